@@ -1,5 +1,5 @@
-//! What `--version` says of a build: commit, compiler, target. Nothing here needs git or a clock; the same sources built by the same
-//! compiler get the same words.
+//! What `--version` says of a build: commit, compiler, target. Nothing here needs git or a clock;
+//! the same sources built by the same compiler get the same words.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,9 +8,14 @@ use std::process::Command;
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
     let variable = |name: &str| std::env::var(name).unwrap_or_else(|_| "unknown".into());
-    let rustc = said(Command::new(variable("RUSTC")).arg("--version")).unwrap_or_else(|| "unknown".into());
+    let rustc =
+        said(Command::new(variable("RUSTC")).arg("--version")).unwrap_or_else(|| "unknown".into());
     // Only releases carry their commit: a debug build would be made anew after every one.
-    let commit = if variable("PROFILE") == "release" { commit() } else { "not recorded in debug builds".into() };
+    let commit = if variable("PROFILE") == "release" {
+        commit()
+    } else {
+        "not recorded in debug builds".into()
+    };
     for (name, value) in [
         ("TWOFOLD_COMMIT", commit),
         ("TWOFOLD_RUSTC", rustc),
@@ -31,8 +36,10 @@ fn commit() -> String {
     }
     let git = |arguments: &[&str]| said(Command::new("git").arg("-C").arg(&here).args(arguments));
     // Sources inside some other repository are not of its commit.
-    let ours = git(&["rev-parse", "--show-toplevel"])
-        .is_some_and(|top| matches!((Path::new(&top).canonicalize(), here.canonicalize()), (Ok(a), Ok(b)) if a == b));
+    let ours = git(&["rev-parse", "--show-toplevel"]).is_some_and(|top| {
+        matches!((Path::new(&top).canonicalize(), here.canonicalize()), (Ok(a),
+            Ok(b)) if a == b)
+    });
     let Some(hash) = git(&["rev-parse", "HEAD"]).filter(|_| ours) else {
         return "unknown (not built from a git checkout)".into();
     };
@@ -47,7 +54,8 @@ fn commit() -> String {
     for path in watched {
         println!("cargo::rerun-if-changed={path}");
     }
-    let changed = git(&[&["status", "--porcelain", "--"], &watched[..]].concat()).is_none_or(|list| !list.is_empty());
+    let changed = git(&[&["status", "--porcelain", "--"], &watched[..]].concat())
+        .is_none_or(|list| !list.is_empty());
     if changed { format!("{hash}, with changes") } else { hash }
 }
 

@@ -1,7 +1,8 @@
 //! Work a second of general systems: `cargo bench -p twofold-benches --bench general`.
 //!
-//! Each line is the fastest of five runs: a ball whose impacts do not accumulate; an oscillator with and without what a step is searched for;
-//! rows of blocks on a belt, where each step must cost in proportion to the number of blocks.
+//! Each line is the fastest of five runs: a ball whose impacts do not accumulate; an oscillator
+//! with and without what a step is searched for; rows of blocks on a belt, where each step must
+//! cost in proportion to the number of blocks.
 
 use std::time::Instant;
 
@@ -32,7 +33,10 @@ fn measure(text: &str, t_end: f64) -> Result<Work, Box<dyn std::error::Error>> {
 /// A row of blocks between springs, each on the belt.
 fn blocks(n: usize) -> String {
     let names = |letter: &str| (0..n).map(|i| format!("'{letter}{i}'")).collect::<Vec<_>>();
-    let start = (0..n).map(|i| format!("{}", 0.01 * i as f64)).chain((0..n).map(|_| "0".into())).collect::<Vec<_>>();
+    let start = (0..n)
+        .map(|i| format!("{}", 0.01 * i as f64))
+        .chain((0..n).map(|_| "0".into()))
+        .collect::<Vec<_>>();
     let mut f: Vec<String> = (0..n).map(|i| format!("'v{i}'")).collect();
     for i in 0..n {
         let left = if i > 0 { format!("x{} - x{i}", i - 1) } else { format!("-x{i}") };
@@ -40,7 +44,12 @@ fn blocks(n: usize) -> String {
         f.push(format!("'{left}{right} - 0.5*sign(v{i} - 0.1) - 0.05*v{i}'"));
     }
     let states = [names("x"), names("v")].concat();
-    format!("states = [{}]\nstart = [{}]\nf = [{}]", states.join(", "), start.join(", "), f.join(", "))
+    format!(
+        "states = [{}]\nstart = [{}]\nf = [{}]",
+        states.join(", "),
+        start.join(", "),
+        f.join(", ")
+    )
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -54,13 +63,21 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         work.seconds
     );
     // An orbit that never comes near the surface, and the same without one.
-    let oscillator = "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-x - 0.2*x^3 + 0.1*cos(1.3*x)']";
+    let oscillator =
+        "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-x - 0.2*x^3 + 0.1*cos(1.3*x)']";
     let plain = measure(oscillator, 5_000.0)?;
-    let event = measure(&format!("{oscillator}\n[[event]]\nwhen = 'x - 3'\nset = {{ v = '-v' }}"), 5_000.0)?;
-    let curved = measure(&format!("{oscillator}\n[[event]]\nwhen = 'x^2 + x*v - 25'\nset = {{ v = '-v' }}"), 5_000.0)?;
+    let event = measure(
+        &format!("{oscillator}\n[[event]]\nwhen = 'x - 3'\nset = {{ v = '-v' }}"),
+        5_000.0,
+    )?;
+    let curved = measure(
+        &format!("{oscillator}\n[[event]]\nwhen = 'x^2 + x*v - 25'\nset = {{ v = '-v' }}"),
+        5_000.0,
+    )?;
     let each = |work: &Work| 1e9 * work.seconds / work.steps as f64;
     println!(
-        "oscillator: {:.0} ns a step; with the event x = 3 {:+.0} %; with the event x^2 + x v = 25 {:+.0} %",
+        "oscillator: {:.0} ns a step; with the event x = 3 {:+.0} %; with the event x^2 + x v = 25 \
+            {:+.0} %",
         each(&plain),
         100.0 * (each(&event) / each(&plain) - 1.0),
         100.0 * (each(&curved) / each(&plain) - 1.0),

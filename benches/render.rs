@@ -1,10 +1,13 @@
-//! Drawing a figure of three sections with 50 000 points each, in both halves: PNG, SVG and PDF together.
+//! Drawing a figure of three sections with 50 000 points each, in both halves: PNG, SVG and PDF
+//! together.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
 use twofold::num::elementary::{cos, sin};
 use twofold::render::render;
-use twofold::render::sheet::{Axis, ColumnWidth, DotStyle, LineStyle, PlanePanel, Sheet, SpacePanel};
+use twofold::render::sheet::{
+    Axis, ColumnWidth, DotStyle, LineStyle, PlanePanel, Sheet, SpacePanel,
+};
 use twofold::render::style;
 
 /// The standard map: islands in a chaotic sea, as in the paper's sections.
@@ -23,7 +26,9 @@ fn cloud(k: f64, n: usize) -> Vec<[f64; 2]> {
 }
 
 fn sections() -> Sheet {
-    let mut sheet = Sheet::new(ColumnWidth::Wide, 3, "Three sections.").title("Sections").footer("*α* = 10^{-3}");
+    let mut sheet = Sheet::new(ColumnWidth::Wide, 3, "Three sections.")
+        .title("Sections")
+        .footer("*α* = 10^{-3}");
     for (label, k) in [("(i)", 0.9), ("(ii)", 0.97), ("(iii)", 1.1)] {
         let panel = PlanePanel::new(Axis::linear("*x*", 0.0, 6.3), Axis::linear("*z*", 0.0, 6.3))
             .dots(cloud(k + 0.5, 25_000), DotStyle::early())
@@ -36,11 +41,16 @@ fn sections() -> Sheet {
 fn curve() -> Sheet {
     let path = (0..300_000)
         .map(|i| f64::from(i) * 2e-3)
-        .map(|t| [sin(t) * (1.0 + 0.3 * cos(0.117 * t)), cos(1.0071 * t), sin(0.0311 * t + 0.4 * sin(t))])
+        .map(|t| {
+            [sin(t) * (1.0 + 0.3 * cos(0.117 * t)), cos(1.0071 * t), sin(0.0311 * t + 0.4 * sin(t))]
+        })
         .collect();
-    let panel =
-        SpacePanel::new(Axis::linear("*x*", -1.4, 1.4), Axis::linear("*y*", -1.2, 1.2), Axis::linear("*z*", -1.2, 1.2))
-            .line(path, LineStyle::new(style::INK, 0.5));
+    let panel = SpacePanel::new(
+        Axis::linear("*x*", -1.4, 1.4),
+        Axis::linear("*y*", -1.2, 1.2),
+        Axis::linear("*z*", -1.2, 1.2),
+    )
+    .line(path, LineStyle::new(style::INK, 0.5));
     Sheet::new(ColumnWidth::Single, 1, "A curve of 300 000 vertices.").panel("(i)", "curve", panel)
 }
 
@@ -48,8 +58,11 @@ fn benchmark(c: &mut Criterion) {
     let (sections, curve) = (sections(), curve());
     let mut group = c.benchmark_group("render");
     group.sample_size(20);
-    group.bench_function("sections, 3 x 50 000 points", |b| b.iter(|| render(black_box(&sections))));
-    group.bench_function("curve in space, 300 000 vertices", |b| b.iter(|| render(black_box(&curve))));
+    group
+        .bench_function("sections, 3 x 50 000 points", |b| b.iter(|| render(black_box(&sections))));
+    group.bench_function("curve in space, 300 000 vertices", |b| {
+        b.iter(|| render(black_box(&curve)))
+    });
     group.finish();
 }
 

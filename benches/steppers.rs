@@ -1,5 +1,6 @@
-//! What a unit of time costs: the caricature, smoothed and hysteretic, both readings, by each method, as the figures run
-//! it (tolerances 10^-7.97727, restart after each 100, step cap 10). Prints the counts of work first, then times.
+//! What a unit of time costs: the caricature, smoothed and hysteretic, both readings, by each
+//! method, as the figures run it (tolerances 10^-7.97727, restart after each 100, step cap 10).
+//! Prints the counts of work first, then times.
 //!
 //! `cargo bench -p twofold-benches --bench steppers`; with `-- --counts` the counts only.
 
@@ -8,8 +9,8 @@ use std::hint::black_box;
 use criterion::{BenchmarkId, Criterion, Throughput};
 use nalgebra::{SVector, vector};
 use twofold::integrate::{
-    Dopri5, DriveOptions, Failure, Flow, Lsoda, Observer, Radau5, Schedule, Statistics, Step, StepCap, Stepper,
-    Summary, Tolerance, drive,
+    Dopri5, DriveOptions, Failure, Flow, Lsoda, Observer, Radau5, Schedule, Statistics, Step,
+    StepCap, Stepper, Summary, Tolerance, drive,
 };
 use twofold::num::elementary::exp10;
 use twofold::system::{Caricature, Hysteretic, Relaxation, Smoothed, Transition, VectorField};
@@ -22,7 +23,11 @@ fn tolerance() -> Tolerance {
 }
 
 fn smoothed(alpha: f64) -> Smoothed<Caricature> {
-    Smoothed { system: Caricature::with_reinjection(alpha, 1e-5), transition: Transition::Tanh, eps: 1e-3 }
+    Smoothed {
+        system: Caricature::with_reinjection(alpha, 1e-5),
+        transition: Transition::Tanh,
+        eps: 1e-3,
+    }
 }
 
 fn hysteretic(alpha: f64) -> Hysteretic<Caricature> {
@@ -83,21 +88,30 @@ fn counts(t_end: f64) {
     println!("work for t = {t_end}");
     println!(
         "{:24} {:7} {:>9} {:>9} {:>11} {:>9} {:>9} {:>9} {:>9}",
-        "system", "method", "steps", "rejected", "evaluations", "Jacobians", "BDF", "switches", "swings"
+        "system",
+        "method",
+        "steps",
+        "rejected",
+        "evaluations",
+        "Jacobians",
+        "BDF",
+        "switches",
+        "swings"
     );
-    let print = |system: &str, method: &str, result: Result<(Statistics, u64), Failure>| match result {
-        Ok((s, swings)) => println!(
-            "{system:24} {method:7} {:9} {:9} {:11} {:9} {:9} {:9} {:>9}",
-            s.steps,
-            s.rejected + s.convergence_failures,
-            s.evaluations,
-            s.jacobians,
-            s.stiff_steps,
-            s.method_switches,
-            if system.starts_with("hysteretic") { swings.to_string() } else { String::new() },
-        ),
-        Err(failure) => println!("{system:24} {method:7} {failure}"),
-    };
+    let print =
+        |system: &str, method: &str, result: Result<(Statistics, u64), Failure>| match result {
+            Ok((s, swings)) => println!(
+                "{system:24} {method:7} {:9} {:9} {:11} {:9} {:9} {:9} {:>9}",
+                s.steps,
+                s.rejected + s.convergence_failures,
+                s.evaluations,
+                s.jacobians,
+                s.stiff_steps,
+                s.method_switches,
+                if system.starts_with("hysteretic") { swings.to_string() } else { String::new() },
+            ),
+            Err(failure) => println!("{system:24} {method:7} {failure}"),
+        };
     for (reading, alpha) in READINGS {
         for method in METHODS {
             let result = by_name(method, &smoothed(alpha), vector![0.2, 0.0, -1.0], t_end);
@@ -117,7 +131,9 @@ fn times(criterion: &mut Criterion) {
         group.throughput(Throughput::Elements(T_END as u64)).sample_size(20);
         for method in METHODS {
             group.bench_function(BenchmarkId::from_parameter(method), |b| {
-                b.iter(|| by_name(method, &smoothed(black_box(alpha)), vector![0.2, 0.0, -1.0], T_END));
+                b.iter(|| {
+                    by_name(method, &smoothed(black_box(alpha)), vector![0.2, 0.0, -1.0], T_END)
+                });
             });
         }
         group.finish();
@@ -125,7 +141,14 @@ fn times(criterion: &mut Criterion) {
         group.throughput(Throughput::Elements(T_END as u64)).sample_size(10);
         for method in METHODS {
             group.bench_function(BenchmarkId::from_parameter(method), |b| {
-                b.iter(|| by_name(method, &hysteretic(black_box(alpha)), vector![0.2, 0.0, -1.0, 1.0], T_END));
+                b.iter(|| {
+                    by_name(
+                        method,
+                        &hysteretic(black_box(alpha)),
+                        vector![0.2, 0.0, -1.0, 1.0],
+                        T_END,
+                    )
+                });
             });
         }
         group.finish();

@@ -1,7 +1,8 @@
-//! The units of work W0 to W3 (benches/README.md), by our methods: `cargo bench -p twofold-benches --bench units -- W1 A dopri5 5`.
+//! The units of work W0 to W3 (benches/README.md), by our methods: `cargo bench -p twofold-benches
+//! --bench units -- W1 A dopri5 5`.
 //!
-//! Prints one line, as the programs in benches/peers do: program, unit, set, the least seconds of the given number of
-//! runs, steps, crossings, final state of the last run.
+//! Prints one line, as the programs in benches/peers do: program, unit, set, the least seconds of
+//! the given number of runs, steps, crossings, final state of the last run.
 
 use std::process::exit;
 use std::time::Instant;
@@ -10,10 +11,12 @@ use nalgebra::{SVector, vector};
 use twofold::analyse::SectionRecorder;
 use twofold::integrate::ensemble::{EnsembleRun, InstructionSet, ensemble_with};
 use twofold::integrate::{
-    Dopri5, DriveOptions, Failure, Ignore, Layered, Lsoda, Radau5, Schedule, StepCap, Stepper, Taylor, Tolerance, drive,
+    Dopri5, DriveOptions, Failure, Ignore, Layered, Lsoda, Radau5, Schedule, StepCap, Stepper,
+    Taylor, Tolerance, drive,
 };
 use twofold::system::{
-    BatchedField, BoundField, Caricature, Field as Recorded, ParameterBatch, Smoothed, System, Transition, VectorField,
+    BatchedField, BoundField, Caricature, Field as Recorded, ParameterBatch, Smoothed, System,
+    Transition, VectorField,
 };
 
 const TOLERANCE: Tolerance = Tolerance { rtol: 1.0536712e-8, atol: 1.0536712e-8 };
@@ -21,7 +24,8 @@ const TOLERANCE: Tolerance = Tolerance { rtol: 1.0536712e-8, atol: 1.0536712e-8 
 /// What Hairer & Wanner's program, and others after it, make of [`TOLERANCE`]: 0.1 rtol^(2/3).
 const REPLACED: Tolerance = Tolerance { rtol: 4.806217345097476e-07, atol: 4.806217345097476e-07 };
 
-/// With which Radau IIA's error at the end of W0 is below that of the crate `differential-equations` in both sets.
+/// With which Radau IIA's error at the end of W0 is below that of the crate
+/// `differential-equations` in both sets.
 const MATCHED: Tolerance = Tolerance { rtol: 1e-5, atol: 1e-5 };
 
 /// For double-double arithmetic.
@@ -41,7 +45,8 @@ fn field(set: &str) -> Field {
 /// The same from its file, as a user's system is.
 fn from_file(set: &str) -> Option<BoundField<3>> {
     let (alpha, beta) = if set == "A" { (1e-3, 1e-5) } else { (1e-1, 1e-4) };
-    let system = System::builtin("caricature")?.with("alpha", alpha).ok()?.with("beta", beta).ok()?;
+    let system =
+        System::builtin("caricature")?.with("alpha", alpha).ok()?.with("beta", beta).ok()?;
     Recorded::smoothed(&system, Transition::Tanh, 1e-3).bind().ok()
 }
 
@@ -78,7 +83,10 @@ fn w2<F: VectorField<3>, M: Stepper<3>>(field: &F, make: impl Fn() -> M) -> Done
 /// W2 in lanes.
 fn w2_in_lanes<E: BatchedField<3>>(equations: &E, set: InstructionSet) -> Done {
     let options = DriveOptions { step_cap: StepCap::Absolute(10.0), ..DriveOptions::to(2000.0) };
-    let run = |k: u32| EnsembleRun { start: vector![0.1 + 0.2 * (f64::from(k) + 0.5) / 1000.0, 0.0, -1.0], options };
+    let run = |k: u32| EnsembleRun {
+        start: vector![0.1 + 0.2 * (f64::from(k) + 0.5) / 1000.0, 0.0, -1.0],
+        options,
+    };
     let runs: Vec<_> = (0..1000).map(run).collect();
     let ends = ensemble_with(set, equations, &runs, TOLERANCE, None, |_| Ignore);
     ends.into_iter().try_fold((0, 0, vector![0.0, 0.0, 0.0]), |done, end| {
@@ -97,7 +105,14 @@ fn w0<F: VectorField<3>, M: Stepper<3>>(field: &F, mut stepper: M) -> Done {
 /// W3: ordinary stretches of the orbit in double-double arithmetic.
 fn w3<F: VectorField<3>>(field: &F) -> Done {
     let options = DriveOptions { step_cap: StepCap::Absolute(10.0), ..DriveOptions::to(300.0) };
-    let end = drive(field, vector![0.2, 0.0, -1.0], &options, &mut Taylor::extended(EXACT), &mut Ignore, &())?;
+    let end = drive(
+        field,
+        vector![0.2, 0.0, -1.0],
+        &options,
+        &mut Taylor::extended(EXACT),
+        &mut Ignore,
+        &(),
+    )?;
     Ok((end.statistics.steps, 0, end.x))
 }
 
@@ -122,7 +137,9 @@ fn once(unit: &str, set: &str, method: &str) -> Option<Done> {
         ("W1", "layered") => w1(&field, Layered::new(TOLERANCE)),
         ("W2", "layered") => w2(&field, || Layered::new(TOLERANCE)),
         ("W2", "dopri5") => w2(&field, || Dopri5::new(TOLERANCE)),
-        ("W2", "dopri5-lanes-avx2") if InstructionSet::Avx2.is_here() => w2_in_lanes(&field, InstructionSet::Avx2),
+        ("W2", "dopri5-lanes-avx2") if InstructionSet::Avx2.is_here() => {
+            w2_in_lanes(&field, InstructionSet::Avx2)
+        }
         ("W2", "dopri5-lanes-avx512") if InstructionSet::Avx512.is_here() => {
             w2_in_lanes(&field, InstructionSet::Avx512)
         }
@@ -142,8 +159,11 @@ fn once(unit: &str, set: &str, method: &str) -> Option<Done> {
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
-    let [unit, set, method, repeats] = words.iter().map(String::as_str).collect::<Vec<_>>()[..] else {
-        println!("usage: cargo bench -p twofold-benches --bench units -- W0|W1|W2|W3 A|B METHOD REPEATS");
+    let [unit, set, method, repeats] = words.iter().map(String::as_str).collect::<Vec<_>>()[..]
+    else {
+        println!(
+            "usage: cargo bench -p twofold-benches --bench units -- W0|W1|W2|W3 A|B METHOD REPEATS"
+        );
         return;
     };
     let mut best = f64::INFINITY;
@@ -155,7 +175,10 @@ fn main() {
     }
     match last {
         Some(Ok((steps, crossings, x))) => {
-            println!("twofold-{method} {unit} {set} {best:.6} {steps} {crossings} {} {} {}", x[0], x[1], x[2]);
+            println!(
+                "twofold-{method} {unit} {set} {best:.6} {steps} {crossings} {} {} {}",
+                x[0], x[1], x[2]
+            );
         }
         Some(Err(failure)) => {
             eprintln!("{failure}");

@@ -1,7 +1,9 @@
-//! How a disturbance grows in one passage of the two-fold when the switch acts late or has a memory, and where the two-fold is left in dependence on
-//! the chatter's phase: the data of figures/delay.
+//! How a disturbance grows in one passage of the two-fold when the switch acts late or has a
+//! memory, and where the two-fold is left in dependence on the chatter's phase: the data of
+//! figures/delay.
 //!
-//! `cargo run --release --example delay_growth growth > figures/delay/growth.csv`, and the same with `exits`
+//! `cargo run --release --example delay_growth growth > figures/delay/growth.csv`, and the same
+//! with `exits`
 
 use nalgebra::SVector;
 use twofold::analyse::delay::{LateGrowth, LatePassageQuestion, LateRule, late_exit, late_growth};
@@ -11,8 +13,14 @@ use twofold::num::fit::line;
 use twofold::system::{Caricature, System};
 
 /// Starts in attracting sliding, whose chatter comes to the two-fold in different phases.
-pub const STARTS: [[f64; 3]; 6] =
-    [[0.0, 0.3, 0.2], [0.0, 0.25, 0.25], [0.0, 0.2, 0.3], [0.0, 0.28, 0.26], [0.0, 0.31, 0.22], [0.0, 0.22, 0.27]];
+pub const STARTS: [[f64; 3]; 6] = [
+    [0.0, 0.3, 0.2],
+    [0.0, 0.25, 0.25],
+    [0.0, 0.2, 0.3],
+    [0.0, 0.28, 0.26],
+    [0.0, 0.31, 0.22],
+    [0.0, 0.22, 0.27],
+];
 /// delay/sqrt(eps) of the smooth rule.
 const RATIOS: [f64; 11] = [0.03, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 10.0];
 /// Phases of the chatter, evenly over one period.
@@ -38,17 +46,21 @@ pub fn growth(rule: LateRule, starts: &[[f64; 3]]) -> Result<Vec<LateGrowth>, Fa
     starts.iter().map(|start| late_growth(&caricature, &data, &question(rule, *start))).collect()
 }
 
-/// Slopes of log growth against the log of the rule's parameter, with their standard errors: across, along, carried in.
+/// Slopes of log growth against the log of the rule's parameter, with their standard errors:
+/// across, along, carried in.
 pub fn exponents(found: &[(f64, Vec<LateGrowth>)]) -> [(f64, f64); 3] {
     [|g: &LateGrowth| g.across, |g: &LateGrowth| g.along, |g: &LateGrowth| g.carried_in].map(|of| {
-        let all = found.iter().flat_map(|(parameter, growth)| growth.iter().map(|g| (*parameter, of(g))));
-        let points: Vec<_> = all.filter(|p| p.1.is_finite()).map(|(p, g)| (log10(p), log10(g))).collect();
+        let all =
+            found.iter().flat_map(|(parameter, growth)| growth.iter().map(|g| (*parameter, of(g))));
+        let points: Vec<_> =
+            all.filter(|p| p.1.is_finite()).map(|(p, g)| (log10(p), log10(g))).collect();
         line(&points).map_or((f64::NAN, f64::NAN), |line| (line.slope, line.slope_error))
     })
 }
 
-/// A start on the sliding orbit of [`STARTS`]' first, later by `phase` times a bound of the chatter's period: the period of steady chatter, along the orbit
-/// of the normal form, which is longer by a tenth.
+/// A start on the sliding orbit of [`STARTS`]' first, later by `phase` times a bound of the
+/// chatter's period: the period of steady chatter, along the orbit of the normal form, which is
+/// longer by a tenth.
 pub fn start_at(rule: LateRule, phase: f64) -> [f64; 3] {
     let [_, y, z] = STARTS[0];
     let period = match rule {
@@ -68,7 +80,8 @@ pub fn start_at(rule: LateRule, phase: f64) -> [f64; 3] {
 pub fn exit(rule: LateRule, start: [f64; 3]) -> Result<[f64; 3], Failure> {
     let (caricature, data) = system();
     let none = SVector::zeros();
-    Ok((late_exit(&caricature, &data, &question(rule, start), none, none)? / rule.scales()[1]).into())
+    Ok((late_exit(&caricature, &data, &question(rule, start), none, none)? / rule.scales()[1])
+        .into())
 }
 
 /// A quarter of a decade per step, from 10^`from` down over so many decades.

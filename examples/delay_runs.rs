@@ -1,7 +1,8 @@
-//! Runs of a delayed switch beside smoothed and hysteretic ones, compared by the rules of sentence 4.8 (crates/paper/src/claims.toml): the data
-//! of figures/delay.
+//! Runs of a delayed switch beside smoothed and hysteretic ones, compared by the rules of sentence
+//! 4.8 (crates/paper/src/claims.toml): the data of figures/delay.
 //!
-//! `make delay-data`: late sections go to a journal first, target/delay-sections-*.jsonl, and a call of the same version goes on with it.
+//! `make delay-data`: late sections go to a journal first, target/delay-sections-*.jsonl, and a
+//! call of the same version goes on with it.
 
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -25,7 +26,9 @@ use twofold::paper::Reading;
 use twofold::paper::claims::{Similarity, claims};
 use twofold::paper::similarity::{RULES, Rule};
 use twofold::record::Hash;
-use twofold::system::{Caricature, Hysteretic, Relaxation, Smoothed, System, Transition, VectorField};
+use twofold::system::{
+    Caricature, Hysteretic, Relaxation, Smoothed, System, Transition, VectorField,
+};
 
 /// Of all rules.
 const EPS: f64 = 1e-3;
@@ -91,26 +94,37 @@ pub fn shift(run: u64) -> [f64; 3] {
 
 /// What has captured the run by the time from which its section is shown.
 pub fn settles(crossings: &[Crossing], t_end: f64) -> (String, f64) {
-    let point = |c: &Crossing| SectionPoint { t: c.t, u: [c.x[0], c.x[2]], upward: c.direction == Direction::Up };
+    let point = |c: &Crossing| SectionPoint {
+        t: c.t,
+        u: [c.x[0], c.x[2]],
+        upward: c.direction == Direction::Up,
+    };
     let section: Vec<SectionPoint> = crossings.iter().map(point).collect();
     let shown_from = claims().similarity.shown_from;
     let question = Question { t_end: Some(t_end), shown_from, ..Question::default() };
     let evidence = classify(&section, &question, &Thresholds::default());
     match evidence.verdict.cycle() {
-        Some(cycle) if cycle.captured_at <= shown_from => (format!("period-{}", cycle.period), cycle.captured_at),
+        Some(cycle) if cycle.captured_at <= shown_from => {
+            (format!("period-{}", cycle.period), cycle.captured_at)
+        }
         Some(cycle) => ("nothing".into(), cycle.captured_at),
         None => ("nothing".into(), f64::NAN),
     }
 }
 
 /// The late section's points, counted by cells.
-fn cells(crossings: &[Crossing], window: f64, Similarity { cells, .. }: &Similarity) -> BTreeMap<usize, u64> {
+fn cells(
+    crossings: &[Crossing],
+    window: f64,
+    Similarity { cells, .. }: &Similarity,
+) -> BTreeMap<usize, u64> {
     let mut counts = BTreeMap::new();
     for c in crossings.iter().filter(|c| c.t >= claims().similarity.shown_from) {
         let place = |u: f64| (0.5 * (u / window + 1.0) * *cells as f64).floor();
         let (i, k) = (place(c.x[0]), place(c.x[2]));
         let inside = |i: f64| i >= 0.0 && i < *cells as f64;
-        let cell = if inside(i) && inside(k) { i as usize * cells + k as usize } else { cells * cells };
+        let cell =
+            if inside(i) && inside(k) { i as usize * cells + k as usize } else { cells * cells };
         *counts.entry(cell).or_insert(0) += 1;
     }
     counts
@@ -128,8 +142,8 @@ pub fn followed(run: &RunSpec) -> Result<Vec<Crossing>, Box<dyn Error>> {
     }
 }
 
-/// The late section that figure 9(i) would show under another rule, as the figure shows it: every so manyth point, an odd number because
-/// crossings of two senses alternate.
+/// The late section that figure 9(i) would show under another rule, as the figure shows it: every
+/// so manyth point, an odd number because crossings of two senses alternate.
 fn show(reading: Reading, rule: Rule, out: &mut dyn Write) -> Result<(), Box<dyn Error>> {
     let rules = claims().rules;
     let crossings = followed(&run(reading, rule, [0.0; 3], rules.end))?;
@@ -151,9 +165,8 @@ fn section(reading: Reading, rule: Rule, number: u64) -> Result<Value, Box<dyn E
     let (outcome, captured_at) = settles(&crossings, rules.similarity.end);
     let cells: Vec<_> = cells(&crossings, window, &rules.similarity).into_iter().collect();
     let (reading, rule) = (reading.word(), rule.name());
-    Ok(
-        json!({ "reading": reading, "rule": rule, "run": number, "outcome": outcome, "captured_at": captured_at, "cells": cells }),
-    )
+    Ok(json!({ "reading": reading, "rule": rule, "run": number, "outcome": outcome,
+            "captured_at": captured_at, "cells": cells }))
 }
 
 /// Lengths of chatter, and the exit: its distance from the two-fold, negative if x falls there.
@@ -211,16 +224,23 @@ fn passages(reading: Reading, rule: Rule, number: u64) -> Result<Passed, Box<dyn
     let Similarity { inside: [low, high], passages, seed, beyond, .. } = claims().similarity;
     // Streams of their own for each rule: runs of two rules are independent, too.
     let mut random = RandomStream::new(seed, 1000 * (1 + rule as u64) + number);
-    let (caricature, data): (Caricature, System) = (reading.caricature(), reading.caricature().into());
+    let (caricature, data): (Caricature, System) =
+        (reading.caricature(), reading.caricature().into());
     let mut passed = Passed::default();
     for _ in 0..passages {
         let x0 = vector![0.0, random.uniform_in(low, high), random.uniform_in(low, high)];
         let beyond = beyond * scale(rule);
         match (delay(rule), relaxation(rule)) {
             (Some(delay), _) => {
-                let switch = LateSwitch::Delayed { delay, smooth: None, history: History::Constant };
+                let switch =
+                    LateSwitch::Delayed { delay, smooth: None, history: History::Constant };
                 let delayed = Delayed { sides: Sides::new(&caricature, &data), switch, x0 };
-                delayed.with_stepper(Method::Taylor, None, TOLERANCE, Late(&mut passed, x0, beyond))??;
+                delayed.with_stepper(
+                    Method::Taylor,
+                    None,
+                    TOLERANCE,
+                    Late(&mut passed, x0, beyond),
+                )??;
             }
             (None, Some(relaxation)) => {
                 let (system, eps, eps_prime) = (caricature, EPS, RELAXATION * EPS);
@@ -253,19 +273,24 @@ fn scaled(runs: &mut [Vec<f64>]) {
     }
 }
 
-/// The largest distance of two distribution functions: of a run's values and of a pool's, less `own` values of it if the run is part of the pool.
+/// The largest distance of two distribution functions: of a run's values and of a pool's, less
+/// `own` values of it if the run is part of the pool.
 fn kolmogorov_smirnov(run: &[f64], pool: &[f64], own: bool) -> f64 {
     let rest = pool.len() - if own { run.len() } else { 0 };
     let share = |value: f64, equal: bool| {
         let below = |of: &[f64]| of.partition_point(|v| *v < value || (equal && *v == value));
         let mine = below(run);
-        (mine as f64 / run.len() as f64, (below(pool) - if own { mine } else { 0 }) as f64 / rest as f64)
+        (
+            mine as f64 / run.len() as f64,
+            (below(pool) - if own { mine } else { 0 }) as f64 / rest as f64,
+        )
     };
     let gap = |value: f64, equal: bool| {
         let (a, b) = share(value, equal);
         (a - b).abs()
     };
-    // Between jumps of the run the pool's function is monotonic: the largest distance is at one of them.
+    // Between jumps of the run the pool's function is monotonic: the largest distance is at one of
+    // them.
     run.iter().fold(0.0, |most: f64, v| most.max(gap(*v, true)).max(gap(*v, false)))
 }
 
@@ -278,7 +303,9 @@ fn total_variation(run: &BTreeMap<usize, u64>, pool: &BTreeMap<usize, u64>, own:
     };
     let (mine, others) = (all(run) as f64, (all(pool) - if own { all(run) } else { 0 }) as f64);
     let cells: std::collections::BTreeSet<&usize> = run.keys().chain(pool.keys()).collect();
-    let gap = |cell: &usize| (run.get(cell).copied().unwrap_or(0) as f64 / mine - rest(cell) as f64 / others).abs();
+    let gap = |cell: &usize| {
+        (run.get(cell).copied().unwrap_or(0) as f64 / mine - rest(cell) as f64 / others).abs()
+    };
     0.5 * cells.into_iter().map(gap).sum::<f64>()
 }
 
@@ -297,7 +324,11 @@ impl Runs {
         for (cell, n) in self.cells.iter().flatten() {
             *cells.entry(*cell).or_insert(0) += n;
         }
-        (cells, sorted(self.lengths.iter().flatten().copied()), sorted(self.exits.iter().flatten().copied()))
+        (
+            cells,
+            sorted(self.lengths.iter().flatten().copied()),
+            sorted(self.exits.iter().flatten().copied()),
+        )
     }
 
     fn has_chatter(&self) -> bool {
@@ -309,7 +340,8 @@ impl Runs {
 /// The journal of the runs that this version of the program makes by these rules.
 fn journal() -> String {
     let rules = format!("{:?} {:?}", claims().rules, claims().similarity);
-    let version: String = Hash::of(format!("{NUMERICS} {rules} {}", include_str!("delay_runs.rs")).as_bytes()).into();
+    let version: String =
+        Hash::of(format!("{NUMERICS} {rules} {}", include_str!("delay_runs.rs")).as_bytes()).into();
     format!("target/delay-sections-{}.jsonl", &version[..12])
 }
 
@@ -332,7 +364,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         Err(_) => Vec::new(),
     };
     let find = |all: &[Value], reading: Reading, rule: Rule, run: u64| {
-        let is_it = |v: &&Value| v["reading"] == reading.word() && v["rule"] == rule.name() && v["run"] == run;
+        let is_it = |v: &&Value| {
+            v["reading"] == reading.word() && v["rule"] == rule.name() && v["run"] == run
+        };
         all.iter().find(is_it).cloned()
     };
     let mut writer = OpenOptions::new().create(true).append(true).open(&journal)?;
@@ -352,15 +386,24 @@ fn main() -> Result<(), Box<dyn Error>> {
     for reading in Reading::ALL {
         let mut of = Vec::new();
         for rule in RULES {
-            let lines: Vec<Value> = (0..runs).filter_map(|run| find(&all, reading, rule, run)).collect();
-            let passed = (0..runs).map(|run| passages(reading, rule, run)).collect::<Result<Vec<_>, _>>()?;
+            let lines: Vec<Value> =
+                (0..runs).filter_map(|run| find(&all, reading, rule, run)).collect();
+            let passed =
+                (0..runs).map(|run| passages(reading, rule, run)).collect::<Result<Vec<_>, _>>()?;
             let mut found = Runs {
-                outcome: lines.iter().map(|v| v["outcome"].as_str().unwrap_or_default().to_owned()).collect(),
-                captured_at: lines.iter().map(|v| v["captured_at"].as_f64().unwrap_or(f64::NAN)).collect(),
+                outcome: lines
+                    .iter()
+                    .map(|v| v["outcome"].as_str().unwrap_or_default().to_owned())
+                    .collect(),
+                captured_at: lines
+                    .iter()
+                    .map(|v| v["captured_at"].as_f64().unwrap_or(f64::NAN))
+                    .collect(),
                 cells: lines
                     .iter()
                     .map(|v| {
-                        serde_json::from_value::<Vec<(usize, u64)>>(v["cells"].clone()).map(|c| c.into_iter().collect())
+                        serde_json::from_value::<Vec<(usize, u64)>>(v["cells"].clone())
+                            .map(|c| c.into_iter().collect())
                     })
                     .collect::<Result<_, _>>()?,
                 lengths: passed.iter().map(|p| p.lengths.clone()).collect(),
@@ -374,14 +417,20 @@ fn main() -> Result<(), Box<dyn Error>> {
         for (i, (rule, mine)) in of.iter().enumerate() {
             for number in 0..mine.outcome.len() {
                 let captured = mine.captured_at[number];
-                let mut row =
-                    format!("{},{},{number},{},{captured:.1}", reading.word(), rule.name(), mine.outcome[number]);
+                let mut row = format!(
+                    "{},{},{number},{},{captured:.1}",
+                    reading.word(),
+                    rule.name(),
+                    mine.outcome[number]
+                );
                 let mut distances = [const { String::new() }; 4];
                 for (k, (_, others)) in of.iter().enumerate().take(3) {
                     let (own, (cells, lengths, exits)) = (i == k, &pools[k]);
-                    let same = others.outcome.iter().filter(|o| **o == mine.outcome[number]).count();
+                    let same =
+                        others.outcome.iter().filter(|o| **o == mine.outcome[number]).count();
                     let own_count = usize::from(own);
-                    let settles = 1.0 - (same - own_count) as f64 / (others.outcome.len() - own_count) as f64;
+                    let settles =
+                        1.0 - (same - own_count) as f64 / (others.outcome.len() - own_count) as f64;
                     let occupancy = total_variation(&mine.cells[number], cells, own);
                     let chatter = if own || (mine.has_chatter() && others.has_chatter()) {
                         if mine.lengths[number].is_empty() {
@@ -393,7 +442,9 @@ fn main() -> Result<(), Box<dyn Error>> {
                         1.0
                     };
                     let exits = kolmogorov_smirnov(&mine.exits[number], exits, own);
-                    for (text, distance) in distances.iter_mut().zip([settles, occupancy, chatter, exits]) {
+                    for (text, distance) in
+                        distances.iter_mut().zip([settles, occupancy, chatter, exits])
+                    {
                         text.push_str(&format!(",{distance:.4}"));
                     }
                 }

@@ -1,4 +1,5 @@
-//! A figure of your own: a picture of two runs, computed, drawn and written like the paper's, with its numbers and hashes beside it.
+//! A figure of your own: a picture of two runs, computed, drawn and written like the paper's, with
+//! its numbers and hashes beside it.
 //!
 //! `cargo run --example own_figure [FOLDER]`
 

@@ -1,11 +1,13 @@
-//! A method of your own: the classical Runge-Kutta method with a fixed step, as a stepper that everything else can use. Here it makes a Poincaré
-//! section beside Dormand-Prince.
+//! A method of your own: the classical Runge-Kutta method with a fixed step, as a stepper that
+//! everything else can use. Here it makes a Poincaré section beside Dormand-Prince.
 //!
 //! `cargo run --example own_method`
 
 use nalgebra::{SVector, vector};
 use twofold::analyse::SectionRecorder;
-use twofold::integrate::{Dopri5, DriveOptions, Failure, Interpolant, Statistics, Step, Stepper, Tolerance, drive};
+use twofold::integrate::{
+    Dopri5, DriveOptions, Failure, Interpolant, Statistics, Step, Stepper, Tolerance, drive,
+};
 use twofold::num::Elementary;
 use twofold::system::VectorField;
 
@@ -106,7 +108,14 @@ impl VectorField<2> for Pendulum {
 /// When the pendulum passes its lowest point.
 fn passages<M: Stepper<2>>(mut method: M) -> Result<Vec<f64>, Failure> {
     let mut section = SectionRecorder::<2>::new(0, 0.0);
-    let _ = drive(&Pendulum, vector![1.0, 0.0], &DriveOptions::to(30.0), &mut method, &mut section, &())?;
+    let _ = drive(
+        &Pendulum,
+        vector![1.0, 0.0],
+        &DriveOptions::to(30.0),
+        &mut method,
+        &mut section,
+        &(),
+    )?;
     Ok(section.into_crossings().iter().map(|c| c.t).collect())
 }
 

@@ -1,10 +1,13 @@
-//! A piecewise-smooth system of your own, run by the event-driven integrator: a planar predator-prey model in which the
-//! predator hunts the prey only while it is plentiful: h = prey - refuge.
+//! A piecewise-smooth system of your own, run by the event-driven integrator: a planar
+//! predator-prey model in which the predator hunts the prey only while it is plentiful: h = prey -
+//! refuge.
 //!
 //! `cargo run --example own_system`
 
 use nalgebra::{SVector, vector};
-use twofold::integrate::filippov::{ExitRule, FilippovError, FilippovOptions, ModeEvent, Side, Trajectory, run};
+use twofold::integrate::filippov::{
+    ExitRule, FilippovError, FilippovOptions, ModeEvent, Side, Trajectory, run,
+};
 use twofold::num::Elementary;
 use twofold::system::PiecewiseSmooth;
 
@@ -30,15 +33,26 @@ impl PiecewiseSmooth<2> for Refuge {
 ///
 /// If the orbit cannot be followed.
 pub fn follow() -> Result<Vec<ModeEvent<2>>, FilippovError> {
-    let rule = ExitRule::AtOnce { side: Side::Plus }; // What to do where the future is not unique: must be chosen.
+    // What to do where the future is not unique: must be chosen.
+    let rule = ExitRule::AtOnce { side: Side::Plus };
     let mut record = Trajectory::new(4);
-    let _ = run(&Refuge { prey_needed: 1.0 }, vector![2.0, 0.8], 40.0, &FilippovOptions::default(), rule, &mut record)?;
+    let _ = run(
+        &Refuge { prey_needed: 1.0 },
+        vector![2.0, 0.8],
+        40.0,
+        &FilippovOptions::default(),
+        rule,
+        &mut record,
+    )?;
     Ok(record.events)
 }
 
 fn main() -> Result<(), FilippovError> {
     for event in follow()? {
-        println!("t = {:8.4}  prey {:.4}  predator {:.4}  {:?}", event.t, event.state[0], event.state[1], event.kind);
+        println!(
+            "t = {:8.4}  prey {:.4}  predator {:.4}  {:?}",
+            event.t, event.state[0], event.state[1], event.kind
+        );
     }
     Ok(())
 }

@@ -1,4 +1,5 @@
-//! Draws a gallery of made-up data with every kind of panel, to look at. `cargo run --release --example render_gallery -- OUTDIR [NAME]`
+//! Draws a gallery of made-up data with every kind of panel, to look at. `cargo run --release
+//! --example render_gallery -- OUTDIR [NAME]`
 
 use twofold::num::elementary::{cos, exp, sin};
 use twofold::render::render;
@@ -27,7 +28,8 @@ fn sections() -> Sheet {
     }
     let chaos = standard_map(1.3, (3.0, 0.1), 50_000);
     let transient = standard_map(1.6, (1.0, 0.3), 700);
-    let two: Vec<[f64; 2]> = (0..9000).map(|i| if i % 2 == 0 { [1.7, -0.02] } else { [-1.34, -0.02] }).collect();
+    let two: Vec<[f64; 2]> =
+        (0..9000).map(|i| if i % 2 == 0 { [1.7, -0.02] } else { [-1.34, -0.02] }).collect();
     let panel = |first: Vec<[f64; 2]>, late: Vec<[f64; 2]>| {
         let (x, y) = axes();
         PlanePanel::new(x, y).dots(first, early()).dots(late, DotStyle::late())
@@ -40,15 +42,23 @@ fn sections() -> Sheet {
         .legend(LegendEntry::new(LegendKey::Dots(early()), "0 < *t* ≤ 10^{5}"))
         .legend(LegendEntry::new(LegendKey::Dots(DotStyle::late()), "10^{5} < *t* ≤ 2×10^{5}"))
         .banner("SHORTENED: *t* = 500 instead of 200 000")
-        .footer("Caricature (5), smoothed (8); *α* = 10^{-1}, *β* = 10^{-5}, *ε* = 10^{-3}, *v*_{+} = -1.2, *v*_{-} = -1.4; start (0.2, 0, -1); LSODA, rtol = atol = 10^{-7.97727}, step cap a tenth of the interval; state (*x*, *y*, *z*) restarted after every interval.")
+        .footer(
+            "Caricature (5), smoothed (8); *α* = 10^{-1}, *β* = 10^{-5}, *ε* = 10^{-3}, \
+            *v*_{+} = -1.2, *v*_{-} = -1.4; start (0.2, 0, -1); LSODA, rtol = atol = \
+            10^{-7.97727}, step cap a tenth of the interval; state (*x*, *y*, *z*) restarted after \
+            every interval.",
+        )
         .provenance("spec", "0123abcd")
         .provenance("reading", "reconstructed & <odd> \"α\" (x) \\ y")
 }
 
 fn lorenz(n: usize, dt: f64) -> Vec<[f64; 3]> {
     let mut s = [1.0, 1.0, 20.0];
-    let f = |s: [f64; 3]| [10.0 * (s[1] - s[0]), s[0] * (28.0 - s[2]) - s[1], s[0] * s[1] - 8.0 / 3.0 * s[2]];
-    let add = |a: [f64; 3], b: [f64; 3], h: f64| [a[0] + h * b[0], a[1] + h * b[1], a[2] + h * b[2]];
+    let f = |s: [f64; 3]| {
+        [10.0 * (s[1] - s[0]), s[0] * (28.0 - s[2]) - s[1], s[0] * s[1] - 8.0 / 3.0 * s[2]]
+    };
+    let add =
+        |a: [f64; 3], b: [f64; 3], h: f64| [a[0] + h * b[0], a[1] + h * b[1], a[2] + h * b[2]];
     (0..n)
         .map(|_| {
             let k1 = f(s);
@@ -81,12 +91,19 @@ fn space() -> Sheet {
     .line(path, LineStyle::default())
     .markers(vec![[0.0, 0.0, 27.0]], MarkerStyle::new(MarkerShape::Dot, style::MAGENTA))
     .note([0.0, 0.0, 27.0], "two-fold", Anchor::Right);
-    let mut sheet = Sheet::new(ColumnWidth::Single, 1, "A trajectory of the Lorenz system and a plane.")
-        .title("Wheel trajectory (reconstruction)")
-        .panel("", "", panel)
-        .footer("*m* = 1, *J* = 0.02, *d* = 1, *γ* = *π*/4, *k*_{w} = 2, *ε* = 10^{-3}, *t* = 0…60");
+    let mut sheet =
+        Sheet::new(ColumnWidth::Single, 1, "A trajectory of the Lorenz system and a plane.")
+            .title("Wheel trajectory (reconstruction)")
+            .panel("", "", panel)
+            .footer(
+                "*m* = 1, *J* = 0.02, *d* = 1, *γ* = *π*/4, *k*_{w} = 2, *ε* = 10^{-3}, *t* = 0…60",
+            );
     sheet.panel_aspect = 0.9;
-    for (c, t) in [(style::ATTRACTING, "attracting"), (style::REPELLING, "repelling"), (style::CROSSING, "crossing")] {
+    for (c, t) in [
+        (style::ATTRACTING, "attracting"),
+        (style::REPELLING, "repelling"),
+        (style::CROSSING, "crossing"),
+    ] {
         sheet = sheet.legend(LegendEntry::new(LegendKey::Area(c, style::SURFACE_OPACITY), t));
     }
     sheet.legend(LegendEntry::new(LegendKey::Line(LineStyle::default()), "trajectory"))
@@ -102,7 +119,11 @@ fn four_spaces() -> Sheet {
             Axis::linear("*x*", -20.0, 20.0),
         )
         .line(path.iter().map(|p| [p[1], p[2], p[0]]).collect(), LineStyle::new(style::INK, 0.5));
-        sheet = sheet.panel(label, ["smoothed", "hysteretic", "noise, run 1", "noise, run 2"][i], panel);
+        sheet = sheet.panel(
+            label,
+            ["smoothed", "hysteretic", "noise, run 1", "noise, run 2"][i],
+            panel,
+        );
     }
     sheet.panel_aspect = 1.0;
     sheet
@@ -112,21 +133,31 @@ fn charts() -> Sheet {
     let cost = |c: f64, order: f64| -> Vec<[f64; 2]> {
         (2..12)
             .map(|k| {
-                [c * exp(f64::from(k) * std::f64::consts::LN_10 / order), exp(-f64::from(k) * std::f64::consts::LN_10)]
+                [
+                    c * exp(f64::from(k) * std::f64::consts::LN_10 / order),
+                    exp(-f64::from(k) * std::f64::consts::LN_10),
+                ]
             })
             .collect()
     };
-    let mut work =
-        PlanePanel::new(Axis::log("function evaluations", 50.0, 2e5), Axis::log("error at the end", 1e-12, 1e-1))
-            .grid();
+    let mut work = PlanePanel::new(
+        Axis::log("function evaluations", 50.0, 2e5),
+        Axis::log("error at the end", 1e-12, 1e-1),
+    )
+    .grid();
     for (i, (name, c, order)) in
-        [("LSODA", 60.0, 6.0), ("DOPRI5", 40.0, 5.0), ("Radau IIA", 90.0, 5.5)].into_iter().enumerate()
+        [("LSODA", 60.0, 6.0), ("DOPRI5", 40.0, 5.0), ("Radau IIA", 90.0, 5.5)]
+            .into_iter()
+            .enumerate()
     {
         let shape = [MarkerShape::Dot, MarkerShape::Square, MarkerShape::Triangle][i];
-        let (line, marker) = (LineStyle::new(style::SERIES[i], 1.0), MarkerStyle::new(shape, style::SERIES[i]));
+        let (line, marker) =
+            (LineStyle::new(style::SERIES[i], 1.0), MarkerStyle::new(shape, style::SERIES[i]));
         let points = cost(c, order);
-        work =
-            work.line(points.clone(), line).markers(points, marker).legend(LegendKey::LineMarker(line, marker), name);
+        work = work
+            .line(points.clone(), line)
+            .markers(points, marker)
+            .legend(LegendKey::LineMarker(line, marker), name);
     }
     let regions = PlanePanel::new(Axis::linear("*y*", -2.0, 2.0), Axis::linear("*z*", -2.0, 2.0))
         .equal()
@@ -135,7 +166,10 @@ fn charts() -> Sheet {
         .area(vec![[0.0, 0.0], [5.0, 0.0], [5.0, -5.0], [0.0, -5.0]], style::CROSSING)
         .area(vec![[0.0, 0.0], [-5.0, 0.0], [-5.0, 5.0], [0.0, 5.0]], style::CROSSING)
         .arrow(
-            (0..60).map(|i| f64::from(i) * 0.025).map(|t| [1.8 - t, 1.9 - 1.2 * t - 0.1 * sin(4.0 * t)]).collect(),
+            (0..60)
+                .map(|i| f64::from(i) * 0.025)
+                .map(|t| [1.8 - t, 1.9 - 1.2 * t - 0.1 * sin(4.0 * t)])
+                .collect(),
             LineStyle::default(),
         )
         .arrow(vec![[-0.2, -0.2], [-1.5, -0.8]], LineStyle::default().dashed())
@@ -169,7 +203,10 @@ fn charts() -> Sheet {
 fn helix() -> SpacePanel {
     let unit = |t: &str| Axis::linear(t, -1.0, 1.0);
     let turn = |from: u32, to: u32| {
-        (from..to).map(|i| f64::from(i) * 0.02).map(|t| [0.8 * cos(t), 0.8 * sin(t), t / 8.0 - 1.0]).collect()
+        (from..to)
+            .map(|i| f64::from(i) * 0.02)
+            .map(|t| [0.8 * cos(t), 0.8 * sin(t), t / 8.0 - 1.0])
+            .collect()
     };
     let plane = grid_surface(
         (-1.0, 1.0, 20),
@@ -197,7 +234,11 @@ fn helix() -> SpacePanel {
 fn edge_cases() -> Sheet {
     Sheet::new(ColumnWidth::Wide, 4, "Edge cases.")
         .title("Edge cases")
-        .panel("(a)", "empty", PlanePanel::new(Axis::linear("*x*", 0.0, 1.0), Axis::linear("*y*", 0.0, 1.0)))
+        .panel(
+            "(a)",
+            "empty",
+            PlanePanel::new(Axis::linear("*x*", 0.0, 1.0), Axis::linear("*y*", 0.0, 1.0)),
+        )
         .panel(
             "(b)",
             "one point",
@@ -244,7 +285,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         ("edge", edge_cases()),
     ];
     let only = std::env::args().nth(2);
-    for (name, sheet) in all.into_iter().filter(|(name, _)| only.as_deref().is_none_or(|o| o == *name)) {
+    for (name, sheet) in
+        all.into_iter().filter(|(name, _)| only.as_deref().is_none_or(|o| o == *name))
+    {
         let started = std::time::Instant::now();
         let picture = render(&sheet)?;
         println!(

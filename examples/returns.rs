@@ -1,12 +1,15 @@
-//! How many orbits that leave the repelling sliding region of the paper's caricature come back to its two-fold: starts drawn evenly from a box of that
-//! region, left at once to either side in turn, followed for 300 units of time or until they are back. (The paper says that all come back.)
+//! How many orbits that leave the repelling sliding region of the paper's caricature come back to
+//! its two-fold: starts drawn evenly from a box of that region, left at once to either side in
+//! turn, followed for 300 units of time or until they are back. (The paper says that all come
+//! back.)
 //!
 //! `make returns`, or `cargo run --release --example returns`
 
 use nalgebra::{SVector, vector};
 use twofold::analyse::counts::wilson;
 use twofold::integrate::filippov::{
-    EventKind, ExitRule, FilippovError, FilippovObserver, FilippovOptions, Mode, ModeEvent, Side, run,
+    EventKind, ExitRule, FilippovError, FilippovObserver, FilippovOptions, Mode, ModeEvent, Side,
+    run,
 };
 use twofold::integrate::{Flow, Step, Tolerance};
 use twofold::num::random::RandomStream;
@@ -30,17 +33,22 @@ impl FilippovObserver<3> for Back {
     }
 }
 
-/// How many of `starts` orbits come back: y and z down to `-box_size`, where both fields point away from x = 0.
+/// How many of `starts` orbits come back: y and z down to `-box_size`, where both fields point away
+/// from x = 0.
 ///
 /// # Errors
 ///
 /// If an orbit cannot be followed.
 pub fn back(system: &Caricature, box_size: f64, starts: u64) -> Result<u64, FilippovError> {
-    let settings = FilippovOptions { tolerance: Tolerance { rtol: 1e-12, atol: 1e-12 }, ..FilippovOptions::default() };
+    let settings = FilippovOptions {
+        tolerance: Tolerance { rtol: 1e-12, atol: 1e-12 },
+        ..FilippovOptions::default()
+    };
     let mut count = 0;
     for k in 0..starts {
         let mut random = RandomStream::new(2013, k);
-        let start: SVector<f64, 3> = vector![0.0, random.uniform_in(-box_size, 0.0), random.uniform_in(-box_size, 0.0)];
+        let start: SVector<f64, 3> =
+            vector![0.0, random.uniform_in(-box_size, 0.0), random.uniform_in(-box_size, 0.0)];
         let side = if k % 2 == 0 { Side::Plus } else { Side::Minus };
         let mut seen = Back::default();
         let _ = run(system, start, WITHIN, &settings, ExitRule::AtOnce { side }, &mut seen)?;
@@ -55,7 +63,10 @@ fn main() -> Result<(), FilippovError> {
         for box_size in [0.3, 1.0, 3.0] {
             let back = back(&Caricature::with_reinjection(alpha, 1e-5), box_size, starts)?;
             let [low, high] = wilson(back, starts, 0.95).map(|share| 100.0 * share);
-            println!("{reading}, y and z down to -{box_size}: {back} of {starts} ({low:.0} % to {high:.0} %)");
+            println!(
+                "{reading}, y and z down to -{box_size}: {back} of {starts} ({low:.0} % to \
+                    {high:.0} %)"
+            );
         }
     }
     Ok(())

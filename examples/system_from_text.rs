@@ -1,5 +1,6 @@
-//! A piecewise-smooth system of your own as text (it could stand in a file), run by the event-driven integrator: a planar predator-prey model in which the
-//! predator hunts the prey only while it is plentiful: h = prey - refuge.
+//! A piecewise-smooth system of your own as text (it could stand in a file), run by the
+//! event-driven integrator: a planar predator-prey model in which the predator hunts the prey only
+//! while it is plentiful: h = prey - refuge.
 //!
 //! `cargo run --example system_from_text`
 
@@ -24,11 +25,22 @@ caught = "prey*predator"
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let system = System::new(Definition::from_toml(REFUGE, "refuge.toml")?).with("refuge", 1.0)?;
-    let rule = ExitRule::AtOnce { side: Side::Plus }; // What to do where the future is not unique: must be chosen.
+    // What to do where the future is not unique: must be chosen.
+    let rule = ExitRule::AtOnce { side: Side::Plus };
     let mut record = Trajectory::new(4);
-    let end = run(&system.bind::<2>()?, vector![2.0, 0.8], 40.0, &FilippovOptions::default(), rule, &mut record)?;
+    let end = run(
+        &system.bind::<2>()?,
+        vector![2.0, 0.8],
+        40.0,
+        &FilippovOptions::default(),
+        rule,
+        &mut record,
+    )?;
     for event in &record.events {
-        println!("t = {:8.4}  prey {:.4}  predator {:.4}  {:?}", event.t, event.state[0], event.state[1], event.kind);
+        println!(
+            "t = {:8.4}  prey {:.4}  predator {:.4}  {:?}",
+            event.t, event.state[0], event.state[1], event.kind
+        );
     }
     println!("t = {} in {:?}: {:?}", end.t, end.mode, end.x.as_slice());
     Ok(())

@@ -1,5 +1,6 @@
-//! How often runs of fig. 6(i) visit the singularity by t = 150, at each candidate for alpha and beta: 30 starts within 1e-9 of the paper's. A visit comes
-//! within 0.1 of the origin after more than 0.4 away. CSV on standard output, a row a run.
+//! How often runs of fig. 6(i) visit the singularity by t = 150, at each candidate for alpha and
+//! beta: 30 starts within 1e-9 of the paper's. A visit comes within 0.1 of the origin after more
+//! than 0.4 away. CSV on standard output, a row a run.
 //!
 //! `make capture`, or `cargo run --release --example visits > figures/capture/visits.csv`
 
@@ -42,7 +43,9 @@ pub fn visits([alpha, beta]: [f64; 2], stream: u64) -> Result<u32, JobError> {
         schedule: Schedule { restart_every: None, kick: None },
         observe: Observation::Path { chord: 1e-3 },
     };
-    let Data::Path(samples) = simulate(&run, &())?.data else { unreachable!("a path was asked for") };
+    let Data::Path(samples) = simulate(&run, &())?.data else {
+        unreachable!("a path was asked for")
+    };
     let (mut away, mut count) = (true, 0);
     for sample in &samples {
         let square: f64 = sample.x.iter().map(|v| v * v).sum();

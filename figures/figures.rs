@@ -1,8 +1,9 @@
-//! Sketches of the paper's model and our own studies, with the committed references. The figures that the paper computed stand in
-//! `papers/jeffrey-2013`.
+//! Sketches of the paper's model and our own studies, with the committed references. The figures
+//! that the paper computed stand in `papers/jeffrey-2013`.
 //!
-//! Each figure stands in `figures/NAME/figure.rs`: every number of it, and nothing else; beside it the hashes that it must
-//! have. Both are part of the library, so that an installed program can make and check them anywhere.
+//! Each figure stands in `figures/NAME/figure.rs`: every number of it, and nothing else; beside it
+//! the hashes that it must have. Both are part of the library, so that an installed program can
+//! make and check them anywhere.
 
 use twofold::paper::Figure;
 
@@ -45,7 +46,8 @@ figures! {
     basin: "basin/figure.rs", "basin/expected.json";
 }
 
-/// The sweeps whose rows are committed beside a figure: name and content of each CSV file. Empty for figures that compute all they show.
+/// The sweeps whose rows are committed beside a figure: name and content of each CSV file. Empty
+/// for figures that compute all they show.
 pub fn data(id: &str) -> &'static [(&'static str, &'static [u8])] {
     match id {
         "census" => census::DATA,

@@ -1,5 +1,7 @@
-//! What is fuzzed: every reader of foreign bytes. A reader may refuse; it must not panic, hang, or take memory that its input does not pay for. Where something is read that can be written
-//! again, it must come back the same. Two drivers make the inputs: tests/it/fuzz.rs, which needs no tool, and libFuzzer (fuzz/Cargo.toml), which sees what an input runs through.
+//! What is fuzzed: every reader of foreign bytes. A reader may refuse; it must not panic, hang, or
+//! take memory that its input does not pay for. Where something is read that can be written again,
+//! it must come back the same. Two drivers make the inputs: tests/it/fuzz.rs, which needs no tool,
+//! and libFuzzer (fuzz/Cargo.toml), which sees what an input runs through.
 
 use twofold::job::spec::{FunnelSpec, Observation, RunSpec, SwitchSpec};
 use twofold::job::sweep::Rows;
@@ -8,7 +10,8 @@ use twofold::record::{Hash, Manifest};
 use twofold::render::{decode_png, png_size, read_provenance};
 use twofold::system::{Definition, PiecewiseSmooth, System};
 
-/// A reader under test. What it gives back says how far an input came: inputs that come somewhere new are worth changing further.
+/// A reader under test. What it gives back says how far an input came: inputs that come somewhere
+/// new are worth changing further.
 pub type Target = fn(&[u8]) -> String;
 
 /// What came of reading something.
@@ -48,14 +51,17 @@ pub fn spec(bytes: &[u8]) -> String {
     if let Err(error) = spec.validate() {
         return error.to_string();
     }
-    // What a sound spec may ask for is limited by time only: so few steps and points that the fuzzer goes on.
+    // What a sound spec may ask for is limited by time only: so few steps and points that the
+    // fuzzer goes on.
     spec.t_end = spec.t_end.min(1.0);
     spec.method.max_steps = spec.method.max_steps.min(50);
     spec.schedule.restart_every = spec.schedule.restart_every.map(|t| t.max(0.1));
     if let Some(kick) = &mut spec.schedule.kick {
         kick.every = kick.every.max(0.1);
     }
-    if let SwitchSpec::Filippov { funnel: Some(FunnelSpec { times, horizon, .. }), .. } = &mut spec.switch {
+    if let SwitchSpec::Filippov { funnel: Some(FunnelSpec { times, horizon, .. }), .. } =
+        &mut spec.switch
+    {
         (*times, *horizon) = (1, horizon.min(0.5));
     }
     match &mut spec.observe {
@@ -73,7 +79,8 @@ pub fn system(bytes: &[u8]) -> String {
         Ok(definition) => definition,
         Err(diagnostic) => return diagnostic.message.clone(),
     };
-    let again = Definition::from_toml(&definition.to_toml(), "written again").expect("what is written can be read");
+    let again = Definition::from_toml(&definition.to_toml(), "written again")
+        .expect("what is written can be read");
     assert_eq!(again.to_toml(), definition.to_toml());
     let system = System::new(definition);
     let _ = system.reversed().canonical();
@@ -88,7 +95,9 @@ pub fn manifest(bytes: &[u8]) -> String {
     let Some(text) = text(bytes) else { return "no text".into() };
     let found = Manifest::parse(text, "a file");
     if let Ok(manifest) = &found {
-        let again = Manifest::parse(std::str::from_utf8(&manifest.to_json()).unwrap(), "written again").unwrap();
+        let again =
+            Manifest::parse(std::str::from_utf8(&manifest.to_json()).unwrap(), "written again")
+                .unwrap();
         assert_eq!(again, *manifest);
     }
     said(&found)
@@ -98,11 +107,17 @@ pub fn manifest(bytes: &[u8]) -> String {
 pub fn csv(bytes: &[u8]) -> String {
     let table = encode::from_csv(bytes);
     if let Ok((heading, table)) = &table {
-        let (_, again) = encode::from_csv(&encode::csv(table, &heading.about)).expect("what is written can be read");
+        let (_, again) = encode::from_csv(&encode::csv(table, &heading.about))
+            .expect("what is written can be read");
         assert_eq!(encode::bits(&[again]), encode::bits(std::slice::from_ref(table)));
     }
     let lines: Vec<String> = text(bytes).unwrap_or_default().lines().map(str::to_owned).collect();
-    format!("{} {} {}", said(&table), said(&Rows::from_csv(bytes)), said(&Rows::from_journal(&lines)))
+    format!(
+        "{} {} {}",
+        said(&table),
+        said(&Rows::from_csv(bytes)),
+        said(&Rows::from_journal(&lines))
+    )
 }
 
 /// A picture: what it says of itself.
@@ -119,13 +134,15 @@ pub fn png(bytes: &[u8]) -> String {
     format!("{} {pixels}", picture(bytes))
 }
 
-/// An entry of a store, and the tables in it. Its digest is made to fit, so that what lies behind it is reached.
+/// An entry of a store, and the tables in it. Its digest is made to fit, so that what lies behind
+/// it is reached.
 pub fn store(bytes: &[u8]) -> String {
     let found = store::answer_in(bytes);
     let content = &bytes[..bytes.len().saturating_sub(64)];
     let sealed = store::answer_in(&[content, Hash::of(content).as_str().as_bytes()].concat());
     if let Ok(answer) = &sealed {
-        let again = encode::from_bits(&encode::bits(&answer.tables)).expect("what is written can be read");
+        let again =
+            encode::from_bits(&encode::bits(&answer.tables)).expect("what is written can be read");
         assert_eq!(encode::bits(&again), encode::bits(&answer.tables));
     }
     let tables = encode::from_bits(bytes);
@@ -136,7 +153,8 @@ pub fn store(bytes: &[u8]) -> String {
     format!("{} {} {}", said(&found), said(&sealed), said(&tables))
 }
 
-/// A theorem's certificate, without the orbits that the checker computes itself (`make forge` tries those).
+/// A theorem's certificate, without the orbits that the checker computes itself (`make forge` tries
+/// those).
 pub fn certificate(bytes: &[u8]) -> String {
     match text(bytes) {
         Some(text) => said(&twofold::verify::Checker::of_reader().verify(text)),

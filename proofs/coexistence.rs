@@ -1,23 +1,29 @@
-//! Theorem. In the reconstructed reading (alpha = 0.1, beta = 1e-5, eps = 1e-3, tanh) a closed orbit of one return and another of three
-//! returns both exist, and both attract: which of them, if any, a run ends on is decided by where it starts.
+//! Theorem. In the reconstructed reading (alpha = 0.1, beta = 1e-5, eps = 1e-3, tanh) a closed
+//! orbit of one return and another of three returns both exist, and both attract: which of them, if
+//! any, a run ends on is decided by where it starts.
 //!
-//! Proof. As for the printed cycle, with two and with six crossings of y = 0 a turn. The points of crossing are disjoint, so
-//! that the orbits are two. Dissipation is slow: 1 - det is only 2.4e-4 and 6.4e-4, far above the enclosures' widths.
+//! Proof. As for the printed cycle, with two and with six crossings of y = 0 a turn. The points of
+//! crossing are disjoint, so that the orbits are two. Dissipation is slow: 1 - det is only 2.4e-4
+//! and 6.4e-4, far above the enclosures' widths.
 
 use serde_json::json;
 use twofold::rigor::cycle::Search;
 use twofold::rigor::{FlowOptions, prove_cycle};
 use twofold_proofs::{SECTION, cycle, equation, print_cycle, refuse, write};
 
-const STATEMENT: &str = "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the smoothed caricature has two different closed \
+const STATEMENT: &str = "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the \
+    smoothed caricature has two different closed \
 orbits that both attract: one crosses y = 0 upwards once a turn, the other three times.";
 
 fn main() {
     let alpha = 0.1;
     println!("{STATEMENT}");
-    let search = |near, crossings| Search { plane: SECTION, near, radius: 1e-10, crossings, longest: 40.0 };
+    let search =
+        |near, crossings| Search { plane: SECTION, near, radius: 1e-10, crossings, longest: 40.0 };
     let mut found = Vec::new();
-    for (name, near, crossings) in [("period one", [0.8063, 0.0], 2), ("period three", [1.2073, 0.0003], 6)] {
+    for (name, near, crossings) in
+        [("period one", [0.8063, 0.0], 2), ("period three", [1.2073, 0.0003], 6)]
+    {
         println!("{name}:");
         let c = prove_cycle(&equation(alpha), FlowOptions::PLAIN, &search(near, crossings))
             .unwrap_or_else(|e| refuse(&e.to_string()));
@@ -28,8 +34,11 @@ fn main() {
         found.push(c);
     }
     let [one, three] = &found[..] else { refuse("an orbit is missing") };
-    // Different orbits, and the second one does close only after three returns: its upward crossings are pairwise disjoint.
-    let upward = |c: &twofold::rigor::Cycle| -> Vec<_> { c.crossings.iter().filter(|x| x.2).map(|x| x.1).collect() };
+    // Different orbits, and the second one does close only after three returns: its upward
+    // crossings are pairwise disjoint.
+    let upward = |c: &twofold::rigor::Cycle| -> Vec<_> {
+        c.crossings.iter().filter(|x| x.2).map(|x| x.1).collect()
+    };
     let points: Vec<_> = upward(one).into_iter().chain(upward(three)).collect();
     for (i, a) in points.iter().enumerate() {
         for b in &points[i + 1..] {
@@ -39,5 +48,9 @@ fn main() {
         }
     }
     println!("PROVED: both exist and attract.");
-    write("coexistence", STATEMENT, json!({ "period one": cycle(one, alpha), "period three": cycle(three, alpha) }));
+    write(
+        "coexistence",
+        STATEMENT,
+        json!({ "period one": cycle(one, alpha), "period three": cycle(three, alpha) }),
+    );
 }

@@ -1,9 +1,12 @@
-//! Theorem. In the reconstructed reading (alpha = 0.1, eps = 1e-3) the first visit to the singularity contracts what is carried in from the start: orbits that start
-//! a hundredth apart leave it thirty times nearer. For honesty beside `sensitivity.rs`: what grows by 7.7e12 is a disturbance made at
-//! the singularity, not one brought there.
+//! Theorem. In the reconstructed reading (alpha = 0.1, eps = 1e-3) the first visit to the
+//! singularity contracts what is carried in from the start: orbits that start a hundredth apart
+//! leave it thirty times nearer. For honesty beside `sensitivity.rs`: what grows by 7.7e12 is a
+//! disturbance made at the singularity, not one brought there.
 //!
-//! Proof. Validated Taylor steps with centres in double-double arithmetic (crates/rigor/src), of three orbits from the start through the singularity (the third
-//! crossing of y = 0) to the fourth crossing. (The derivative itself, whose factors are 1e-14 and 1e13, is beyond enclosures in f64.)
+//! Proof. Validated Taylor steps with centres in double-double arithmetic (crates/rigor/src), of
+//! three orbits from the start through the singularity (the third crossing of y = 0) to the fourth
+//! crossing. (The derivative itself, whose factors are 1e-14 and 1e13, is beyond enclosures in
+//! f64.)
 
 use nalgebra::SVector;
 use serde_json::{Value, json};
@@ -11,8 +14,10 @@ use twofold::num::{Arithmetic, Ball, Elementary, Enclosure, FromDecimal, Interva
 use twofold::rigor::{Flow, FlowOptions, Set};
 use twofold_proofs::{SECTION, ball, bounds, digits, equation, parameters, refuse, write};
 
-const STATEMENT: &str = "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the orbits of the smoothed caricature from (0.2, 0, -1), (0.21, 0, -1) and (0.2, 0, -0.99) \
-pass the two-fold singularity at their third crossing of y = 0, and the fourth crossings of the second and third are less than 0.0005 from that of the first.";
+const STATEMENT: &str = "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the \
+    orbits of the smoothed caricature from (0.2, 0, -1), (0.21, 0, -1) and (0.2, 0, -0.99) \
+pass the two-fold singularity at their third crossing of y = 0, and the fourth crossings of the \
+second and third are less than 0.0005 from that of the first.";
 
 /// Where the orbits start: x and z on y = 0, as decimal numbers.
 const STARTS: [[f64; 2]; 3] = [[0.2, -1.0], [0.21, -1.0], [0.2, -0.99]];
@@ -37,7 +42,9 @@ fn main() {
         }
         let at = |n: usize| [points[n].1[0], points[n].1[2]];
         let [nx, nz] = at(2).map(|c| c.interval().magnitude());
-        println!("  from ({x}, 0, {z}): |x| <= {nx:.3e}, |z| <= {nz:.3e} at crossing 3; crossing 4 at");
+        println!(
+            "  from ({x}, 0, {z}): |x| <= {nx:.3e}, |z| <= {nz:.3e} at crossing 3; crossing 4 at"
+        );
         println!("    x = {}, z = {}", digits(at(3)[0].interval()), digits(at(3)[1].interval()));
         if nx >= 1e-4 || nz >= 1e-4 {
             refuse("the third crossing is not at the singularity");
@@ -45,9 +52,13 @@ fn main() {
         ends.push(at(3));
         let crossings: Vec<Value> = points
             .iter()
-            .map(|(t, s, upward)| json!({ "time": ball(*t), "x": ball(s[0]), "z": ball(s[2]), "upward": upward }))
+            .map(|(t, s, upward)| {
+                json!({ "time": ball(*t), "x": ball(s[0]), "z": ball(s[2]),
+                "upward": upward })
+            })
             .collect();
-        rows.push(json!({ "start": { "x": x.to_string(), "y": "0", "z": z.to_string() }, "crossings": crossings }));
+        rows.push(json!({ "start": { "x": x.to_string(), "y": "0", "z": z.to_string() },
+            "crossings": crossings }));
     }
     let distances: Vec<Interval> = ends[1..]
         .iter()
@@ -64,5 +75,9 @@ fn main() {
     }
     println!("PROVED: what is carried in from the start is contracted by the first visit.");
     let distances: Vec<Value> = distances.into_iter().map(bounds).collect();
-    write("contraction", STATEMENT, json!({ "equation": parameters(alpha), "orbits": rows, "distances": distances }));
+    write(
+        "contraction",
+        STATEMENT,
+        json!({ "equation": parameters(alpha), "orbits": rows, "distances": distances }),
+    );
 }

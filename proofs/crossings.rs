@@ -1,10 +1,12 @@
-//! Theorem. The orbit from (0.2, 0, -1) crosses y = 0 where the reference tables say, in both readings: through the singularity, 24 rows of
-//! the printed reading and all 61 of the reconstructed one.
+//! Theorem. The orbit from (0.2, 0, -1) crosses y = 0 where the reference tables say, in both
+//! readings: through the singularity, 24 rows of the printed reading and all 61 of the
+//! reconstructed one.
 //!
-//! Proof. Validated Taylor steps with centres in double-double arithmetic (crates/rigor/src), from crossing to crossing. No crossing is
-//! missed: while a step's box meets y = 0, the flow crosses it in one direction on all of the box. Each row of the tables, which were
-//! computed outside this project in 113-bit arithmetic, lies in the enclosure, up to the uncertainty that the row claims and its
-//! own printed digits.
+//! Proof. Validated Taylor steps with centres in double-double arithmetic (crates/rigor/src), from
+//! crossing to crossing. No crossing is missed: while a step's box meets y = 0, the flow crosses it
+//! in one direction on all of the box. Each row of the tables, which were computed outside this
+//! project in 113-bit arithmetic, lies in the enclosure, up to the uncertainty that the row claims
+//! and its own printed digits.
 
 use nalgebra::SVector;
 use serde_json::{Value, json};
@@ -12,8 +14,10 @@ use twofold::num::{Arithmetic, Ball, Enclosure, FromDecimal, Interval};
 use twofold::rigor::{Flow, FlowOptions, Set};
 use twofold_proofs::{SECTION, ball, equation, parameters, refuse, write};
 
-const STATEMENT: &str = "For beta = 1e-5, eps = 1e-3, the tanh transition and alpha = 1e-3 or 0.1, the first crossings of y = 0 by the orbit \
-of the smoothed caricature from (0.2, 0, -1) are those listed, each within its radius; there are no others between them.";
+const STATEMENT: &str = "For beta = 1e-5, eps = 1e-3, the tanh transition and alpha = 1e-3 or 0.1, \
+    the first crossings of y = 0 by the orbit \
+of the smoothed caricature from (0.2, 0, -1) are those listed, each within its radius; there are \
+no others between them.";
 
 const PRINTED: &str = include_str!("../crates/verify/data/crossings-printed.csv");
 const RECONSTRUCTED: &str = include_str!("../crates/verify/data/crossings-reconstructed.csv");
@@ -36,10 +40,12 @@ fn table(alpha: f64, text: &str) -> Result<(String, Vec<Value>), String> {
         }
         let states = set.states();
         let mut widest: f64 = 0.0;
-        for (name, got, want) in [("t", crossing.time, t), ("x", states[0], x), ("z", states[2], z)] {
+        for (name, got, want) in [("t", crossing.time, t), ("x", states[0], x), ("z", states[2], z)]
+        {
             let want: f64 = want.parse().map_err(|e| at(&e))?;
             let claimed: f64 = uncertainty.parse().map_err(|e| at(&e))?;
-            // The row's last digit is rounded: a unit in the last place of an f64 is more than that.
+            // The row's last digit is rounded: a unit in the last place of an f64 is more than
+            // that.
             let slack = Interval::symmetric(claimed + 2.0 * f64::EPSILON * want.abs());
             let got = got.interval();
             if !(got + slack).contains(want) {
@@ -48,9 +54,13 @@ fn table(alpha: f64, text: &str) -> Result<(String, Vec<Value>), String> {
             widest = widest.max(got.width());
         }
         let radius = states[0].radius().max(states[2].radius());
-        report += &format!("  {:3}  x = {x:>24}  z = {z:>24}  {direction:4}  radius {radius:.1e}\n", n + 1);
+        report += &format!(
+            "  {:3}  x = {x:>24}  z = {z:>24}  {direction:4}  radius {radius:.1e}\n",
+            n + 1
+        );
         rows.push(json!({
-            "time": ball(crossing.time), "x": ball(states[0]), "z": ball(states[2]), "upward": crossing.upward,
+            "time": ball(crossing.time), "x": ball(states[0]), "z": ball(states[2]),
+                "upward": crossing.upward,
         }));
     }
     Ok((report, rows))
@@ -65,11 +75,15 @@ fn main() {
         (first.join(), second.join())
     });
     let mut data = serde_json::Map::new();
-    for (name, alpha, result) in [("printed", 1e-3, printed), ("reconstructed", 0.1, reconstructed)] {
+    for (name, alpha, result) in [("printed", 1e-3, printed), ("reconstructed", 0.1, reconstructed)]
+    {
         match result {
             Ok(Ok((report, rows))) => {
                 print!("{name} reading:\n{report}");
-                data.insert(name.into(), json!({ "equation": parameters(alpha), "crossings": rows }));
+                data.insert(
+                    name.into(),
+                    json!({ "equation": parameters(alpha), "crossings": rows }),
+                );
             }
             Ok(Err(e)) => refuse(&e),
             Err(_) => refuse("the computation stopped"),

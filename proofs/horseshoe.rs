@@ -1,17 +1,24 @@
-//! Theorem. In the reconstructed reading (alpha = 0.1, beta = 1e-5, eps = 1e-3, tanh) the return map of orbits that pass the two-fold
-//! singularity has a horseshoe: chaos there is the equation's and no artefact of a solver. (Whether orbits of the figures follow it is not part of the statement.)
+//! Theorem. In the reconstructed reading (alpha = 0.1, beta = 1e-5, eps = 1e-3, tanh) the return
+//! map of orbits that pass the two-fold singularity has a horseshoe: chaos there is the equation's
+//! and no artefact of a solver. (Whether orbits of the figures follow it is not part of the
+//! statement.)
 //!
-//! Orbits leave the singularity along a curve in the section y = 0, and each place of it goes back to the singularity. From exit to next exit
-//! (every fourth downward crossing of y = 0) the curve is mapped nearly like an interval. A saddle orbit, "hub", leaves at x = -0.1523 and -0.1137 in turn; its multiplier is -67.2. What
-//! starts 5.8e-15 beside it on its unstable manifold is off to x = -0.0980 after thirteen returns, and from there comes back onto its stable manifold: a homoclinic
-//! orbit, and with it a horseshoe (Smale 1967).
+//! Orbits leave the singularity along a curve in the section y = 0, and each place of it goes back
+//! to the singularity. From exit to next exit (every fourth downward crossing of y = 0) the curve
+//! is mapped nearly like an interval. A saddle orbit, "hub", leaves at x = -0.1523 and -0.1137 in
+//! turn; its multiplier is -67.2. What starts 5.8e-15 beside it on its unstable manifold is off to
+//! x = -0.0980 after thirteen returns, and from there comes back onto its stable manifold: a
+//! homoclinic orbit, and with it a horseshoe (Smale 1967).
 //!
-//! Proof. Covering relations (Zgliczynski & Gidea 2004) between small parallelograms along the saddle orbit and along the homoclinic one, with validated
-//! Taylor steps (crates/rigor/src) whose centres are in double-double arithmetic. They make two loops, of 2 and of 14 sets, that have the hub in common. A chain that runs
-//! through them in any order is followed by an orbit; where it can choose, the next set is one of two that are disjoint. So chains of n sets, of
-//! which there are about lambda^n with lambda^-2 + lambda^-14 = 1, are told apart by orbits, and lambda > 1.12.
+//! Proof. Covering relations (Zgliczynski & Gidea 2004) between small parallelograms along the
+//! saddle orbit and along the homoclinic one, with validated Taylor steps (crates/rigor/src) whose
+//! centres are in double-double arithmetic. They make two loops, of 2 and of 14 sets, that have the
+//! hub in common. A chain that runs through them in any order is followed by an orbit; where it can
+//! choose, the next set is one of two that are disjoint. So chains of n sets, of which there are
+//! about lambda^n with lambda^-2 + lambda^-14 = 1, are told apart by orbits, and lambda > 1.12.
 //!
-//! Where the parallelograms lie is found by following plain points and is no part of the proof: what the coverings say of them is.
+//! Where the parallelograms lie is found by following plain points and is no part of the proof:
+//! what the coverings say of them is.
 
 use nalgebra::SVector;
 use serde_json::{Value, json};
@@ -20,14 +27,20 @@ use twofold::rigor::covering::Image;
 use twofold::rigor::{Covering, Flow, FlowOptions, HSet, Return, Set, prove_covering};
 use twofold_proofs::{SECTION, bounds, equation, parameters, refuse, write};
 
-const STATEMENT: &str = "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the return map of the smoothed caricature from a downward crossing of \
-y = 0 to the fourth next has a horseshoe: two loops of covering relations between parallelograms, of 2 and of 14 sets, that have one set in common and go on from \
-it to disjoint ones. Each return passes the two-fold singularity, at a crossing with |x| and |z| below 1e-4. So for every sequence of the two loops there is an \
-orbit that runs through them in this order, for every periodic sequence a periodic one, and the topological entropy of the return map is more than log(1.12).";
+const STATEMENT: &str = "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the \
+    return map of the smoothed caricature from a downward crossing of \
+y = 0 to the fourth next has a horseshoe: two loops of covering relations between parallelograms, \
+of 2 and of 14 sets, that have one set in common and go on from \
+it to disjoint ones. Each return passes the two-fold singularity, at a crossing with |x| and |z| \
+below 1e-4. So for every sequence of the two loops there is an \
+orbit that runs through them in this order, for every periodic sequence a periodic one, and the \
+topological entropy of the return map is more than log(1.12).";
 
 /// The saddle orbit at the hub, in two parts each (double-double).
-const HUB: [[f64; 2]; 2] =
-    [[-0.15231549483258058, -1.2462355425244966e-17], [-0.4540927536719651, -9.622314832703039e-18]];
+const HUB: [[f64; 2]; 2] = [
+    [-0.15231549483258058, -1.2462355425244966e-17],
+    [-0.4540927536719651, -9.622314832703039e-18],
+];
 /// The direction of its unstable manifold there.
 const UNSTABLE: [f64; 2] = [-0.650591069181416, -0.7594282459201673];
 /// How far from the hub, along it, the homoclinic orbit begins.
@@ -50,7 +63,8 @@ type Point = [Ball; 2];
 
 /// A plain point's image and the derivative there: middles of what the validated steps give.
 fn follow(flow: &mut Flow<Ball, 3>, [x, z]: Point) -> (Point, [[f64; 2]; 2]) {
-    let mut set = Set::on_plane(SVector::from([x, Ball::zero(), z]), SECTION.axis, SECTION.value, true);
+    let mut set =
+        Set::on_plane(SVector::from([x, Ball::zero(), z]), SECTION.axis, SECTION.value, true);
     for _ in 0..MAP.crossings {
         set = flow
             .next_crossing(&set, SECTION, MAP.longest)
@@ -90,7 +104,8 @@ fn hset(place: &Place, size: f64) -> HSet {
 }
 
 fn piece(image: &Image) -> Value {
-    let seen: Vec<Value> = image.seen.iter().map(|[u, v]| json!([bounds(*u), bounds(*v)])).collect();
+    let seen: Vec<Value> =
+        image.seen.iter().map(|[u, v]| json!([bounds(*u), bounds(*v)])).collect();
     json!({ "part": image.part, "seen": seen })
 }
 
@@ -103,7 +118,8 @@ fn main() {
     let beside = [0, 1].map(|i| hub[i] + Ball::from_f64(UNSTABLE[i]) * Ball::from_f64(OFFSET));
     let saddle = places(&mut flow, hub, 2);
     let orbit = places(&mut flow, beside, RETURNS);
-    // Sets: the hub, the saddle orbit's other one, then those of the homoclinic orbit from its first return on.
+    // Sets: the hub, the saddle orbit's other one, then those of the homoclinic orbit from its
+    // first return on.
     let mut sizes = [HUB_SIZE; RETURNS + 1];
     for i in (1..RETURNS).rev() {
         sizes[i] = (MARGIN * sizes[i + 1] / orbit[i].stretch).max(SHORTEST);
@@ -129,8 +145,9 @@ fn main() {
     for (i, set) in sets.iter().enumerate() {
         let next = follows(i);
         let targets: Vec<HSet> = next.iter().map(|t| sets[*t]).collect();
-        let Covering { pieces, edges } = prove_covering::<Ball>(&tape, FlowOptions::EXTENDED, &MAP, set, &targets)
-            .unwrap_or_else(|e| refuse(&format!("set {i} to {next:?}: {e}")));
+        let Covering { pieces, edges } =
+            prove_covering::<Ball>(&tape, FlowOptions::EXTENDED, &MAP, set, &targets)
+                .unwrap_or_else(|e| refuse(&format!("set {i} to {next:?}: {e}")));
         let ends: Vec<String> = (0..next.len())
             .map(|k| {
                 let [a, b] = edges.each_ref().map(|e| e.seen[k][0].midpoint());
@@ -159,12 +176,19 @@ fn main() {
             refuse(&format!("set {i}: the orbits are not shown to pass the singularity"));
         }
         coverings.push(json!({
-            "from": i, "to": next, "ends": edges.iter().map(piece).collect::<Vec<_>>(), "pieces": pieces.iter().map(piece).collect::<Vec<_>>(),
+            "from": i, "to": next, "ends": edges.iter().map(piece).collect::<Vec<_>>(),
+                "pieces": pieces.iter().map(piece).collect::<Vec<_>>(),
             "passage": { "crossing": nearest + 1, "x": bounds(x), "z": bounds(z) },
         }));
     }
     println!("PROVED: a horseshoe, with loops of 2 and {RETURNS} returns.");
-    let sets: Vec<Value> =
-        sets.iter().map(|s| json!({ "centre": s.centre, "unstable": s.unstable, "stable": s.stable })).collect();
-    write("horseshoe", STATEMENT, json!({ "equation": parameters(alpha), "sets": sets, "coverings": coverings }));
+    let sets: Vec<Value> = sets
+        .iter()
+        .map(|s| json!({ "centre": s.centre, "unstable": s.unstable, "stable": s.stable }))
+        .collect();
+    write(
+        "horseshoe",
+        STATEMENT,
+        json!({ "equation": parameters(alpha), "sets": sets, "coverings": coverings }),
+    );
 }

@@ -1,15 +1,19 @@
-//! Theorem. In the printed reading (alpha = 1e-3, beta = 1e-5, eps = 1e-3, tanh) the smoothed caricature has an attracting
-//! periodic orbit. It crosses y = 0 upwards once a turn, in a box of width below 1e-8; its period is known to ten digits.
+//! Theorem. In the printed reading (alpha = 1e-3, beta = 1e-5, eps = 1e-3, tanh) the smoothed
+//! caricature has an attracting periodic orbit. It crosses y = 0 upwards once a turn, in a box of
+//! width below 1e-8; its period is known to ten digits.
 //!
-//! Proof. Krawczyk's inclusion for the return map to y = 0, with validated Taylor steps (crates/rigor/src); both multipliers lie in
-//! the unit disc because 1 - det > 0 and 1 + det +- trace > 0.
+//! Proof. Krawczyk's inclusion for the return map to y = 0, with validated Taylor steps
+//! (crates/rigor/src); both multipliers lie in the unit disc because 1 - det > 0 and 1 + det +-
+//! trace > 0.
 
 use twofold::rigor::cycle::Search;
 use twofold::rigor::{FlowOptions, prove_cycle};
 use twofold_proofs::{SECTION, cycle, equation, print_cycle, refuse, write};
 
-const STATEMENT: &str = "For alpha = 1e-3, beta = 1e-5, eps = 1e-3 and the tanh transition, the smoothed caricature has exactly one \
-closed orbit that crosses y = 0 upwards in the candidate box and returns to it at its first upward crossing. It attracts.";
+const STATEMENT: &str = "For alpha = 1e-3, beta = 1e-5, eps = 1e-3 and the tanh transition, the \
+    smoothed caricature has exactly one \
+closed orbit that crosses y = 0 upwards in the candidate box and returns to it at its first upward \
+crossing. It attracts.";
 
 fn main() {
     let alpha = 1e-3;
@@ -21,7 +25,8 @@ fn main() {
         longest: 40.0,
     };
     println!("{STATEMENT}");
-    let found = prove_cycle(&equation(alpha), FlowOptions::PLAIN, &search).unwrap_or_else(|e| refuse(&e.to_string()));
+    let found = prove_cycle(&equation(alpha), FlowOptions::PLAIN, &search)
+        .unwrap_or_else(|e| refuse(&e.to_string()));
     print_cycle(&found);
     if !found.attracts() {
         refuse("the enclosures of trace and determinant do not show that the orbit attracts");

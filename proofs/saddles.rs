@@ -1,8 +1,10 @@
-//! Theorem. In the reconstructed reading (alpha = 0.1, beta = 1e-5, eps = 1e-3, tanh) there are saddle orbits beside the two that attract: of three returns, of four
-//! (two different ones) and of five. Their stable manifolds are walls between fates: near them the smallest difference decides.
+//! Theorem. In the reconstructed reading (alpha = 0.1, beta = 1e-5, eps = 1e-3, tanh) there are
+//! saddle orbits beside the two that attract: of three returns, of four (two different ones) and of
+//! five. Their stable manifolds are walls between fates: near them the smallest difference decides.
 //!
-//! Proof. As for the attracting orbits (`coexistence.rs`). The characteristic polynomial of the return map's derivative has different signs at 1 and -1, so that
-//! one multiplier lies inside the unit circle and the other outside.
+//! Proof. As for the attracting orbits (`coexistence.rs`). The characteristic polynomial of the
+//! return map's derivative has different signs at 1 and -1, so that one multiplier lies inside the
+//! unit circle and the other outside.
 //!
 //! The orbits were found by Newton's method from random starts, which is no part of the proof.
 
@@ -12,8 +14,10 @@ use twofold::rigor::cycle::Search;
 use twofold::rigor::{Cycle, FlowOptions, prove_cycle};
 use twofold_proofs::{SECTION, cycle, digits, equation, print_cycle, refuse, write};
 
-const STATEMENT: &str = "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the smoothed caricature has four different closed orbits of saddle type, one \
-multiplier of each inside the unit circle and one outside: they cross y = 0 upwards three, four, four and five times a turn.";
+const STATEMENT: &str = "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the \
+    smoothed caricature has four different closed orbits of saddle type, one \
+multiplier of each inside the unit circle and one outside: they cross y = 0 upwards three, four, \
+four and five times a turn.";
 
 /// Names, places near the orbits on y = 0, crossings a turn.
 const ORBITS: [(&str, [f64; 2], usize); 4] = [
@@ -35,7 +39,8 @@ fn main() {
     for (name, near, crossings) in ORBITS {
         println!("{name}:");
         let search = Search { plane: SECTION, near, radius: 1e-10, crossings, longest: 40.0 };
-        let c = prove_cycle(&equation(alpha), FlowOptions::PLAIN, &search).unwrap_or_else(|e| refuse(&e.to_string()));
+        let c = prove_cycle(&equation(alpha), FlowOptions::PLAIN, &search)
+            .unwrap_or_else(|e| refuse(&e.to_string()));
         print_cycle(&c);
         if !c.is_saddle() {
             refuse("the enclosures of trace and determinant do not show a saddle");
@@ -47,7 +52,10 @@ fn main() {
         println!("  multipliers  {} and {}", digits(outside), digits(c.determinant / outside));
         // Each needs all of its returns, and all orbits are different.
         for point in upward(&c) {
-            if points.iter().any(|p| p[0].intersection(point[0]).is_ok() && p[1].intersection(point[1]).is_ok()) {
+            if points
+                .iter()
+                .any(|p| p[0].intersection(point[0]).is_ok() && p[1].intersection(point[1]).is_ok())
+            {
                 refuse("two crossings may be the same");
             }
             points.push(point);

@@ -1,11 +1,13 @@
-//! Theorem. In the reconstructed reading (alpha = 0.1, eps = 1e-3) two states at the singularity, less than 1e-12 apart, leave more than
-//! 0.3 apart: the first exit crossings of y = 0 lie 0.17 apart, the second more than 0.3, the third more than 0.8.
+//! Theorem. In the reconstructed reading (alpha = 0.1, eps = 1e-3) two states at the singularity,
+//! less than 1e-12 apart, leave more than 0.3 apart: the first exit crossings of y = 0 lie 0.17
+//! apart, the second more than 0.3, the third more than 0.8.
 //!
-//! The first state is, to its digits, where the orbit of the figures (from (0.2, 0, -1)) first passes the singularity. How much a
-//! disturbance there grows until the first exit crossing is enclosed, too: the derivative's largest element is 7.67e12.
+//! The first state is, to its digits, where the orbit of the figures (from (0.2, 0, -1)) first
+//! passes the singularity. How much a disturbance there grows until the first exit crossing is
+//! enclosed, too: the derivative's largest element is 7.67e12.
 //!
-//! Proof. Validated Taylor steps with centres in double-double arithmetic (crates/rigor/src). In f64 intervals, 1e-16 times the growth would
-//! leave nothing.
+//! Proof. Validated Taylor steps with centres in double-double arithmetic (crates/rigor/src). In
+//! f64 intervals, 1e-16 times the growth would leave nothing.
 
 use nalgebra::SVector;
 use serde_json::{Value, json};
@@ -13,8 +15,10 @@ use twofold::num::{Arithmetic, Ball, Elementary, Enclosure, FromDecimal};
 use twofold::rigor::{Flow, FlowOptions, Set};
 use twofold_proofs::{SECTION, ball, bounds, digits, equation, parameters, refuse, write};
 
-const STATEMENT: &str = "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the orbits of the smoothed caricature from the two \
-states, which are less than 1e-12 apart at the two-fold singularity, are more than 0.3 apart at their second crossing of y = 0.";
+const STATEMENT: &str = "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the \
+    orbits of the smoothed caricature from the two \
+states, which are less than 1e-12 apart at the two-fold singularity, are more than 0.3 apart at \
+their second crossing of y = 0.";
 
 const Z: f64 = 8.14695211321934e-14;
 const STATES: [f64; 2] = [4.99176529062235e-5, 4.99176538962235e-5];
@@ -36,8 +40,9 @@ fn main() {
         let mut set = Set::on_plane(start, SECTION.axis, SECTION.value, i == 0);
         let mut points = Vec::new();
         for _ in 0..CROSSINGS {
-            let crossing =
-                flow.next_crossing(&set, SECTION, 10.0).unwrap_or_else(|e| refuse(&format!("state {i}: {e}")));
+            let crossing = flow
+                .next_crossing(&set, SECTION, 10.0)
+                .unwrap_or_else(|e| refuse(&format!("state {i}: {e}")));
             set = crossing.set;
             points.push((crossing.time, set.states(), crossing.upward, set.derivative()));
         }
@@ -50,7 +55,11 @@ fn main() {
         let distance = (dx * dx + dz * dz).sqrt().interval();
         println!("  crossing {}:", k + 1);
         for orbit in [a, b] {
-            println!("    x = {}, z = {}", digits(orbit.1[0].interval()), digits(orbit.1[2].interval()));
+            println!(
+                "    x = {}, z = {}",
+                digits(orbit.1[0].interval()),
+                digits(orbit.1[2].interval())
+            );
         }
         println!("    apart by {}", digits(distance));
         if a.2 != b.2 {
@@ -59,14 +68,21 @@ fn main() {
         if k == 1 {
             second = distance.lower();
         }
-        let orbit = |o: &(Ball, SVector<Ball, 3>, bool, Option<_>)| json!({ "time": ball(o.0), "x": ball(o.1[0]), "z": ball(o.1[2]) });
-        rows.push(json!({ "upward": a.2, "orbits": [orbit(a), orbit(b)], "distance": bounds(distance) }));
+        let orbit = |o: &(Ball, SVector<Ball, 3>, bool, Option<_>)| {
+            json!({ "time": ball(o.0),
+            "x": ball(o.1[0]), "z": ball(o.1[2]) })
+        };
+        rows.push(
+            json!({ "upward": a.2, "orbits": [orbit(a), orbit(b)], "distance": bounds(distance) }),
+        );
     }
     if second <= 0.3 {
         refuse("the orbits are not shown to be 0.3 apart");
     }
     let Some(d) = orbits[0][0].3 else { refuse("no derivative") };
-    println!("  derivative of the first exit crossing (x, z) by the state (x, z) at the singularity:");
+    println!(
+        "  derivative of the first exit crossing (x, z) by the state (x, z) at the singularity:"
+    );
     let mut derivative: Vec<Value> = Vec::new();
     for i in [0, 2] {
         println!("    {:?}  {:?}", d[(i, 0)], d[(i, 2)]);
@@ -74,7 +90,8 @@ fn main() {
     }
     println!("PROVED: less than 1e-12 becomes more than 0.3.");
     let data = json!({
-        "equation": parameters(alpha), "states": { "x": STATES.map(|x| format!("{x:e}")), "y": "0", "z": format!("{Z:e}") },
+        "equation": parameters(alpha), "states": { "x": STATES.map(|x| format!("{x:e}")), "y": "0",
+            "z": format!("{Z:e}") },
         "crossings": rows, "growth_until_first_crossing": derivative,
     });
     write("sensitivity", STATEMENT, data);

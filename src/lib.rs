@@ -1,34 +1,44 @@
 //! `twofold`: reference software for the breakdown of determinism at a two-fold singularity.
 //!
-//! The crate regenerates every figure of M. R. Jeffrey, *Singularities that induce a breakdown of determinism in mechanics*
-//! (2013), byte for byte the same on any machine, and says panel by panel whether the paper's claim holds.
+//! The crate regenerates every figure of M. R. Jeffrey, *Singularities that induce a breakdown of
+//! determinism in mechanics* (2013), byte for byte the same on any machine, and says panel by panel
+//! whether the paper's claim holds.
 //!
 //! # Parts
 //!
-//! Each is a crate of its own (`twofold-num` and so on) that this one re-exports; docs/architecture.md says what may import what.
+//! Each is a crate of its own (`twofold-num` and so on) that this one re-exports;
+//! docs/architecture.md says what may import what.
 //!
-//! - [`num`]: arithmetic that results depend on. Elementary functions with the same bits everywhere, the scalar traits
-//!   over which equations are written, tapes of recorded equations, dual numbers, series, intervals, random numbers.
-//! - [`system`]: piecewise-smooth systems as data, their transforms, compiled fast paths; no time stepping.
-//! - [`integrate`]: time stepping. One file a method; a step carries its interpolant; one driver loop; restarts and kicks
-//!   are a schedule around a run.
-//! - [`rigor`]: validated steps, sets, Poincaré maps, closed orbits: enclosures that are theorems. The theorems: `proofs/`.
-//! - [`verify`]: checks the theorems' certificates in exact arithmetic; shares nothing with [`rigor`].
+//! - [`num`]: arithmetic that results depend on. Elementary functions with the same bits
+//!   everywhere, the scalar traits over which equations are written, tapes of recorded equations,
+//!   dual numbers, series, intervals, random numbers.
+//! - [`system`]: piecewise-smooth systems as data, their transforms, compiled fast paths; no time
+//!   stepping.
+//! - [`integrate`]: time stepping. One file a method; a step carries its interpolant; one driver
+//!   loop; restarts and kicks are a schedule around a run.
+//! - [`rigor`]: validated steps, sets, Poincaré maps, closed orbits: enclosures that are theorems.
+//!   The theorems: `proofs/`.
+//! - [`verify`]: checks the theorems' certificates in exact arithmetic; shares nothing with
+//!   [`rigor`].
 //! - [`analyse`]: analysis of trajectories: paths, Poincaré sections, exponents, closed orbits.
-//! - [`job`]: a question as data, its computation, its answer. [`record`]: files, hashes, manifests, all-or-nothing writes.
+//! - [`job`]: a question as data, its computation, its answer. [`record`]: files, hashes,
+//!   manifests, all-or-nothing writes.
 //! - [`render`]: the only user of plotters: one drawing, three formats.
 //! - [`paper`]: everything specific to this paper: readings, claims, figures as data.
-//! - [`draw`]: drawings from answers. [`compare`]: two pictures, point by point. [`report`]: the page about everything.
+//! - [`draw`]: drawings from answers. [`compare`]: two pictures, point by point. [`report`]: the
+//!   page about everything.
 //! - [`cli`]: flags, progress, error messages.
 //!
 //! # Why isn't there ...?
 //!
-//! - *a platform `tanh`?* It differs by an ulp between C libraries, and an ulp near the singularity is visible in a picture.
-//! - *a time argument in the right-hand side?* Every system of the paper is autonomous; a forced one carries its phase.
+//! - *a platform `tanh`?* It differs by an ulp between C libraries, and an ulp near the singularity
+//!   is visible in a picture.
+//! - *a time argument in the right-hand side?* Every system of the paper is autonomous; a forced
+//!   one carries its phase.
 //! - *noise inside a system?* Noise and restarts happen around a run; see [`integrate::Schedule`].
 //! - *an integer for a crossing's direction?* `Up` and `Down` cannot be mixed up.
-//! - *an error when two runs differ in the last digit?* That they do is the paper's subject; what must not differ is the
-//!   same run on two machines, and that is what the hashes are for.
+//! - *an error when two runs differ in the last digit?* That they do is the paper's subject; what
+//!   must not differ is the same run on two machines, and that is what the hashes are for.
 //!
 //! # In five lines
 //!
@@ -49,7 +59,8 @@
 //! # Ok::<(), twofold::job::JobError>(())
 //! ```
 #![forbid(unsafe_code)]
-#![cfg_attr(test, allow(clippy::disallowed_methods))] // tests compare with tolerances, not with hashes
+// tests compare with tolerances, not with hashes
+#![cfg_attr(test, allow(clippy::disallowed_methods))]
 
 /// The linear algebra in public signatures: states are `nalgebra::SVector`.
 pub use nalgebra;
@@ -75,7 +86,7 @@ pub use twofold_verify as verify;
 /// use twofold::paper::{figures, pipeline};
 /// let figure = figures::all().into_iter().find(|f| f.id == "fig1").expect("the first figure");
 /// let picture = pipeline::compute(&figure.pictures[0], &Executor::quiet())?;
-/// assert!(picture.rendered.svg.starts_with(b"<?xml") || picture.rendered.svg.starts_with(b"<svg"));
+/// assert!(picture.rendered.png.starts_with(b"\x89PNG"));
 /// // The committed reference holds the same hashes.
 /// let reference = figures::reference("fig1").expect("every figure has one");
 /// assert!(reference.contains(picture.record.hashes.pixels.as_str()));

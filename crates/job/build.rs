@@ -1,4 +1,5 @@
-//! Digests what numbers depend on, so that an answer stored by one version of the numerics is never taken for another's.
+//! Digests what numbers depend on, so that an answer stored by one version of the numerics is never
+//! taken for another's.
 
 use std::path::Path;
 
@@ -11,7 +12,8 @@ fn main() -> std::io::Result<()> {
 fn numerics() -> std::io::Result<String> {
     let root = Path::new("../..");
     if !root.join("crates/num/src").is_dir() {
-        // A published package: its version, and the exact versions that it asks for, name the sources.
+        // A published package: its version, and the exact versions that it asks for, name the
+        // sources.
         return Ok(format!("version {}", env!("CARGO_PKG_VERSION")));
     }
     let mut sources = twofold_digest::Sources::default();

@@ -1,4 +1,5 @@
-//! Digests the figures' own code and data, on which the answers depend that a figure computes itself (src/study.rs).
+//! Digests the figures' own code and data, on which the answers depend that a figure computes
+//! itself (src/study.rs).
 
 use std::path::Path;
 
@@ -19,6 +20,8 @@ fn figures() -> std::io::Result<String> {
     let above = ["crates/paper/src/report/", "crates/paper/src/compare/"];
     sources.add(root, "crates/paper/src", |file| !above.iter().any(|a| file.starts_with(a)))?;
     let inputs = [".rs", ".csv", ".toml"];
-    sources.add(root, "figures", |file| inputs.iter().any(|e| file.ends_with(e)) && !file.ends_with("/main.rs"))?;
+    sources.add(root, "figures", |file| {
+        inputs.iter().any(|e| file.ends_with(e)) && !file.ends_with("/main.rs")
+    })?;
     Ok(sources.digest())
 }

@@ -1,5 +1,5 @@
-//! The audit: at which alpha and beta the paper's outcomes of figs 7, 8 and 9(i) are likely. Not a figure of the paper. Its data are committed beside it and
-//! made by `make census`.
+//! The audit: at which alpha and beta the paper's outcomes of figs 7, 8 and 9(i) are likely. Not a
+//! figure of the paper. Its data are committed beside it and made by `make census`.
 
 use std::sync::Arc;
 
@@ -17,8 +17,9 @@ use twofold::record::Hash;
 use twofold::render::sheet::*;
 use twofold::render::style;
 
-/// What is made for this figure: fig. 7's intervals, fig. 8's sigmas and fig. 9's hysteretic switch over alpha and beta, Dormand-Prince at NDSolve's
-/// tolerance; and the candidates, one exponent changed, by LSODA as the figures are.
+/// What is made for this figure: fig. 7's intervals, fig. 8's sigmas and fig. 9's hysteretic switch
+/// over alpha and beta, Dormand-Prince at NDSolve's tolerance; and the candidates, one exponent
+/// changed, by LSODA as the figures are.
 pub const DATA: &[(&str, &[u8])] = &[
     ("fig7.csv", include_bytes!("fig7.csv")),
     ("fig8.csv", include_bytes!("fig8.csv")),
@@ -39,16 +40,20 @@ const CENSUS: [(&str, &[u8]); 2] = [
 
 /// The committed content of a file.
 fn committed(name: &str) -> Result<Vec<u8>, JobError> {
-    let found = DATA.iter().chain(&CENSUS).find(|(n, _)| *n == name).map(|(_, bytes)| bytes.to_vec());
+    let found =
+        DATA.iter().chain(&CENSUS).find(|(n, _)| *n == name).map(|(_, bytes)| bytes.to_vec());
     found.ok_or_else(|| JobError::Other(format!("the audit has no {name}")))
 }
 
 fn table_of(bytes: &[u8]) -> Result<Table, JobError> {
-    Rows::from_csv(bytes).map(|rows| rows.table()).map_err(|e| JobError::Other(format!("the audit's data: {e}")))
+    Rows::from_csv(bytes)
+        .map(|rows| rows.table())
+        .map_err(|e| JobError::Other(format!("the audit's data: {e}")))
 }
 
-/// The candidates for what was meant, the printed numbers first: with as many runs of each panel for all, because fewer runs leave more room for what did
-/// not happen; and the printed and reconstructed numbers alone, with all their runs.
+/// The candidates for what was meant, the printed numbers first: with as many runs of each panel
+/// for all, because fewer runs leave more room for what did not happen; and the printed and
+/// reconstructed numbers alone, with all their runs.
 ///
 /// # Errors
 ///
@@ -57,14 +62,18 @@ pub fn candidates() -> Result<[Vec<Candidate>; 2], JobError> {
     candidates_in(&committed)
 }
 
-/// The candidates by the files that `read` gives for names as in [`DATA`], and for the census' names with `../census/` before them.
+/// The candidates by the files that `read` gives for names as in [`DATA`], and for the census'
+/// names with `../census/` before them.
 ///
 /// # Errors
 ///
 /// If they are not such as `make census` writes, or `read` fails.
-pub fn candidates_in(read: &dyn Fn(&str) -> Result<Vec<u8>, JobError>) -> Result<[Vec<Candidate>; 2], JobError> {
-    let tables =
-        |names: &[&str]| -> Result<Vec<Table>, JobError> { names.iter().map(|name| table_of(&read(name)?)).collect() };
+pub fn candidates_in(
+    read: &dyn Fn(&str) -> Result<Vec<u8>, JobError>,
+) -> Result<[Vec<Candidate>; 2], JobError> {
+    let tables = |names: &[&str]| -> Result<Vec<Table>, JobError> {
+        names.iter().map(|name| table_of(&read(name)?)).collect()
+    };
     let sweeps = [
         tables(&["../census/fig7.csv", "alpha7.csv", "beta7.csv"])?,
         tables(&["../census/fig8.csv", "alpha8.csv", "beta8.csv"])?,
@@ -77,10 +86,13 @@ pub fn candidates_in(read: &dyn Fn(&str) -> Result<Vec<u8>, JobError>) -> Result
         usize::try_from(runs).unwrap_or(usize::MAX)
     });
     let equal = audit::cells(&sweeps, fewest, rules);
-    let two: Vec<Cell> = all.into_iter().filter(|cell| READINGS.contains(&[cell.alpha, cell.beta])).collect();
+    let two: Vec<Cell> =
+        all.into_iter().filter(|cell| READINGS.contains(&[cell.alpha, cell.beta])).collect();
     match (audit::candidates(&equal, rules), audit::candidates(&two, rules)) {
         (Some(equal), Some(two)) => Ok([equal, two]),
-        _ => Err(JobError::Other("the printed numbers are not among the audit's candidates".into())),
+        _ => {
+            Err(JobError::Other("the printed numbers are not among the audit's candidates".into()))
+        }
     }
 }
 
@@ -91,17 +103,22 @@ pub fn candidates_in(read: &dyn Fn(&str) -> Result<Vec<u8>, JobError>) -> Result
 /// If the committed data are not the files that `make census` writes.
 pub fn support(panel: &str, reading: Reading) -> Result<Support, JobError> {
     let known = audit::PANELS.iter().find(|p| p.name == panel && p.column.is_none());
-    let panel = known.ok_or_else(|| JobError::Other(format!("the audit has no runs of {panel} alone")))?;
+    let panel =
+        known.ok_or_else(|| JobError::Other(format!("the audit has no runs of {panel} alone")))?;
     let table = table_of(&committed("alpha9.csv")?)?;
     let runs = panel.runs(&table, vec![("params.alpha", reading.caricature().alpha.into())]);
-    Ok(Support { support: census::supporting(panel.said, &runs, &claims().rules), runs: runs.len() as u64 })
+    Ok(Support {
+        support: census::supporting(panel.said, &runs, &claims().rules),
+        runs: runs.len() as u64,
+    })
 }
 
 /// The printed and the reconstructed alpha and beta.
 const READINGS: [[f64; 2]; 2] = [[1e-3, 1e-5], [1e-1, 1e-5]];
 
 fn tables() -> Result<Vec<Table>, JobError> {
-    let [fig7, fig8, fig9] = ["fig7.csv", "fig8.csv", "fig9.csv"].map(|name| table_of(&committed(name)?));
+    let [fig7, fig8, fig9] =
+        ["fig7.csv", "fig8.csv", "fig9.csv"].map(|name| table_of(&committed(name)?));
     let cells = audit::cells(&[vec![fig7?], vec![fig8?], vec![fig9?]], audit::ALL, &claims().rules);
     Ok(vec![audit::cell_table(&cells), audit::candidate_table(&candidates()?[0])])
 }
@@ -118,13 +135,15 @@ fn questions() -> Vec<AnyQuestion> {
 
 /// From white to a dark blue.
 fn shade(share: f64) -> Colour {
-    let mix = |light: f64, dark: f64| (light + (dark - light) * share.clamp(0.0, 1.0)).round() as u8;
+    let mix =
+        |light: f64, dark: f64| (light + (dark - light) * share.clamp(0.0, 1.0)).round() as u8;
     Colour::rgb(mix(247.0, 8.0), mix(251.0, 48.0), mix(255.0, 107.0))
 }
 
 fn draw(tables: &[Table]) -> Sheet {
     let [cells, candidates] = tables else { unreachable!("the audit has two tables") };
-    let (alpha, beta, l) = (cells.numbers("alpha"), cells.numbers("beta"), cells.numbers("log10_likelihood"));
+    let (alpha, beta, l) =
+        (cells.numbers("alpha"), cells.numbers("beta"), cells.numbers("log10_likelihood"));
     let spacing = |values: &[f64]| {
         let mut sorted = values.to_vec();
         sorted.sort_by(f64::total_cmp);
@@ -143,7 +162,12 @@ fn draw(tables: &[Table]) -> Sheet {
     let mut map = PlanePanel::new(Axis::log("*α*", a0, a1), Axis::log("*β*", b0, b1));
     for i in 0..l.len() {
         let (x, y) = (alpha[i], beta[i]);
-        let outline = vec![[x / wide, y / high], [x * wide, y / high], [x * wide, y * high], [x / wide, y * high]];
+        let outline = vec![
+            [x / wide, y / high],
+            [x * wide, y / high],
+            [x * wide, y * high],
+            [x / wide, y * high],
+        ];
         map = map.solid(outline, shade(if top > low { (l[i] - low) / (top - low) } else { 0.0 }));
     }
     let marks = [
@@ -169,11 +193,16 @@ fn draw(tables: &[Table]) -> Sheet {
         sheet = sheet.legend(LegendEntry::new(LegendKey::Marker(marker), words));
     }
     for (share, words) in [(0.0, low), (0.5, 0.5 * (low + top)), (1.0, top)] {
-        sheet = sheet.legend(LegendEntry::new(LegendKey::Area(shade(share), 100), format!("10^{{{words:.1}}}")));
+        sheet = sheet.legend(LegendEntry::new(
+            LegendKey::Area(shade(share), 100),
+            format!("10^{{{words:.1}}}"),
+        ));
     }
     let (ca, cb) = (candidates.numbers("alpha"), candidates.numbers("beta"));
-    let posteriors = PRIORS
-        .map(|prior| ["", "_low", "_high"].map(|end| candidates.numbers(&format!("posterior_prior_{prior}{end}"))));
+    let posteriors = PRIORS.map(|prior| {
+        ["", "_low", "_high"]
+            .map(|end| candidates.numbers(&format!("posterior_prior_{prior}{end}")))
+    });
     let n = candidates.len() as f64;
     let mut odds = PlanePanel::new(Axis::linear("", -0.8, n + 0.1), Axis::linear("", -0.3, 1.1));
     odds.axes = false;
@@ -190,8 +219,14 @@ fn draw(tables: &[Table]) -> Sheet {
             let [height, from, to] = posteriors[k].map(|column| column[i]);
             let (left, height) = (i as f64 + 0.12 + 0.38 * k as f64, height.max(0.003));
             odds = odds
-                .solid(vec![[left, 0.0], [left + 0.36, 0.0], [left + 0.36, height], [left, height]], colour)
-                .line(vec![[left + 0.18, from], [left + 0.18, to]], LineStyle::new(style::INK, style::CURVE_PT));
+                .solid(
+                    vec![[left, 0.0], [left + 0.36, 0.0], [left + 0.36, height], [left, height]],
+                    colour,
+                )
+                .line(
+                    vec![[left + 0.18, from], [left + 0.18, to]],
+                    LineStyle::new(style::INK, style::CURVE_PT),
+                );
         }
         odds = odds.note([i as f64 + 0.5, -0.03], number(ca[i]), Anchor::Below).note(
             [i as f64 + 0.5, -0.14],
@@ -206,20 +241,39 @@ fn draw(tables: &[Table]) -> Sheet {
         .flat_map(|c| cells.integers(&c.name))
         .copied()
         .collect();
-    let (fewest, most) = (runs.iter().min().copied().unwrap_or(0), runs.iter().max().copied().unwrap_or(0));
+    let (fewest, most) =
+        (runs.iter().min().copied().unwrap_or(0), runs.iter().max().copied().unwrap_or(0));
     sheet
         .panel("(a)", "likelihood of the seven outcomes", map)
         .panel("(b)", "posterior of *α* (above) and *β*", odds)
-        .legend(LegendEntry::new(LegendKey::Area(style::BLUE, 100), format!("prior of printed {}", PRIORS[0])))
-        .legend(LegendEntry::new(LegendKey::Area(style::ORANGE, 100), format!("prior of printed {}", PRIORS[1])))
+        .legend(LegendEntry::new(
+            LegendKey::Area(style::BLUE, 100),
+            format!(
+                "prior of printed \
+            {}",
+                PRIORS[0]
+            ),
+        ))
+        .legend(LegendEntry::new(
+            LegendKey::Area(style::ORANGE, 100),
+            format!(
+                "prior of printed \
+            {}",
+                PRIORS[1]
+            ),
+        ))
         .footer(format!(
-            "(a) Probability that one new run of each panel of figs 7 and 8 and of 9(i) comes out as the paper says, from {fewest} to {most} runs of each panel in each cell \
-             (Dormand-Prince at NDSolve's tolerance, *t* = 200000). Most likely: *α* = {}, *β* = {}.",
+            "(a) Probability that one new run of each panel of figs 7 and 8 and of 9(i) comes out \
+                as the paper says, from {fewest} to {most} runs of each panel in each cell \
+             (Dormand-Prince at NDSolve's tolerance, *t* = 200000). Most likely: *α* = {}, *β* = \
+             {}.",
             number(alpha[best]),
             number(beta[best])
         ))
         .footer(format!(
-            "(b) The printed numbers and those with one exponent changed, LSODA, {} runs or more of each panel, with 95 % intervals; what is not printed shares the rest of the prior evenly.",
+            "(b) The printed numbers and those with one exponent changed, LSODA, {} runs or more \
+                of each panel, with 95 % intervals; what is not printed shares the rest of the \
+                prior evenly.",
             candidates.integers("fewest_runs").iter().min().copied().unwrap_or(0)
         ))
 }
@@ -233,8 +287,10 @@ pub fn figure() -> Figure {
             name: "audit".into(),
             reading: None,
             title: "At which parameters the paper's outcomes are likely".into(),
-            caption: "(a) How likely the seven outcomes that the paper reports in figs 7, 8 and 9(i) are at each α and β, with the printed, the reconstructed and \
-                      the most likely pair. (b) How probable it is that one digit of an exponent was misprinted, under two priors."
+            caption: "(a) How likely the seven outcomes that the paper reports in figs 7, 8 and \
+                9(i) are at each α and β, with the printed, the reconstructed and \
+                      the most likely pair. (b) How probable it is that one digit of an exponent \
+                      was misprinted, under two priors."
                 .into(),
             view: View::Study(Study { questions, draw: |answers| draw(&Study::tables(answers)) }),
             panels: Vec::new(),

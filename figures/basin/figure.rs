@@ -1,4 +1,5 @@
-//! The basin: where starts on the plane y = 0 lead. Not a figure of the paper. Its data are committed beside it and made by `make census`.
+//! The basin: where starts on the plane y = 0 lead. Not a figure of the paper. Its data are
+//! committed beside it and made by `make census`.
 
 use std::sync::Arc;
 
@@ -17,10 +18,12 @@ const PRINTED: &[u8] = include_bytes!("printed.csv");
 const RECONSTRUCTED: &[u8] = include_bytes!("reconstructed.csv");
 
 /// Both, under the files' names.
-pub const DATA: &[(&str, &[u8])] = &[("printed.csv", PRINTED), ("reconstructed.csv", RECONSTRUCTED)];
+pub const DATA: &[(&str, &[u8])] =
+    &[("printed.csv", PRINTED), ("reconstructed.csv", RECONSTRUCTED)];
 
 /// Colours of the kinds, in the order of `MotionKind::ALL`.
-const COLOURS: [Colour; 6] = [style::BLUE, style::GREEN, style::SKY, style::VERMILLION, style::INK, style::FAINT];
+const COLOURS: [Colour; 6] =
+    [style::BLUE, style::GREEN, style::SKY, style::VERMILLION, style::INK, style::FAINT];
 
 fn data(reading: Reading) -> &'static [u8] {
     match reading {
@@ -30,14 +33,22 @@ fn data(reading: Reading) -> &'static [u8] {
 }
 
 fn tables(reading: Reading) -> Result<Vec<Table>, JobError> {
-    let rows = Rows::from_csv(data(reading)).map_err(|e| JobError::Other(format!("the basin's data: {e}")))?;
+    let rows = Rows::from_csv(data(reading))
+        .map_err(|e| JobError::Other(format!("the basin's data: {e}")))?;
     let end = rows.sweep().run().t_end;
     let table = rows.table();
-    let mut found =
-        Table::new("basin", [Column::numbers("x"), Column::numbers("z"), Column::words("kind"), Column::numbers("t")]);
+    let mut found = Table::new(
+        "basin",
+        [Column::numbers("x"), Column::numbers("z"), Column::words("kind"), Column::numbers("t")],
+    );
     let runs = census::runs(&table, &[]);
     for ((x, z), run) in table.numbers("start.x").iter().zip(table.numbers("start.z")).zip(&runs) {
-        found.push([Entry::Number(*x), Entry::Number(*z), run.kind(end).words().into(), Entry::Number(end)]);
+        found.push([
+            Entry::Number(*x),
+            Entry::Number(*z),
+            run.kind(end).words().into(),
+            Entry::Number(end),
+        ]);
     }
     Ok(vec![found])
 }
@@ -75,9 +86,13 @@ fn draw(tables: &[Table]) -> Sheet {
         let Some(kind) = MotionKind::ALL.iter().position(|k| k.words() == word) else { continue };
         counts[kind] += 1;
         let (a, b) = (x[i], z[i]);
-        // A little beyond its edge, under the next cell: between cells that only touch, paper shines through.
+        // A little beyond its edge, under the next cell: between cells that only touch, paper
+        // shines through.
         let (right, top) = (a + 1.08 * dx, b + 1.08 * dz);
-        map = map.solid(vec![[a - dx, b - dz], [right, b - dz], [right, top], [a - dx, top]], COLOURS[kind]);
+        map = map.solid(
+            vec![[a - dx, b - dz], [right, b - dz], [right, top], [a - dx, top]],
+            COLOURS[kind],
+        );
     }
     let start = MarkerStyle { shape: MarkerShape::OpenDot, colour: style::INK, size: 4.5 };
     map = map.markers(vec![[0.2, -1.0]], start);
@@ -101,10 +116,14 @@ pub fn figure() -> Figure {
     Figure::studied_in_both_readings(
         "basin",
         "Where starts lead",
-        "Starts on the plane y = 0, coloured by what becomes of the run: captured by the period-one orbit, by the period-three orbit, regular \
+        "Starts on the plane y = 0, coloured by what becomes of the run: captured by the \
+            period-one orbit, by the period-three orbit, regular \
          otherwise, still irregular, or on the way to the far state.",
         [
-            Study { questions: || vec![question(Reading::Printed)], draw: |answers| draw(&Study::tables(answers)) },
+            Study {
+                questions: || vec![question(Reading::Printed)],
+                draw: |answers| draw(&Study::tables(answers)),
+            },
             Study {
                 questions: || vec![question(Reading::Reconstructed)],
                 draw: |answers| draw(&Study::tables(answers)),

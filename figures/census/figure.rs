@@ -1,5 +1,6 @@
-//! The census: what a panel of figs 7 and 8 shows is drawn from a lottery, and these are the odds. Not a figure of the paper. Its data are committed
-//! beside it and made by `make census`; the rules were fixed before (crates/paper/src/claims.toml).
+//! The census: what a panel of figs 7 and 8 shows is drawn from a lottery, and these are the odds.
+//! Not a figure of the paper. Its data are committed beside it and made by `make census`; the rules
+//! were fixed before (crates/paper/src/claims.toml).
 
 use std::sync::Arc;
 
@@ -14,9 +15,10 @@ use twofold::record::Hash;
 use twofold::render::sheet::*;
 use twofold::render::style;
 
-/// The data: figs 7 and 8 by LSODA at NDSolve's defaults from starts shifted within 1e-9; fig. 7(iii) by other methods and by Dormand-Prince at other
-/// tolerances; fig. 7(iii) to a shorter time by LSODA, and by the layer-resolved Taylor method with local errors of 1e-15, and of 1e-20 in double-double
-/// arithmetic.
+/// The data: figs 7 and 8 by LSODA at NDSolve's defaults from starts shifted within 1e-9; fig.
+/// 7(iii) by other methods and by Dormand-Prince at other tolerances; fig. 7(iii) to a shorter time
+/// by LSODA, and by the layer-resolved Taylor method with local errors of 1e-15, and of 1e-20 in
+/// double-double arithmetic.
 pub const DATA: &[(&str, &[u8])] = &[
     ("fig7.csv", include_bytes!("fig7.csv")),
     ("fig8.csv", include_bytes!("fig8.csv")),
@@ -42,7 +44,8 @@ const SHORTER: [(&str, &str, &str); 3] = [
 ];
 
 /// Colours of the kinds, in the order of `MotionKind::ALL`.
-const COLOURS: [Colour; 6] = [style::BLUE, style::GREEN, style::SKY, style::VERMILLION, style::INK, style::FAINT];
+const COLOURS: [Colour; 6] =
+    [style::BLUE, style::GREEN, style::SKY, style::VERMILLION, style::INK, style::FAINT];
 
 fn rows_of(bytes: &[u8]) -> Result<Rows, JobError> {
     Rows::from_csv(bytes).map_err(|e| JobError::Other(format!("the census' data: {e}")))
@@ -81,9 +84,13 @@ pub fn found(reading: Reading) -> Result<Found, JobError> {
 /// # Errors
 ///
 /// If they are not such as `make census` writes, or `read` fails.
-pub fn found_in(reading: Reading, read: &dyn Fn(&str) -> Result<Vec<u8>, JobError>) -> Result<Found, JobError> {
+pub fn found_in(
+    reading: Reading,
+    read: &dyn Fn(&str) -> Result<Vec<u8>, JobError>,
+) -> Result<Found, JobError> {
     let table = |name: &str| rows_of(&read(name)?).map(|rows| rows.table());
-    let tables = |names: &[&str]| names.iter().map(|name| table(name)).collect::<Result<Vec<_>, _>>();
+    let tables =
+        |names: &[&str]| names.iter().map(|name| table(name)).collect::<Result<Vec<_>, _>>();
     let mut shorter = Vec::new();
     for (file, name, _) in SHORTER {
         for reading in Reading::ALL {
@@ -95,7 +102,12 @@ pub fn found_in(reading: Reading, read: &dyn Fn(&str) -> Result<Vec<u8>, JobErro
         fig7: table("fig7.csv")?,
         fig8: table("fig8.csv")?,
         methods: tables(&["methods-printed.csv", "methods.csv"])?,
-        tolerances: tables(&["tolerances-printed.csv", "tolerances.csv", "tight-printed.csv", "tight.csv"])?,
+        tolerances: tables(&[
+            "tolerances-printed.csv",
+            "tolerances.csv",
+            "tight-printed.csv",
+            "tight.csv",
+        ])?,
         shorter,
     };
     Ok(Found::of(reading, &data, &claims().rules))
@@ -125,7 +137,10 @@ pub fn runs(panel: &str, reading: Reading) -> Result<Vec<census::CensusRun>, Job
 /// As [`runs`].
 pub fn support(panel: &str, reading: Reading) -> Result<Support, JobError> {
     let (said, runs) = (census::PANELS[place(panel)?].said, runs(panel, reading)?);
-    Ok(Support { support: census::supporting(said, &runs, &claims().rules), runs: runs.len() as u64 })
+    Ok(Support {
+        support: census::supporting(said, &runs, &claims().rules),
+        runs: runs.len() as u64,
+    })
 }
 
 fn tables(reading: Reading) -> Result<Vec<Table>, JobError> {
@@ -135,7 +150,8 @@ fn tables(reading: Reading) -> Result<Vec<Table>, JobError> {
 /// Columns of counts as stacked bars with a name above each.
 fn bars(names: &[String], counts: &[Vec<f64>], below: &[Vec<String>]) -> PlanePanel {
     let n = names.len() as f64;
-    let mut panel = PlanePanel::new(Axis::linear("", -0.95, n + 0.15), Axis::linear("", -0.24, 1.16));
+    let mut panel =
+        PlanePanel::new(Axis::linear("", -0.95, n + 0.15), Axis::linear("", -0.24, 1.16));
     panel.axes = false;
     for percent in [0.0, 50.0, 100.0] {
         let y = percent / 100.0;
@@ -151,7 +167,8 @@ fn bars(names: &[String], counts: &[Vec<f64>], below: &[Vec<String>]) -> PlanePa
         let mut low = 0.0;
         for (count, colour) in row.iter().zip(COLOURS).filter(|(count, _)| **count > 0.0) {
             let high = low + count / total.max(1.0);
-            panel = panel.solid(vec![[left, low], [right, low], [right, high], [left, high]], colour);
+            panel =
+                panel.solid(vec![[left, low], [right, low], [right, high], [left, high]], colour);
             low = high;
         }
         let middle = i as f64 + 0.5;
@@ -164,12 +181,19 @@ fn bars(names: &[String], counts: &[Vec<f64>], below: &[Vec<String>]) -> PlanePa
 }
 
 fn draw(tables: &[Table]) -> Sheet {
-    let [shares, found, curves, ways, shorter] = tables else { unreachable!("the census has five tables") };
+    let [shares, found, curves, ways, shorter] = tables else {
+        unreachable!("the census has five tables")
+    };
     let count = |table: &Table, row: usize, suffix: &str| -> Vec<f64> {
-        MotionKind::ALL.map(|k| table.integers(&format!("{}{suffix}", k.words().replace(' ', "_")))[row] as f64).to_vec()
+        MotionKind::ALL
+            .map(|k| {
+                table.integers(&format!("{}{suffix}", k.words().replace(' ', "_")))[row] as f64
+            })
+            .to_vec()
     };
     let names: Vec<String> = shares.words("panel").map(str::to_owned).collect();
-    let at_end: Vec<Vec<f64>> = (0..shares.len()).map(|row| count(shares, row, "_at_end")).collect();
+    let at_end: Vec<Vec<f64>> =
+        (0..shares.len()).map(|row| count(shares, row, "_at_end")).collect();
     let percent = |v: f64| format!("{:.0}", 100.0 * v);
     let claimed: Vec<Vec<String>> = (0..shares.len())
         .map(|row| {
@@ -177,7 +201,8 @@ fn draw(tables: &[Table]) -> Sheet {
             vec![format!("{} %", percent(p)), format!("{}–{}", percent(low), percent(high))]
         })
         .collect();
-    let mut capture = PlanePanel::new(Axis::log("*t*", 3.0, 2e5), Axis::linear("share captured", 0.0, 1.0));
+    let mut capture =
+        PlanePanel::new(Axis::log("*t*", 3.0, 2e5), Axis::linear("share captured", 0.0, 1.0));
     for (i, name) in names.iter().enumerate() {
         let mut points = vec![[3.0, 0.0]];
         let mut last = 0.0;
@@ -206,11 +231,15 @@ fn draw(tables: &[Table]) -> Sheet {
     };
     let ways_names: Vec<String> = ways.words("group").map(short).collect();
     let ways_counts: Vec<Vec<f64>> = (0..ways.len()).map(|row| count(ways, row, "")).collect();
-    let ways_totals: Vec<Vec<String>> =
-        ways_counts.iter().map(|c| vec![format!("{:.0}", c.iter().sum::<f64>()), "runs".to_owned()]).collect();
-    let in_picture = |name: &str| SHORTER.iter().find(|s| s.1 == name).map_or(name, |s| s.2).to_owned();
+    let ways_totals: Vec<Vec<String>> = ways_counts
+        .iter()
+        .map(|c| vec![format!("{:.0}", c.iter().sum::<f64>()), "runs".to_owned()])
+        .collect();
+    let in_picture =
+        |name: &str| SHORTER.iter().find(|s| s.1 == name).map_or(name, |s| s.2).to_owned();
     let shorter_names: Vec<String> = shorter.words("group").map(in_picture).collect();
-    let shorter_counts: Vec<Vec<f64>> = (0..shorter.len()).map(|row| count(shorter, row, "")).collect();
+    let shorter_counts: Vec<Vec<f64>> =
+        (0..shorter.len()).map(|row| count(shorter, row, "")).collect();
     let shorter_totals: Vec<Vec<String>> =
         shorter_counts.iter().map(|c| vec![format!("{:.0} runs", c.iter().sum::<f64>())]).collect();
     let horizon = shorter.numbers("t").first().copied().unwrap_or(f64::NAN);
@@ -228,7 +257,11 @@ fn draw(tables: &[Table]) -> Sheet {
         .panel_aspect(0.5)
         .panel("(a)", "where runs of each panel end", bars(&names, &at_end, &claimed))
         .panel("(b)", "captured by a closed orbit", capture)
-        .panel("(c)", "interval 100, by method and tolerance", bars(&ways_names, &ways_counts, &ways_totals))
+        .panel(
+            "(c)",
+            "interval 100, by method and tolerance",
+            bars(&ways_names, &ways_counts, &ways_totals),
+        )
         .panel(
             "(d)",
             format!("interval 100 to *t* = {horizon}, by local error"),
@@ -239,8 +272,10 @@ fn draw(tables: &[Table]) -> Sheet {
     }
     sheet
         .footer(format!(
-            "Runs to *t* = 200000 from starts shifted by less than 10^{{-9}}, LSODA at NDSolve's defaults, {} a panel. Below each bar of (a): share of runs \
-             that bear out what the paper says of the panel, with its 95 % interval (Wilson). (c) LSODA, Dormand-Prince (DP5) and Radau IIA at NDSolve's tolerance; \
+            "Runs to *t* = 200000 from starts shifted by less than 10^{{-9}}, LSODA at NDSolve's \
+                defaults, {} a panel. Below each bar of (a): share of runs \
+             that bear out what the paper says of the panel, with its 95 % interval (Wilson). (c) \
+             LSODA, Dormand-Prince (DP5) and Radau IIA at NDSolve's tolerance; \
              Dormand-Prince at other tolerances.",
             match [runs.iter().min(), runs.iter().max()].map(|n| n.copied().unwrap_or(0)) {
                 [fewest, most] if fewest == most => fewest.to_string(),
@@ -248,7 +283,8 @@ fn draw(tables: &[Table]) -> Sheet {
             }
         ))
         .footer(format!(
-            "Tests for the same odds (permutation): intervals 20, 40, 100 {}; *σ* {}; all six panels {}; methods {}; tolerances {}, without 10^{{-6}} {}; (d) {}.",
+            "Tests for the same odds (permutation): intervals 20, 40, 100 {}; *σ* {}; all six \
+                panels {}; methods {}; tolerances {}, without 10^{{-6}} {}; (d) {}.",
             p("intervals 20, 40, 100"),
             p("sigma 0.01, 0.1, 0.13"),
             p("all six panels"),
@@ -258,7 +294,8 @@ fn draw(tables: &[Table]) -> Sheet {
             p("ordinary and small local errors"),
         ))
         .footer(format!(
-            "Three independent runs: fig. 7 all as claimed {}, not all the same {}; fig. 8 all as claimed {}, not all the same {}.",
+            "Three independent runs: fig. 7 all as claimed {}, not all the same {}; fig. 8 all as \
+                claimed {}, not all the same {}.",
             together("fig. 7: all as claimed"),
             together("fig. 7: not all the same"),
             together("fig. 8: all as claimed"),
@@ -271,12 +308,18 @@ pub fn figure() -> Figure {
     Figure::studied_in_both_readings(
         "census",
         "The odds of each outcome of figs 7 and 8",
-        "(a) Where runs of each panel of figs 7 and 8 end, of many starts that differ by less than 1e-9, and the share that bears out what the \
-         paper says of the panel. (b) Share of runs that a closed orbit has captured by time t. (c) The same as (a) for fig. 7(iii) by other \
-         methods, and by Dormand-Prince at other tolerances. (d) Runs of fig. 7(iii) that end earlier, by LSODA and by a Taylor method in double-double \
+        "(a) Where runs of each panel of figs 7 and 8 end, of many starts that differ by less than \
+            1e-9, and the share that bears out what the \
+         paper says of the panel. (b) Share of runs that a closed orbit has captured by time t. \
+         (c) The same as (a) for fig. 7(iii) by other \
+         methods, and by Dormand-Prince at other tolerances. (d) Runs of fig. 7(iii) that end \
+         earlier, by LSODA and by a Taylor method in double-double \
          arithmetic.",
         [
-            Study { questions: || vec![question(Reading::Printed)], draw: |answers| draw(&Study::tables(answers)) },
+            Study {
+                questions: || vec![question(Reading::Printed)],
+                draw: |answers| draw(&Study::tables(answers)),
+            },
             Study {
                 questions: || vec![question(Reading::Reconstructed)],
                 draw: |answers| draw(&Study::tables(answers)),

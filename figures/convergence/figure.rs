@@ -1,5 +1,6 @@
-//! The limit of a stiff switch: smoothed orbits beside the Filippov motion. Not a figure of the paper; it checks the paper's premise
-//! that smoothing is harmless away from the singularity, and that it decides nothing there.
+//! The limit of a stiff switch: smoothed orbits beside the Filippov motion. Not a figure of the
+//! paper; it checks the paper's premise that smoothing is harmless away from the singularity, and
+//! that it decides nothing there.
 
 use std::sync::Arc;
 
@@ -18,7 +19,8 @@ use twofold::system::System;
 const START: [f64; 3] = [0.2, 0.0, -1.0];
 /// Stiffness parameters before the visit.
 const BEFORE: [f64; 6] = [1.6e-2, 8e-3, 4e-3, 2e-3, 1e-3, 5e-4];
-/// Stiffness parameters after the visit: from 1e-2 down, so many a decade, over so many decades: two periods of the far exit.
+/// Stiffness parameters after the visit: from 1e-2 down, so many a decade, over so many decades:
+/// two periods of the far exit.
 const PER_DECADE: usize = 10;
 /// See [`PER_DECADE`].
 const DECADES: usize = 3;
@@ -27,8 +29,14 @@ const BEYOND: f64 = 0.6;
 /// The crossing comes before this time.
 const T_END: f64 = 80.0;
 /// The futures that are looked at.
-const GRID: FunnelGrid =
-    FunnelGrid { shortest: 1e-3, longest: 2.5, times: 80, horizon: 12.0, until_two_fold: true, per_step: 1 };
+const GRID: FunnelGrid = FunnelGrid {
+    shortest: 1e-3,
+    longest: 2.5,
+    times: 80,
+    horizon: 12.0,
+    until_two_fold: true,
+    per_step: 1,
+};
 /// Finer grids in the search for the nearest member.
 const REFINEMENTS: usize = 3;
 /// Exit times of each.
@@ -62,7 +70,9 @@ fn after_question() -> AfterVisitQuestion {
     AfterVisitQuestion {
         start: START.into(),
         t_end: T_END,
-        eps: (0..=PER_DECADE * DECADES).map(|k| exp10(-2.0 - k as f64 / PER_DECADE as f64)).collect(),
+        eps: (0..=PER_DECADE * DECADES)
+            .map(|k| exp10(-2.0 - k as f64 / PER_DECADE as f64))
+            .collect(),
         beyond: BEYOND,
         grid: GRID,
         refinements: REFINEMENTS,
@@ -98,7 +108,9 @@ fn with_room(room: f64, distances: impl Iterator<Item = f64>) -> Axis {
 }
 
 fn draw(tables: &[Table]) -> Sheet {
-    let [before, members, after] = tables else { unreachable!("the two questions have three tables") };
+    let [before, members, after] = tables else {
+        unreachable!("the two questions have three tables")
+    };
     let (before, members, after) = (before.rows(), members.rows(), after.rows());
     let expected = LineStyle::new(style::SOFT_INK, style::CURVE_PT).dashed();
     let (approach, rates) = approach(&before, expected);
@@ -107,29 +119,44 @@ fn draw(tables: &[Table]) -> Sheet {
     let nearest: Vec<String> = after
         .iter()
         .step_by(PER_DECADE)
-        .map(|r| format!("{} for *ε* = {}", number((value(&r[3]) * 1e3).round() / 1e3), number(value(&r[0]))))
+        .map(|r| {
+            format!(
+                "{} for *ε* = {}",
+                number((value(&r[3]) * 1e3).round() / 1e3),
+                number(value(&r[0]))
+            )
+        })
         .collect();
     Sheet::new(ColumnWidth::Wide, 1, "")
         .panel_aspect(0.5)
         .panel("(a)", "before the visit", approach)
         .panel("(b)", "crossings of *x* = 0 after it", crossings(&members, &after))
         .panel("(c)", "nearest member", nearest_member(&after, &distances))
-        .legend(LegendEntry::new(LegendKey::Line(expected), "(a) distance proportional to *ε*, through the point of the smallest *ε*"))
+        .legend(LegendEntry::new(
+            LegendKey::Line(expected),
+            "(a) distance proportional to *ε*, \
+            through the point of the smallest *ε*",
+        ))
         .footer(format!(
-            "(a) Distance of the smoothed orbit from the Filippov orbit, whose first visit to the singularity is at *t* = {visit:.3}. \
+            "(a) Distance of the smoothed orbit from the Filippov orbit, whose first visit to the \
+                singularity is at *t* = {visit:.3}. \
              Measured powers of *ε*, least squares: {}.",
             rates.join(", ")
         ))
         .footer(format!(
-            "(b) Where the Filippov orbits that leave the singularity after a time of repelling sliding of {} … {} first cross upwards \
-             farther than {} from it, and where smoothed orbits do, followed in double-double arithmetic through the visit: {PER_DECADE} values of *ε* a decade (labels: whole \
-             decades). They wander along the funnel and jump back, periodically in ln *ε*: figure law.",
+            "(b) Where the Filippov orbits that leave the singularity after a time of repelling \
+                sliding of {} … {} first cross upwards \
+             farther than {} from it, and where smoothed orbits do, followed in double-double \
+             arithmetic through the visit: {PER_DECADE} values of *ε* a decade (labels: whole \
+             decades). They wander along the funnel and jump back, periodically in ln *ε*: figure \
+             law.",
             number(GRID.shortest),
             number(GRID.longest),
             number(BEYOND)
         ))
         .footer(format!(
-            "(c) Distance in (b) to the nearest Filippov orbit: measured power of *ε*, least squares, {:.2}. That orbit’s time of repelling sliding: {}.",
+            "(c) Distance in (b) to the nearest Filippov orbit: measured power of *ε*, least \
+                squares, {:.2}. That orbit’s time of repelling sliding: {}.",
             observed_rate(distances),
             nearest.join(", ")
         ))
@@ -153,7 +180,8 @@ fn approach(before: &[Vec<Entry>], expected: LineStyle) -> (PlanePanel, Vec<Stri
         let points: Vec<[f64; 2]> = rows.iter().map(|r| [value(&r[0]), value(&r[3])]).collect();
         let marker = MarkerStyle { shape, colour, size: 4.0 };
         panel = panel.line(proportional(&points), expected).markers(points.clone(), marker);
-        let mode = if rows.iter().all(|r| r[2] == Entry::from("sliding")) { "sliding" } else { "free" };
+        let mode =
+            if rows.iter().all(|r| r[2] == Entry::from("sliding")) { "sliding" } else { "free" };
         panel = panel.legend(LegendKey::Marker(marker), format!("*t* = {} ({mode})", number(t)));
         rates.push(format!("{:.3} at *t* = {}", observed_rate(points), number(t)));
     }
@@ -168,7 +196,8 @@ fn crossings(members: &[Vec<Entry>], after: &[Vec<Entry>]) -> PlanePanel {
     };
     let exits: Vec<[f64; 2]> = after.iter().map(|r| [value(&r[1]), value(&r[2])]).collect();
     let all = || members.iter().map(|r| [value(&r[2]), value(&r[3])]).chain(exits.iter().copied());
-    let (mut y, mut z) = (Axis::covering("*y*", all().map(|p| p[0])), Axis::covering("*z*", all().map(|p| p[1])));
+    let (mut y, mut z) =
+        (Axis::covering("*y*", all().map(|p| p[0])), Axis::covering("*z*", all().map(|p| p[1])));
     let (wide, high) = (y.upper - y.lower, z.upper - z.lower);
     let left = y.lower;
     (y.upper, z.lower) = (y.upper + 0.3 * wide, z.lower - 0.12 * high);
@@ -216,13 +245,22 @@ pub fn figure() -> Figure {
     Figure::studied_in_both_readings(
         "convergence",
         "Smoothed orbits and the Filippov motion as the switch steepens",
-        "(a) Distance between smoothed orbit and Filippov orbit at four times before the first visit to the singularity, \
-                  against ε, with lines proportional to ε. (b) After the visit the Filippov motion is a set: where its members next cross \
-                  the surface x = 0 far from the singularity, and where smoothed orbits cross it, in the plane of y and z. (c) Distance of \
+        "(a) Distance between smoothed orbit and Filippov orbit at four times before the first \
+            visit to the singularity, \
+                  against ε, with lines proportional to ε. (b) After the visit the Filippov motion \
+                  is a set: where its members next cross \
+                  the surface x = 0 far from the singularity, and where smoothed orbits cross it, \
+                  in the plane of y and z. (c) Distance of \
                   each smoothed crossing to the nearest member, beside the width of the set.",
         [
-            Study { questions: || questions(Reading::Printed), draw: |answers| draw(&Study::tables(answers)) },
-            Study { questions: || questions(Reading::Reconstructed), draw: |answers| draw(&Study::tables(answers)) },
+            Study {
+                questions: || questions(Reading::Printed),
+                draw: |answers| draw(&Study::tables(answers)),
+            },
+            Study {
+                questions: || questions(Reading::Reconstructed),
+                draw: |answers| draw(&Study::tables(answers)),
+            },
         ],
     )
 }

@@ -1,5 +1,7 @@
-//! The delayed switch, which the paper leaves out (end of sec. 4.3), beside smoothing and hysteresis. Not a figure of the paper. The data of (b), (c) and
-//! (d) are committed beside it and made by `make delay-data`; sentence 4.8's rules were fixed before (crates/paper/src/claims.toml).
+//! The delayed switch, which the paper leaves out (end of sec. 4.3), beside smoothing and
+//! hysteresis. Not a figure of the paper. The data of (b), (c) and (d) are committed beside it and
+//! made by `make delay-data`; sentence 4.8's rules were fixed before
+//! (crates/paper/src/claims.toml).
 
 use std::cmp::Ordering;
 use std::sync::Arc;
@@ -22,7 +24,8 @@ use twofold::render::sheet::*;
 use twofold::render::style;
 use twofold::system::{Relaxation, Transition};
 
-/// The data: growth in one passage, exits by the chatter's phase, late sections, and distances of runs from the rules.
+/// The data: growth in one passage, exits by the chatter's phase, late sections, and distances of
+/// runs from the rules.
 pub const DATA: [(&str, &str); 4] = [
     ("growth", include_str!("growth.csv")),
     ("exits", include_str!("exits.csv")),
@@ -87,9 +90,12 @@ fn questions() -> Vec<AnyQuestion> {
     let hashes: Vec<Hash> = DATA.iter().map(|(_, text)| Hash::of(text.as_bytes())).collect();
     all.push(Arc::new(Computed {
         kind: "delay",
-        question: serde_json::json!({ "data": hashes, "rules": claims().similarity, "confidence": claims().rules.confidence }),
+        question: serde_json::json!({ "data": hashes, "rules": claims().similarity,
+            "confidence": claims().rules.confidence }),
         cost: 1.0,
-        compute: || DATA.iter().take(3).map(|(name, text)| table(name, text)).chain([scores()]).collect(),
+        compute: || {
+            DATA.iter().take(3).map(|(name, text)| table(name, text)).chain([scores()]).collect()
+        },
     }));
     all
 }
@@ -109,7 +115,11 @@ fn table(name: &str, text: &str) -> Result<Table, JobError> {
         }
         let mut row = Vec::new();
         for (column, cell) in columns.iter().zip(cells) {
-            row.push(if is_word(column) { cell.into() } else { cell.parse::<f64>().map_err(|_| bad())?.into() });
+            row.push(if is_word(column) {
+                cell.into()
+            } else {
+                cell.parse::<f64>().map_err(|_| bad())?.into()
+            });
         }
         table.push(row);
     }
@@ -126,10 +136,12 @@ pub fn runs() -> Result<Vec<similarity::RuleRun>, JobError> {
         .ok_or_else(|| JobError::Other("figures/delay/runs.csv has other columns or rows".into()))
 }
 
-/// A way, an index of [`WAYS`], in a reading of the parameters; the delayed rule and the hysteretic one; and the score.
+/// A way, an index of [`WAYS`], in a reading of the parameters; the delayed rule and the hysteretic
+/// one; and the score.
 pub type Scored = (usize, Reading, Rule, Rule, Score);
 
-/// Every way in each reading of the parameters, for a delay of eps and of eps', against each reading of eq. (10).
+/// Every way in each reading of the parameters, for a delay of eps and of eps', against each
+/// reading of eq. (10).
 ///
 /// # Errors
 ///
@@ -152,13 +164,31 @@ pub fn all_scores() -> Result<Vec<Scored>, JobError> {
 
 fn scores() -> Result<Table, JobError> {
     let words = ["way", "reading", "delayed", "hysteresis", "outcome"].map(Column::words);
-    let names = ["runs", "near", "near_low", "near_high", "within", "within_low", "within_high", "yardstick"];
+    let names = [
+        "runs",
+        "near",
+        "near_low",
+        "near_high",
+        "within",
+        "within_low",
+        "within_high",
+        "yardstick",
+    ];
     let numbers = names.into_iter().chain(["to_smoothing", "to_hysteresis"]).map(Column::numbers);
     let mut table = Table::new("scores", words.into_iter().chain(numbers));
     for (way, reading, delayed, hysteresis, s) in all_scores()? {
-        let words = [WAYS[way], reading.word(), delayed.name(), hysteresis.name(), s.similar.word()];
+        let words =
+            [WAYS[way], reading.word(), delayed.name(), hysteresis.name(), s.similar.word()];
         let (near, within) = (s.near, s.within);
-        let numbers = [s.of as f64, near.0 as f64, near.1[0], near.1[1], within.0 as f64, within.1[0], within.1[1]];
+        let numbers = [
+            s.of as f64,
+            near.0 as f64,
+            near.1[0],
+            near.1[1],
+            within.0 as f64,
+            within.1[0],
+            within.1[1],
+        ];
         let numbers = numbers.into_iter().chain([s.yardstick, s.medians[0], s.medians[1]]);
         table.push(words.map(Into::into).into_iter().chain(numbers.map(Into::into)));
     }
@@ -191,14 +221,14 @@ fn draw(answers: &[Arc<Answer>]) -> Sheet {
     let (phases, distribution, said) = exit_panels(exits);
     let (grown, slopes) = growth_panel(growth);
     let (restored, changes) = smooth_panel(growth);
-    let mut sheet = Sheet::new(ColumnWidth::Wide, 2, "").panel_aspect(0.74).panel("(a)", "one passage", places).panel(
-        "",
-        "its chatter",
-        strips,
-    );
+    let mut sheet = Sheet::new(ColumnWidth::Wide, 2, "")
+        .panel_aspect(0.74)
+        .panel("(a)", "one passage", places)
+        .panel("", "its chatter", strips);
     for (reading, half) in Reading::ALL.into_iter().zip(SIDES) {
         for (rule, words) in [(Rule::Literal, "fig. 9(i)"), (Rule::Delayed, "delay *ε*")] {
-            let label = if reading == Reading::Printed && rule == Rule::Literal { "(b)" } else { "" };
+            let label =
+                if reading == Reading::Printed && rule == Rule::Literal { "(b)" } else { "" };
             let right = rule == Rule::Delayed;
             sheet = sheet.panel(
                 label,
@@ -208,7 +238,8 @@ fn draw(answers: &[Arc<Answer>]) -> Sheet {
         }
     }
     for (_, words, colour) in KINDS {
-        sheet = sheet.legend(LegendEntry::new(LegendKey::Line(line_of(colour)), format!("{words} (d)")));
+        sheet = sheet
+            .legend(LegendEntry::new(LegendKey::Line(line_of(colour)), format!("{words} (d)")));
     }
     for (_, shape, words) in SHARP {
         let key = LegendKey::Marker(marker(shape, style::SOFT_INK, 3.4));
@@ -220,7 +251,8 @@ fn draw(answers: &[Arc<Answer>]) -> Sheet {
         .panel("(d)", "growth, sharp rules", grown)
         .panel("", "growth, smooth delay", restored)
         .footer(format!(
-            "(a) From {} in attracting sliding; *ε* = {}, *δ* = {}, hysteresis by eq. (10) with *ε*′ = 10*ε*. The smooth delay stops chattering near the two-fold and leaves it as \
+            "(a) From {} in attracting sliding; *ε* = {}, *δ* = {}, hysteresis by eq. (10) with \
+                *ε*′ = 10*ε*. The smooth delay stops chattering near the two-fold and leaves it as \
              smoothing does. A strip is {} of *x* high.",
             "(0, 0.3, 0.2)",
             number(EPS),
@@ -228,7 +260,8 @@ fn draw(answers: &[Arc<Answer>]) -> Sheet {
             number(2.0 * STRIP)
         ))
         .footer(format!(
-            "(b) Sections *y* = 0, 10^{{5}} < *t* < 2 × 10^{{5}}, *ε* = {}: fig. 9(i) and the sharp delay *δ* = *ε*. {}",
+            "(b) Sections *y* = 0, 10^{{5}} < *t* < 2 × 10^{{5}}, *ε* = {}: fig. 9(i) and the \
+                sharp delay *δ* = *ε*. {}",
             number(EPS),
             verdict(scores)
         ))
@@ -238,18 +271,22 @@ fn draw(answers: &[Arc<Answer>]) -> Sheet {
 }
 
 fn passage_panels(paths: &[Table]) -> (PlanePanel, PlanePanel) {
-    let mut places = PlanePanel::new(Axis::linear("*y*", -0.2, 0.32), Axis::linear("*z*", -0.22, 0.26));
+    let mut places =
+        PlanePanel::new(Axis::linear("*y*", -0.2, 0.32), Axis::linear("*z*", -0.22, 0.26));
     let strips = PlanePanel::new(Axis::linear("*t*", 0.0, CHATTER), Axis::linear("", -1.3, 11.3));
     let mut strips = strips.labelled(true, false);
     let axis = LineStyle::new(style::GRID, style::FRAME_PT);
-    places = places.line(vec![[-0.2, 0.0], [0.32, 0.0]], axis).line(vec![[0.0, -0.22], [0.0, 0.26]], axis);
+    places = places
+        .line(vec![[-0.2, 0.0], [0.32, 0.0]], axis)
+        .line(vec![[0.0, -0.22], [0.0, 0.26]], axis);
     for (k, (path, (words, _, colour))) in paths.iter().zip(passages()).enumerate() {
         let [t, x, y, z] = ["t", "x", "y", "z"].map(|c| path.numbers(c));
         let inside = |p: &[f64; 2]| p[0] > -0.2 && p[1] > -0.22 && p[0] < 0.32 && p[1] < 0.26;
         let shown: Vec<[f64; 2]> = (0..t.len()).map(|i| [y[i], z[i]]).take_while(inside).collect();
         places = places.line(shown, LineStyle::new(colour, 0.7));
         let middle = 9.0 - 3.0 * k as f64;
-        let strip = (0..t.len()).take_while(|i| t[*i] <= CHATTER).map(|i| [t[i], middle + x[i] / STRIP]);
+        let strip =
+            (0..t.len()).take_while(|i| t[*i] <= CHATTER).map(|i| [t[i], middle + x[i] / STRIP]);
         let strip: Vec<[f64; 2]> = strip.filter(|p| (p[1] - middle).abs() <= 1.0).collect();
         strips = strips
             .line(vec![[0.0, middle], [CHATTER, middle]], axis)
@@ -259,20 +296,36 @@ fn passage_panels(paths: &[Table]) -> (PlanePanel, PlanePanel) {
     (places.markers(vec![[0.0, 0.0]], marker(MarkerShape::Star, style::MAGENTA, 6.0)), strips)
 }
 
-fn section_panel(sections: &Table, reading: Reading, rule: Rule, half: [f64; 2], left: bool) -> PlanePanel {
+fn section_panel(
+    sections: &Table,
+    reading: Reading,
+    rule: Rule,
+    half: [f64; 2],
+    left: bool,
+) -> PlanePanel {
     let [x, z] = ["x", "z"].map(|c| sections.numbers(c));
     let chosen = sections.words("reading").zip(sections.words("rule")).enumerate();
     let chosen = chosen.filter(|(_, (r, s))| *r == reading.word() && *s == rule.name());
     let points: Vec<[f64; 2]> = chosen.map(|(i, _)| [x[i], z[i]]).collect();
-    let panel = PlanePanel::new(Axis::linear("*x*", -half[0], half[0]), Axis::linear("*z*", -half[1], half[1]))
-        .labelled(true, left);
+    let panel = PlanePanel::new(
+        Axis::linear("*x*", -half[0], half[0]),
+        Axis::linear("*z*", -half[1], half[1]),
+    )
+    .labelled(true, left);
     // A closed orbit's few places are drawn as such.
     let spread = points.iter().fold(0.0_f64, |far, p| {
-        let nearest = points.iter().take(2).map(|q| (p[0] - q[0]).abs() + (p[1] - q[1]).abs()).fold(f64::MAX, f64::min);
+        let nearest = points
+            .iter()
+            .take(2)
+            .map(|q| (p[0] - q[0]).abs() + (p[1] - q[1]).abs())
+            .fold(f64::MAX, f64::min);
         far.max(nearest)
     });
     if spread < 1e-2 * half[0] {
-        panel.markers(points.into_iter().take(2).collect(), marker(MarkerShape::Dot, style::INK, 4.0))
+        panel.markers(
+            points.into_iter().take(2).collect(),
+            marker(MarkerShape::Dot, style::INK, 4.0),
+        )
     } else {
         panel.dots(points, DotStyle { colour: style::INK, diameter: Some(0.9), density: false })
     }
@@ -286,11 +339,18 @@ fn verdict(scores: &Table) -> String {
     let said = WAYS.map(|name| {
         let found = Reading::ALL.map(|r| {
             let row = (0..scores.len()).find(|i| {
-                way[*i] == name && reading[*i] == r.word() && delayed[*i] == "delayed" && hysteresis[*i] == "literal"
+                way[*i] == name
+                    && reading[*i] == r.word()
+                    && delayed[*i] == "delayed"
+                    && hysteresis[*i] == "literal"
             });
             row.map_or("", |i| outcome[i])
         });
-        let shown = if found[0] == found[1] { found[0].to_owned() } else { format!("{}/{}", found[0], found[1]) };
+        let shown = if found[0] == found[1] {
+            found[0].to_owned()
+        } else {
+            format!("{}/{}", found[0], found[1])
+        };
         format!("{name} {shown}")
     });
     format!("By the rules of sentence 4.8 (printed/reconstructed): {}.", said.join(", "))
@@ -310,14 +370,18 @@ fn exit_panels(exits: &Table) -> (PlanePanel, PlanePanel, String) {
         let points = of("sharp", delay);
         let values = sorted(&points);
         let count = values.len() as f64;
-        let steps = values.iter().enumerate().map(|(i, v)| [*v, (i as f64 + 1.0) / count]).collect();
+        let steps =
+            values.iter().enumerate().map(|(i, v)| [*v, (i as f64 + 1.0) / count]).collect();
         let words = format!("*δ* = 10^{{−{}}}", (-log10(delay)).round());
         phases = phases.dots(points, DotStyle { diameter: Some(1.1), ..DotStyle::plain(colour) });
-        distribution = distribution.line(steps, line_of(colour)).legend(LegendKey::Line(line_of(colour)), words);
+        distribution = distribution
+            .line(steps, line_of(colour))
+            .legend(LegendKey::Line(line_of(colour)), words);
     }
     let gaps = |rule: &str| exit_gaps(exits, rule).map(|gap| format!("{gap:.3}")).join(", ");
     let said = format!(
-        "(c) Sharp delay: exits (first *x* = 0 beyond 3*δ*) of {} orbits whose chatter differs by phase alone. Largest distance between the distributions of neighbouring *δ*: {}; of \
+        "(c) Sharp delay: exits (first *x* = 0 beyond 3*δ*) of {} orbits whose chatter differs by \
+            phase alone. Largest distance between the distributions of neighbouring *δ*: {}; of \
          sharp hysteresis, in units of √*b* with the same *b*: {}.",
         of("sharp", DELAYS[0].0).len(),
         gaps("sharp"),
@@ -326,14 +390,16 @@ fn exit_panels(exits: &Table) -> (PlanePanel, PlanePanel, String) {
     (phases, distribution.legend_at(Corner::UpperLeft), said)
 }
 
-/// The exits of a rule over one period of the chatter, as (phase, y) with the phase from 0 to 1. The committed starts cover a little more: the period ends
-/// where the exit is the first one again.
+/// The exits of a rule over one period of the chatter, as (phase, y) with the phase from 0 to 1.
+/// The committed starts cover a little more: the period ends where the exit is the first one again.
 pub fn one_period(exits: &Table, rule: &str, wanted: f64) -> Vec<[f64; 2]> {
     let [parameter, phase, y] = ["parameter", "phase", "y"].map(|c| exits.numbers(c));
-    let chosen: Vec<usize> = rows(exits, "rule", rule).into_iter().filter(|i| is_near(parameter[*i], wanted)).collect();
+    let chosen: Vec<usize> =
+        rows(exits, "rule", rule).into_iter().filter(|i| is_near(parameter[*i], wanted)).collect();
     let Some(&first) = chosen.first() else { return Vec::new() };
     let apart = |i: &usize| (y[*i] - y[first]).abs();
-    let again = chosen.iter().filter(|i| phase[**i] > 0.8).min_by(|i, k| apart(i).total_cmp(&apart(k)));
+    let again =
+        chosen.iter().filter(|i| phase[**i] > 0.8).min_by(|i, k| apart(i).total_cmp(&apart(k)));
     let period = again.map_or(1.0, |i| phase[*i]);
     chosen.into_iter().filter(|i| phase[*i] < period).map(|i| [phase[i] / period, y[i]]).collect()
 }
@@ -345,7 +411,8 @@ fn sorted(points: &[[f64; 2]]) -> Vec<f64> {
     values
 }
 
-/// The largest distances between the distributions of exits at neighbouring parameters, in inner units, the largest parameters first.
+/// The largest distances between the distributions of exits at neighbouring parameters, in inner
+/// units, the largest parameters first.
 pub fn exit_gaps(exits: &Table, rule: &str) -> [f64; 3] {
     let of = DELAYS.map(|(wanted, _)| sorted(&one_period(exits, rule, wanted)));
     [0, 1, 2].map(|k| distance(&of[k], &of[k + 1]))
@@ -377,8 +444,14 @@ const KINDS: [(&str, &str, Colour); 3] = [
 const SHARP: [(&str, MarkerShape, &str); 2] =
     [("sharp", MarkerShape::Dot, "delay"), ("relay", MarkerShape::Triangle, "hysteresis")];
 
-/// The growth of a kind, as (parameter, growth), under a rule, in the rows of which `is_meant` of the ratio and the parameter.
-fn growths(growth: &Table, rule: &str, kind: &str, is_meant: impl Fn(f64, f64) -> bool) -> Vec<(f64, f64)> {
+/// The growth of a kind, as (parameter, growth), under a rule, in the rows of which `is_meant` of
+/// the ratio and the parameter.
+fn growths(
+    growth: &Table,
+    rule: &str,
+    kind: &str,
+    is_meant: impl Fn(f64, f64) -> bool,
+) -> Vec<(f64, f64)> {
     let [parameter, ratio, values] = ["parameter", "ratio", kind].map(|c| growth.numbers(c));
     let chosen = rows(growth, "rule", rule).into_iter();
     let chosen = chosen.filter(|i| values[*i].is_finite() && is_meant(ratio[*i], parameter[*i]));
@@ -396,18 +469,28 @@ pub fn sharp_powers(growth: &Table, rule: &str) -> [(f64, f64); 3] {
     KINDS.map(|(kind, ..)| power(&growths(growth, rule, kind, |_, _| true)))
 }
 
-/// The same under the smooth delayed rule: for ratios in a range, and eps not above `most`. Every start and ratio has a level of its own.
-pub fn smooth_powers(growth: &Table, ratios: std::ops::RangeInclusive<f64>, most: f64) -> [(f64, f64); 3] {
+/// The same under the smooth delayed rule: for ratios in a range, and eps not above `most`. Every
+/// start and ratio has a level of its own.
+pub fn smooth_powers(
+    growth: &Table,
+    ratios: std::ops::RangeInclusive<f64>,
+    most: f64,
+) -> [(f64, f64); 3] {
     let (starts, all) = (growth.numbers("y0"), growth.numbers("ratio"));
     KINDS.map(|(kind, ..)| {
         let [parameter, values] = ["parameter", kind].map(|c| growth.numbers(c));
         let chosen = rows(growth, "rule", "smooth").into_iter();
-        let is_meant = |i: &usize| ratios.contains(&all[*i]) && parameter[*i] < 1.01 * most && values[*i].is_finite();
+        let is_meant = |i: &usize| {
+            ratios.contains(&all[*i]) && parameter[*i] < 1.01 * most && values[*i].is_finite()
+        };
         let mut chosen: Vec<usize> = chosen.filter(is_meant).collect();
-        chosen.sort_by(|i, k| (all[*i], starts[*i]).partial_cmp(&(all[*k], starts[*k])).unwrap_or(Ordering::Equal));
+        chosen.sort_by(|i, k| {
+            (all[*i], starts[*i]).partial_cmp(&(all[*k], starts[*k])).unwrap_or(Ordering::Equal)
+        });
         let mut points = Vec::new();
         for group in chosen.chunk_by(|i, k| all[*i] == all[*k] && starts[*i] == starts[*k]) {
-            let mean = |of: &[f64]| group.iter().map(|i| log10(of[*i])).sum::<f64>() / group.len() as f64;
+            let mean =
+                |of: &[f64]| group.iter().map(|i| log10(of[*i])).sum::<f64>() / group.len() as f64;
             let (x, y) = (mean(parameter), mean(values));
             points.extend(group.iter().map(|i| (log10(parameter[*i]) - x, log10(values[*i]) - y)));
         }
@@ -436,9 +519,15 @@ fn in_words(powers: [(f64, f64); 3], digits: usize) -> String {
 
 fn growth_panel(table: &Table) -> (PlanePanel, String) {
     let law = Predicted::of(-1.2, -1.4);
-    let mut panel = PlanePanel::new(Axis::log("*δ*, or half the band", 5e-7, 2e-2), Axis::log("growth", 1e-2, 1e12));
-    for ((kind, _, colour), power) in KINDS.into_iter().zip([law.across(), law.along(), law.carried()]) {
-        // Where smoothing's line lies says nothing here, how steep it is does: it begins at 10, or 1, at 10^-2 and ends at the panel's edge.
+    let mut panel = PlanePanel::new(
+        Axis::log("*δ*, or half the band", 5e-7, 2e-2),
+        Axis::log("growth", 1e-2, 1e12),
+    );
+    for ((kind, _, colour), power) in
+        KINDS.into_iter().zip([law.across(), law.along(), law.carried()])
+    {
+        // Where smoothing's line lies says nothing here, how steep it is does: it begins at 10, or
+        // 1, at 10^-2 and ends at the panel's edge.
         let log_at = |p: f64| power * (log10(p) + 2.0) + if power < 0.0 { 1.0 } else { 0.0 };
         let end = if power < 0.0 { exp10(-2.0 - 11.0 / -power) } else { 1e-6 };
         let ends = [1e-2, end].map(|p| [p, exp10(log_at(p))]);
@@ -454,8 +543,10 @@ fn growth_panel(table: &Table) -> (PlanePanel, String) {
         }
     }
     let said = format!(
-        "(d) Growth in a passage, geometric means of six starts, under the sharp delay and sharp hysteresis (*f*_{{+}} until *x* falls to −*b*, *f*_{{−}} until it rises to *b*). \
-         Powers of *δ*: {}. Powers of *b*: {}. Dashed: smoothing’s slopes in *ε*, −{:.1}, −{:.1} and +1/2.",
+        "(d) Growth in a passage, geometric means of six starts, under the sharp delay and sharp \
+            hysteresis (*f*_{{+}} until *x* falls to −*b*, *f*_{{−}} until it rises to *b*). \
+         Powers of *δ*: {}. Powers of *b*: {}. Dashed: smoothing’s slopes in *ε*, −{:.1}, −{:.1} \
+         and +1/2.",
         in_words(sharp_powers(table, "sharp"), 3),
         in_words(sharp_powers(table, "relay"), 3),
         -law.across(),
@@ -473,7 +564,8 @@ pub const LARGE: std::ops::RangeInclusive<f64> = 0.99..=1.01;
 
 fn smooth_panel(table: &Table) -> (PlanePanel, String) {
     let [parameter, ratio, along] = ["parameter", "ratio", "along"].map(|c| table.numbers(c));
-    let mut panel = PlanePanel::new(Axis::log("*δ*/√*ε*", 2e-2, 15.0), Axis::log("growth along", 0.3, 1e11));
+    let mut panel =
+        PlanePanel::new(Axis::log("*δ*/√*ε*", 2e-2, 15.0), Axis::log("growth along", 0.3, 1e11));
     for (eps, colour, shape) in SMOOTH {
         let chosen = rows(table, "rule", "smooth").into_iter();
         let chosen = chosen.filter(|i| is_near(parameter[*i], eps) && along[*i].is_finite());
@@ -483,7 +575,8 @@ fn smooth_panel(table: &Table) -> (PlanePanel, String) {
             .legend(LegendKey::Marker(look), format!("*ε* = 10^{{−{}}}", (-log10(eps)).round()));
     }
     let said = format!(
-        "Right: smooth delay, three starts. Powers of *ε* at *δ*/√*ε* ≤ 0.1, as far as f64 resolves: {}; at *δ* = √*ε*: {}. Between the two the chatter stops within the \
+        "Right: smooth delay, three starts. Powers of *ε* at *δ*/√*ε* ≤ 0.1, as far as f64 \
+            resolves: {}; at *δ* = √*ε*: {}. Between the two the chatter stops within the \
          two-fold’s neighbourhood.",
         in_words(smooth_powers(table, SMALL, SMALL_EPS), 2),
         in_words(smooth_powers(table, LARGE, 1e-2), 2),
@@ -497,10 +590,14 @@ pub fn figure() -> Figure {
         name: "delay".into(),
         reading: None,
         title: "A switch that acts late".into(),
-        caption: "(a) One passage of the two-fold under smoothing, hysteresis, sharp and smooth delay, and x during it. (b) Late sections y = 0 under the \
-                  hysteresis of fig. 9(i) and under a sharp delay of the same eps, in both readings. (c) Where the two-fold is left under the sharp delay by the phase \
-                  of the chatter, in delays, and the distribution over phases as the delay falls. (d) Growth of a disturbance in a passage under sharp delay and sharp \
-                  hysteresis beside smoothing's powers, and under smooth delay from one law to the other."
+        caption: "(a) One passage of the two-fold under smoothing, hysteresis, sharp and smooth \
+            delay, and x during it. (b) Late sections y = 0 under the \
+                  hysteresis of fig. 9(i) and under a sharp delay of the same eps, in both \
+                  readings. (c) Where the two-fold is left under the sharp delay by the phase \
+                  of the chatter, in delays, and the distribution over phases as the delay falls. \
+                  (d) Growth of a disturbance in a passage under sharp delay and sharp \
+                  hysteresis beside smoothing's powers, and under smooth delay from one law to the \
+                  other."
             .into(),
         view: View::Study(Study { questions, draw }),
         panels: Vec::new(),

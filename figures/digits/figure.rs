@@ -1,7 +1,8 @@
-//! The breakdown of determinism, in digits. Not a figure of the paper; it puts numbers on the paper's claim.
+//! The breakdown of determinism, in digits. Not a figure of the paper; it puts numbers on the
+//! paper's claim.
 //!
-//! Left: how many digits of each passage through y = 0 a method gets right. Right: what the first visit to the singularity makes
-//! of a small disturbance, as a function of the stiffness.
+//! Left: how many digits of each passage through y = 0 a method gets right. Right: what the first
+//! visit to the singularity makes of a small disturbance, as a function of the stiffness.
 
 use std::sync::Arc;
 
@@ -40,11 +41,13 @@ const TOP: f64 = 18.0;
 const OFFSETS: [f64; 3] = [-3.0, 0.0, 3.0];
 /// The exit is the first passage through y = 0 beyond so many sqrt(eps).
 const BEYOND: f64 = 3.0;
-/// Size of disturbances made at t = 0; they are contracted before they grow, so that it need not be tiny.
+/// Size of disturbances made at t = 0; they are contracted before they grow, so that it need not be
+/// tiny.
 const AT_START: f64 = 1e-3;
 /// The exit of the first visit must come before this time.
 const EXIT_BY: f64 = 80.0;
-/// Growth of a disturbance made across the layer at the singularity, reconstructed reading, measured by another program: (eps, factor).
+/// Growth of a disturbance made across the layer at the singularity, reconstructed reading,
+/// measured by another program: (eps, factor).
 const OUTSIDE: [(f64, f64); 3] = [(1e-2, 3.36e9), (1e-3, 7.67e12), (1e-4, 5.49e16)];
 
 /// Stiffness parameters of the right panel.
@@ -82,7 +85,14 @@ fn digits_question() -> DigitsQuestion {
 }
 
 fn growth_question() -> PassageQuestion {
-    PassageQuestion { start: START, beyond: BEYOND, offsets: OFFSETS.into(), carried: AT_START, far: 0.0, by: EXIT_BY }
+    PassageQuestion {
+        start: START,
+        beyond: BEYOND,
+        offsets: OFFSETS.into(),
+        carried: AT_START,
+        far: 0.0,
+        by: EXIT_BY,
+    }
 }
 
 /// What the figure asks: the digits first, then the growth for each eps.
@@ -114,7 +124,10 @@ fn series(growth: &[Vec<Entry>]) -> [Series; 3] {
     // A row: eps, moment (minus infinity is the start), growth by component.
     let pick = |at_start: bool, components: &[usize]| {
         let rows = growth.iter().filter(|r| value(&r[1]).is_infinite() == at_start);
-        rows.map(|r| [value(&r[0]), components.iter().map(|c| value(&r[2 + c])).fold(0.0, f64::max)]).collect()
+        rows.map(|r| {
+            [value(&r[0]), components.iter().map(|c| value(&r[2 + c])).fold(0.0, f64::max)]
+        })
+        .collect()
     };
     [
         Series {
@@ -151,29 +164,46 @@ impl Series {
         largest
     }
 
-    /// Digits of growth per decade of eps: the slope of log10 of the largest growth over -log10 eps, by least squares.
+    /// Digits of growth per decade of eps: the slope of log10 of the largest growth over -log10
+    /// eps, by least squares.
     fn digits_per_decade(&self) -> f64 {
-        let points: Vec<(f64, f64)> = self.largest().iter().map(|p| (-log10(p[0]), log10(p[1]))).collect();
+        let points: Vec<(f64, f64)> =
+            self.largest().iter().map(|p| (-log10(p[0]), log10(p[1]))).collect();
         line(&points).map_or(f64::NAN, |l| l.slope)
     }
 }
 
 fn draw(reading: Reading, answers: &[Arc<Answer>]) -> Sheet {
     let tables = Study::tables(answers);
-    let [rows, visits, passages @ ..] = &tables[..] else { unreachable!("the first question has two tables") };
-    let growth: Vec<Vec<Entry>> = passages.iter().filter(|t| t.name == "growth").flat_map(Table::rows).collect();
-    let mut digits = PlanePanel::new(Axis::linear("*t*", 0.0, T_END), Axis::linear("digits that are right", -2.0, TOP));
+    let [rows, visits, passages @ ..] = &tables[..] else {
+        unreachable!("the first question has two tables")
+    };
+    let growth: Vec<Vec<Entry>> =
+        passages.iter().filter(|t| t.name == "growth").flat_map(Table::rows).collect();
+    let mut digits = PlanePanel::new(
+        Axis::linear("*t*", 0.0, T_END),
+        Axis::linear("digits that are right", -2.0, TOP),
+    );
     for visit in visits.rows() {
         let t = value(&visit[0]);
-        digits = digits.line(vec![[t, -2.0], [t, TOP]], LineStyle::new(style::MAGENTA, style::CURVE_PT).dashed());
+        digits = digits.line(
+            vec![[t, -2.0], [t, TOP]],
+            LineStyle::new(style::MAGENTA, style::CURVE_PT).dashed(),
+        );
     }
     let mut lines = Vec::new();
     for (method, tolerance, colour, shape) in methods().into_iter().rev() {
-        let mine = |r: &&Vec<Entry>| r[0] == Entry::from(method.name()) && r[1] == Entry::from(tolerance);
-        let points: Vec<[f64; 2]> = rows.rows().iter().filter(mine).map(|r| [value(&r[3]), value(&r[5])]).collect();
-        let (line, marker) = (LineStyle::new(colour, style::FRAME_PT), MarkerStyle { shape, colour, size: 3.2 });
+        let mine =
+            |r: &&Vec<Entry>| r[0] == Entry::from(method.name()) && r[1] == Entry::from(tolerance);
+        let points: Vec<[f64; 2]> =
+            rows.rows().iter().filter(mine).map(|r| [value(&r[3]), value(&r[5])]).collect();
+        let (line, marker) =
+            (LineStyle::new(colour, style::FRAME_PT), MarkerStyle { shape, colour, size: 3.2 });
         digits = digits.line(points.clone(), line).markers(points, marker);
-        lines.push((LegendKey::LineMarker(line, marker), format!("{} {}", method.name(), number(tolerance))));
+        lines.push((
+            LegendKey::LineMarker(line, marker),
+            format!("{} {}", method.name(), number(tolerance)),
+        ));
     }
     for (key, words) in lines.into_iter().rev() {
         digits = digits.legend(key, words);
@@ -183,27 +213,36 @@ fn draw(reading: Reading, answers: &[Arc<Answer>]) -> Sheet {
         .legend_at(Corner::UpperRight);
 
     let series = series(&growth);
-    let outside: Vec<[f64; 2]> = outside(reading).iter().map(|&(eps, growth)| [eps, growth]).collect();
-    let mut amplified =
-        PlanePanel::new(Axis::log("*ε*", 6e-6, 1.6e-2), Axis::log("growth of a disturbance", 1e-4, 1e46));
+    let outside: Vec<[f64; 2]> =
+        outside(reading).iter().map(|&(eps, growth)| [eps, growth]).collect();
+    let mut amplified = PlanePanel::new(
+        Axis::log("*ε*", 6e-6, 1.6e-2),
+        Axis::log("growth of a disturbance", 1e-4, 1e46),
+    );
     for (level, words, at, anchor) in [
         (1.0, "neither grows nor shrinks", 6.6e-6, Anchor::Left),
         (1e8, "10^{−8} becomes 1", 6.6e-6, Anchor::Left),
         (1e16, "10^{−16} becomes 1", 1.45e-2, Anchor::Right),
     ] {
         amplified = amplified
-            .line(vec![[6e-6, level], [1.6e-2, level]], LineStyle::new(style::SOFT_INK, style::FRAME_PT).dotted())
+            .line(
+                vec![[6e-6, level], [1.6e-2, level]],
+                LineStyle::new(style::SOFT_INK, style::FRAME_PT).dotted(),
+            )
             .note([at, level * 5.0], words, anchor);
     }
     for s in &series {
         let style = MarkerStyle { shape: s.shape, colour: s.colour, size: 4.0 };
-        amplified =
-            amplified.line(s.largest(), LineStyle::new(s.colour, style::CURVE_PT)).markers(s.points.clone(), style);
+        amplified = amplified
+            .line(s.largest(), LineStyle::new(s.colour, style::CURVE_PT))
+            .markers(s.points.clone(), style);
         amplified = amplified.legend(LegendKey::Marker(style), s.words);
     }
     if !outside.is_empty() {
         let hollow = MarkerStyle { shape: MarkerShape::OpenDot, colour: style::INK, size: 5.0 };
-        amplified = amplified.markers(outside, hollow).legend(LegendKey::Marker(hollow), "measured elsewhere");
+        amplified = amplified
+            .markers(outside, hollow)
+            .legend(LegendKey::Marker(hollow), "measured elsewhere");
     }
     let amplified = amplified.legend_at(Corner::UpperRight);
     let sheet = Sheet::new(ColumnWidth::Wide, 1, "")
@@ -215,11 +254,14 @@ fn draw(reading: Reading, answers: &[Arc<Answer>]) -> Sheet {
 
 /// What the tables say, in words.
 fn footer(rows: &Table, visits: &Table, series: &[Series; 3]) -> Vec<String> {
-    let mut lines = vec![
-        "(a) −log_{10} of the largest difference in a coordinate between a method’s *n*th passage and that of an orbit in \
+    let mut lines =
+        vec![
+        "(a) −log_{10} of the largest difference in a coordinate between a method’s *n*th passage \
+            and that of an orbit in \
          double-double arithmetic (32 digits). "
             .to_owned()
-            + &format!("Visit: a passage within {} of the singularity. Steps up to {}.", number(NEAR), number(MAX_STEP)),
+            + &format!("Visit: a passage within {} of the singularity. Steps up to \
+                {}.", number(NEAR), number(MAX_STEP)),
     ];
     if let Some(first) = visits.rows().first().map(|r| value(&r[0])) {
         let around = methods().map(|(method, tolerance, _, _)| {
@@ -229,21 +271,28 @@ fn footer(rows: &Table, visits: &Table, series: &[Series; 3]) -> Vec<String> {
                 .filter(|r| r[0] == Entry::from(method.name()) && r[1] == Entry::from(tolerance))
                 .map(|r| (value(&r[3]), value(&r[5])))
                 .collect();
-            let before = mine.iter().filter(|r| r.0 < first).map(|r| r.1).fold(f64::INFINITY, f64::min);
+            let before =
+                mine.iter().filter(|r| r.0 < first).map(|r| r.1).fold(f64::INFINITY, f64::min);
             let after = mine.iter().find(|r| r.0 > first).map_or(f64::NAN, |r| r.1);
-            format!("{} {}: {before:.1} → {after:.1}", method.name(), number(tolerance)).replace('-', "−")
+            format!("{} {}: {before:.1} → {after:.1}", method.name(), number(tolerance))
+                .replace('-', "−")
         });
         lines.push(format!(
-            "Fewest digits before the first visit (*t* = {first:.2}), and digits at the next passage after it: {}.",
+            "Fewest digits before the first visit (*t* = {first:.2}), and digits at the next \
+                passage after it: {}.",
             around.join("; ")
         ));
     }
-    let slopes: Vec<String> =
-        series.iter().map(|s| format!("{:.2} ({})", s.digits_per_decade(), s.words).replace('-', "−")).collect();
+    let slopes: Vec<String> = series
+        .iter()
+        .map(|s| format!("{:.2} ({})", s.digits_per_decade(), s.words).replace('-', "−"))
+        .collect();
     let law = Predicted::of(-1.2, -1.4);
     lines.push(format!(
-        "(b) Distance at the exit over the size of the disturbance; the exit is the first passage beyond {}√*ε*. Made at it: {}√*ε* before, at \
-         and as much after the passage; the line joins the largest. Digits by which the growth rises for each decade that *ε* falls, least squares: {}; \
+        "(b) Distance at the exit over the size of the disturbance; the exit is the first passage \
+            beyond {}√*ε*. Made at it: {}√*ε* before, at \
+         and as much after the passage; the line joins the largest. Digits by which the growth \
+         rises for each decade that *ε* falls, least squares: {}; \
          in the limit {:.2}, {:.2} and −0.5, from *v*_{{+}} and *v*_{{−}} alone (figure law).",
         number(BEYOND),
         number(OFFSETS[2]),
@@ -259,11 +308,17 @@ pub fn figure() -> Figure {
     Figure::studied_in_both_readings(
         "digits",
         "The breakdown of determinism, in digits",
-        "(a) Digits of each passage through y = 0 that a method gets right, against time; dashed lines mark visits to the \
-                  singularity. (b) Growth of a small disturbance until the exit from the first visit, against ε, for disturbances made \
-                  near the singularity across and along the switching layer and for disturbances made at the start.",
+        "(a) Digits of each passage through y = 0 that a method gets right, against time; dashed \
+            lines mark visits to the \
+                  singularity. (b) Growth of a small disturbance until the exit from the first \
+                  visit, against ε, for disturbances made \
+                  near the singularity across and along the switching layer and for disturbances \
+                  made at the start.",
         [
-            Study { questions: || questions(Reading::Printed), draw: |answers| draw(Reading::Printed, answers) },
+            Study {
+                questions: || questions(Reading::Printed),
+                draw: |answers| draw(Reading::Printed, answers),
+            },
             Study {
                 questions: || questions(Reading::Reconstructed),
                 draw: |answers| draw(Reading::Reconstructed, answers),

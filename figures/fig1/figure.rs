@@ -20,9 +20,12 @@ pub fn figure() -> Figure {
             name: "fig1".into(),
             reading: None,
             title: "The wheel assembly".into(),
-            caption: "The wheel assembly (a) obliquely, (b) from above, to scale: a disc that turns at ω₀; a housing on it that turns at ω; in the housing \
-                      a line at distance d from the axle, on which a wheel rolls at an angle γ, held by a spring and a damper. The \
-                      slip h along the wheel's axle is the switching function. Our own reconstruction."
+            caption: "The wheel assembly (a) obliquely, (b) from above, to scale: a disc that \
+                turns at ω₀; a housing on it that turns at ω; in the housing \
+                      a line at distance d from the axle, on which a wheel rolls at an angle γ, \
+                      held by a spring and a damper. The \
+                      slip h along the wheel's axle is the switching function. Our own \
+                      reconstruction."
                 .into(),
             view: View::Study(Study {
                 questions: || {

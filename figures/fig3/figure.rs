@@ -21,8 +21,10 @@ pub fn figure() -> Figure {
             name: "fig3".into(),
             reading: None,
             title: "The two-fold singularity".into(),
-            caption: "The surface x = 0 of the normal form (4) about its two-fold. Orbits cross where both fields point to the same \
-                      side; where they oppose, orbits slide: into the singularity where sliding attracts, out of it where \
+            caption: "The surface x = 0 of the normal form (4) about its two-fold. Orbits cross \
+                where both fields point to the same \
+                      side; where they oppose, orbits slide: into the singularity where sliding \
+                      attracts, out of it where \
                       sliding repels."
                 .into(),
             view: View::Study(Study {

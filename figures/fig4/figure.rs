@@ -1,5 +1,5 @@
-//! Fig. 4: the mechanism of non-deterministic chaos, computed: a singularity with one way in, and its many ways out that come
-//! back.
+//! Fig. 4: the mechanism of non-deterministic chaos, computed: a singularity with one way in, and
+//! its many ways out that come back.
 
 use twofold::integrate::filippov::ExitRule;
 use twofold::integrate::{Schedule, StepCap, Tolerance};
@@ -13,11 +13,16 @@ pub fn figure() -> Figure {
         "One way in, many ways out, and back",
         View::Space { camera: Camera { axes: [1, 2, 0], azimuth: -60.0, elevation: 18.0 } },
         |_| {
-            "The orbit from (0.2, 0, −1) reaches the two-fold; from there its future is a set. Five exit times from the repelling \
-             region, each to both sides, followed until they come back to the two-fold; the foot says how many have within the time drawn. \
-             All these orbits pass through one point, so that a trajectory leads from any of their points to any other: thick, one from A to B. \
-             Below, the passage nearer. Orbits of the printed reading are larger and slower, so exits are \
-             spread up to 2 and orbits followed for 60 there, up to 0.8 and for 16 in the reconstructed one."
+            "The orbit from (0.2, 0, −1) reaches the two-fold; from there its future is a set. \
+                Five exit times from the repelling \
+             region, each to both sides, followed until they come back to the two-fold; the foot \
+             says how many have within the time drawn. \
+             All these orbits pass through one point, so that a trajectory leads from any of their \
+             points to any other: thick, one from A to B. \
+             Below, the passage nearer. Orbits of the printed reading are larger and slower, so \
+             exits are \
+             spread up to 2 and orbits followed for 60 there, up to 0.8 and for 16 in the \
+             reconstructed one."
                 .into()
         },
         |reading| {
@@ -32,7 +37,13 @@ pub fn figure() -> Figure {
                     system: reading.caricature().into(),
                     switch: SwitchSpec::Filippov {
                         exit: ExitRule::All,
-                        funnel: Some(FunnelSpec { shortest: 0.1, longest, times: 5, horizon, until_two_fold: true }),
+                        funnel: Some(FunnelSpec {
+                            shortest: 0.1,
+                            longest,
+                            times: 5,
+                            horizon,
+                            until_two_fold: true,
+                        }),
                     },
                     start: vec![0.2, 0.0, -1.0],
                     t_end: 100.0,

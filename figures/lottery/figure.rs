@@ -1,6 +1,8 @@
-//! The solver lottery: fig. 7 under three methods. Not a figure of the paper; the question that the paper raises.
+//! The solver lottery: fig. 7 under three methods. Not a figure of the paper; the question that the
+//! paper raises.
 //!
-//! Each column is one of fig. 7's panels, each row a method. Same equations, same start, same tolerance.
+//! Each column is one of fig. 7's panels, each row a method. Same equations, same start, same
+//! tolerance.
 
 use twofold::integrate::Schedule;
 use twofold::job::spec::*;
@@ -14,13 +16,17 @@ pub fn figure() -> Figure {
         "The solver lottery: fig. 7 under three methods",
         View::LateSection { horizontal: 0, vertical: 2 },
         |_| {
-            "Poincaré sections y = 0 of the smoothed system to t = 200000, one row per integration method, one column per \
-             restart interval (20, 40, 100), all at the same tolerance. The later half, as the paper shows it."
+            "Poincaré sections y = 0 of the smoothed system to t = 200000, one row per integration \
+                method, one column per \
+             restart interval (20, 40, 100), all at the same tolerance. The later half, as the \
+             paper shows it."
                 .into()
         },
         |reading| {
             let mut panels = Vec::new();
-            for (row, method) in ["a", "b", "c"].into_iter().zip([Method::Lsoda, Method::Dopri5, Method::Radau5]) {
+            for (row, method) in
+                ["a", "b", "c"].into_iter().zip([Method::Lsoda, Method::Dopri5, Method::Radau5])
+            {
                 for (column, interval, claim) in [
                     ("i", 20.0, SectionClaim::Periodic),
                     ("ii", 40.0, SectionClaim::Period(3)),
@@ -37,7 +43,8 @@ pub fn figure() -> Figure {
                     };
                     let label = format!("{row}-{column}");
                     let title = format!("{}, interval {interval}", method.name());
-                    panels.push(FigurePanel::new(&label, title, run).claimed(Claim::Section(claim)));
+                    panels
+                        .push(FigurePanel::new(&label, title, run).claimed(Claim::Section(claim)));
                 }
             }
             panels

@@ -1,4 +1,5 @@
-//! Error against work for ODEPACK's LSODA (frozen, figures/workprecision/odepack) and for this crate's methods (computed).
+//! Error against work for ODEPACK's LSODA (frozen, figures/workprecision/odepack) and for this
+//! crate's methods (computed).
 
 use serde::Deserialize;
 use twofold::analyse::work_precision::{WorkPrecisionQuestion, weighted_error, work_precision};
@@ -86,14 +87,16 @@ impl ReferenceProblem {
 
     /// The same for its uncertainty.
     pub fn uncertainty(&self) -> f64 {
-        let shifted: Vec<f64> = self.reference.iter().zip(&self.uncertainty).map(|(r, u)| r + u).collect();
+        let shifted: Vec<f64> =
+            self.reference.iter().zip(&self.uncertainty).map(|(r, u)| r + u).collect();
         self.error(&shifted)
     }
 }
 
 /// The frozen reference file.
 pub fn reference() -> Reference {
-    serde_json::from_str(include_str!("odepack/reference.json")).expect("reference.json is committed and has this form")
+    serde_json::from_str(include_str!("odepack/reference.json"))
+        .expect("reference.json is committed and has this form")
 }
 
 /// A point of the picture.
@@ -121,7 +124,8 @@ pub const MOST_STEPS: u64 = 200_000;
 /// Our methods.
 const METHODS: [Method; 3] = [Method::Lsoda, Method::Radau5, Method::Dopri5];
 
-/// Every row: ODEPACK's, then ours, problem by problem. A method that fails or takes too long has no row.
+/// Every row: ODEPACK's, then ours, problem by problem. A method that fails or takes too long has
+/// no row.
 pub fn rows() -> Vec<Row> {
     struct Collect {
         reference: Reference,
@@ -130,8 +134,11 @@ pub fn rows() -> Vec<Row> {
     impl Visit for Collect {
         fn visit<const N: usize>(&mut self, problem: &Problem<N>) {
             let Self { reference, rows } = self;
-            let known =
-                reference.problems.iter().find(|p| p.name == problem.name).expect("every problem has a reference");
+            let known = reference
+                .problems
+                .iter()
+                .find(|p| p.name == problem.name)
+                .expect("every problem has a reference");
             let mut row = |method, tolerance, error, evaluations, jacobians, steps| {
                 let problem = problem.name.to_owned();
                 rows.push(Row { problem, method, tolerance, error, evaluations, jacobians, steps });
@@ -140,10 +147,18 @@ pub fn rows() -> Vec<Row> {
                 let error = known.error(&run.x);
                 row("odepack-lsoda", run.rtol, error, run.evaluations, run.jacobians, run.steps);
             }
-            let ours = work_precision(&problem.field, &question(known)).expect("the reference is this problem's");
+            let ours = work_precision(&problem.field, &question(known))
+                .expect("the reference is this problem's");
             for run in ours {
                 let (Some(error), Some(s)) = (run.error, run.statistics) else { continue };
-                row(run.method.name(), run.tolerance.rtol, error, s.evaluations, s.jacobians, s.steps);
+                row(
+                    run.method.name(),
+                    run.tolerance.rtol,
+                    error,
+                    s.evaluations,
+                    s.jacobians,
+                    s.steps,
+                );
             }
         }
     }

@@ -1,5 +1,6 @@
-//! Error against work: ODEPACK's LSODA, as frozen in figures/workprecision/odepack, and this crate's methods. Not a figure of the paper; it
-//! says how far the methods behind the other figures can be trusted where the answer is known.
+//! Error against work: ODEPACK's LSODA, as frozen in figures/workprecision/odepack, and this
+//! crate's methods. Not a figure of the paper; it says how far the methods behind the other figures
+//! can be trusted where the answer is known.
 
 #[allow(dead_code)] // what the frozen file says beyond this picture is for tests/it/odepack.rs
 mod data;
@@ -18,7 +19,8 @@ use twofold::record::Hash;
 use twofold::render::sheet::*;
 use twofold::render::style;
 
-/// Panels: the problem's name in the tables, and its heading. Van der Pol's equation with mu = 1 is in the tables only.
+/// Panels: the problem's name in the tables, and its heading. Van der Pol's equation with mu = 1 is
+/// in the tables only.
 const PANELS: [(&str, &str); 9] = [
     ("lorenz", "Lorenz"),
     ("robertson", "Robertson"),
@@ -31,8 +33,8 @@ const PANELS: [(&str, &str); 9] = [
     ("hysteretic-reconstructed", "hysteretic, reconstructed"),
 ];
 
-/// Methods: the name in the tables, in the legend, and its look, from bottom to top. ODEPACK's wide rings lie under our small
-/// dots, so that both are seen where they coincide.
+/// Methods: the name in the tables, in the legend, and its look, from bottom to top. ODEPACK's wide
+/// rings lie under our small dots, so that both are seen where they coincide.
 const METHODS: [(&str, &str, MarkerShape, Colour, f64); 4] = [
     ("dopri5", "dopri5", MarkerShape::Square, style::GREEN, 3.6),
     ("radau5", "radau5", MarkerShape::Triangle, style::VERMILLION, 4.4),
@@ -54,7 +56,9 @@ fn compute() -> Result<Vec<Table>, JobError> {
     let columns = ["problem", "method", "rtol", "error", "evaluations", "jacobians", "steps"];
     let mut runs = Table::new(
         "runs",
-        columns.map(|c| if matches!(c, "problem" | "method") { Column::words(c) } else { Column::numbers(c) }),
+        columns.map(|c| {
+            if matches!(c, "problem" | "method") { Column::words(c) } else { Column::numbers(c) }
+        }),
     );
     for row in data::rows() {
         runs.push(vec![
@@ -67,7 +71,8 @@ fn compute() -> Result<Vec<Table>, JobError> {
             (row.steps as f64).into(),
         ]);
     }
-    let mut known = Table::new("references", [Column::words("problem"), Column::numbers("uncertainty")]);
+    let mut known =
+        Table::new("references", [Column::words("problem"), Column::numbers("uncertainty")]);
     for problem in data::reference().problems {
         known.push(vec![problem.name.as_str().into(), problem.uncertainty().into()]);
     }
@@ -99,11 +104,14 @@ fn draw(tables: &[Table]) -> Sheet {
         if let Some([_, Entry::Number(limit)]) =
             tables[1].rows().iter().find(|r| r[0] == Entry::from(*problem)).map(Vec::as_slice)
         {
-            chart = chart
-                .line(vec![[left, *limit], [right, *limit]], LineStyle::new(style::SOFT_INK, style::FRAME_PT).dotted());
+            chart = chart.line(
+                vec![[left, *limit], [right, *limit]],
+                LineStyle::new(style::SOFT_INK, style::FRAME_PT).dotted(),
+            );
         }
         for (method, _, shape, colour, size) in METHODS {
-            let points: Vec<[f64; 2]> = here.iter().filter(|r| r.1 == method).map(|r| [r.2[2], r.2[1]]).collect();
+            let points: Vec<[f64; 2]> =
+                here.iter().filter(|r| r.1 == method).map(|r| [r.2[2], r.2[1]]).collect();
             if method != "odepack-lsoda" {
                 chart = chart.line(points.clone(), LineStyle::new(colour, style::CURVE_PT));
             }
@@ -112,7 +120,10 @@ fn draw(tables: &[Table]) -> Sheet {
         sheet = sheet.panel("", *heading, chart);
     }
     for (_, words, shape, colour, size) in METHODS.into_iter().rev() {
-        sheet = sheet.legend(LegendEntry::new(LegendKey::Marker(MarkerStyle { shape, colour, size }), words));
+        sheet = sheet.legend(LegendEntry::new(
+            LegendKey::Marker(MarkerStyle { shape, colour, size }),
+            words,
+        ));
     }
     let limit = LineStyle::new(style::SOFT_INK, style::FRAME_PT).dotted();
     sheet = sheet.legend(LegendEntry::new(LegendKey::Line(limit), "uncertainty of the solution"));
@@ -123,7 +134,11 @@ fn draw(tables: &[Table]) -> Sheet {
 fn footer(runs: &[(&str, &str, [f64; 5])]) -> Vec<String> {
     let of = |method: &'static str| runs.iter().filter(move |r| r.1 == method);
     let pairs: Vec<_> = of("odepack-lsoda")
-        .filter_map(|theirs| of("lsoda").find(|o| o.0 == theirs.0 && o.2[0] == theirs.2[0]).map(|ours| (theirs, ours)))
+        .filter_map(|theirs| {
+            of("lsoda")
+                .find(|o| o.0 == theirs.0 && o.2[0] == theirs.2[0])
+                .map(|ours| (theirs, ours))
+        })
         .collect();
     let same = pairs.iter().filter(|(a, b)| a.2[2..] == b.2[2..]).count();
     let most = pairs.iter().map(|(a, b)| (b.2[2] / a.2[2] - 1.0).abs()).fold(0.0, f64::max);
@@ -135,12 +150,16 @@ fn footer(runs: &[(&str, &str, [f64; 5])]) -> Vec<String> {
         }
     }
     vec![
-        "Error: largest of |*x*_{i} − *r*_{i}|/(|*r*_{i}| + atol/rtol) at the end of the run, *r* a solution computed to the dotted \
-         uncertainty; nothing is resolved below it. Each marker is one tolerance. Evaluations of the Jacobian are not counted."
+        "Error: largest of |*x*_{i} − *r*_{i}|/(|*r*_{i}| + atol/rtol) at the end of the run, *r* \
+            a solution computed to the dotted \
+         uncertainty; nothing is resolved below it. Each marker is one tolerance. Evaluations of \
+         the Jacobian are not counted."
             .into(),
         format!(
-            "ODEPACK’s LSODA and ours take the same numbers of steps, evaluations and Jacobians in {same} of {} runs (with van der \
-             Pol at *μ* = 1, which is not drawn); in the others the evaluations differ by up to {:.1} %.",
+            "ODEPACK’s LSODA and ours take the same numbers of steps, evaluations and Jacobians in \
+                {same} of {} runs (with van der \
+             Pol at *μ* = 1, which is not drawn); in the others the evaluations differ by up to \
+             {:.1} %.",
             pairs.len(),
             100.0 * most,
         ),
@@ -169,10 +188,14 @@ pub fn figure() -> Figure {
             name: "workprecision".into(),
             reading: None,
             title: "Error against work, beside ODEPACK".into(),
-            caption: "Error at the end of the run against the number of evaluations of the right-hand side, for nine initial value \
-                      problems: ODEPACK’s LSODA (rings, from a file made once with the original Fortran), our LSODA (dots), Radau IIA \
-                      of order 5 (triangles) and Dormand-Prince 5(4) (squares). Logarithmic axes, one marker per tolerance. The four \
-                      problems named smoothed and hysteretic are the paper's equations, in both readings of its parameters, from its start to \
+            caption: "Error at the end of the run against the number of evaluations of the \
+                right-hand side, for nine initial value \
+                      problems: ODEPACK’s LSODA (rings, from a file made once with the original \
+                      Fortran), our LSODA (dots), Radau IIA \
+                      of order 5 (triangles) and Dormand-Prince 5(4) (squares). Logarithmic axes, \
+                      one marker per tolerance. The four \
+                      problems named smoothed and hysteretic are the paper's equations, in both \
+                      readings of its parameters, from its start to \
                       t = 10."
                 .into(),
             view: View::Study(Study { questions, draw: |answers| draw(&Study::tables(answers)) }),

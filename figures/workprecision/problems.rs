@@ -1,9 +1,11 @@
-//! The test problems of the work-precision picture and of tests/it/odepack.rs: the same equations, starts and ends as in
-//! scripts/odepack_reference.py.
+//! The test problems of the work-precision picture and of tests/it/odepack.rs: the same equations,
+//! starts and ends as in scripts/odepack_reference.py.
 
 use nalgebra::{SVector, vector};
 use twofold::num::Elementary;
-use twofold::system::{BoundField, Caricature, Field, Hysteretic, Relaxation, Smoothed, Transition, VectorField};
+use twofold::system::{
+    BoundField, Caricature, Field, Hysteretic, Relaxation, Smoothed, Transition, VectorField,
+};
 
 /// An initial value problem with a name.
 pub struct Problem<const N: usize> {
@@ -93,15 +95,22 @@ impl VectorField<3> for Lorenz {
 }
 
 /// alpha of the two readings of the caricature's parameters.
-const READINGS: [(&str, &str, f64); 2] =
-    [("smoothed-printed", "hysteretic-printed", 1e-3), ("smoothed-reconstructed", "hysteretic-reconstructed", 1e-1)];
+const READINGS: [(&str, &str, f64); 2] = [
+    ("smoothed-printed", "hysteretic-printed", 1e-3),
+    ("smoothed-reconstructed", "hysteretic-reconstructed", 1e-1),
+];
 
 /// The smoothed caricature, eq. (8), with beta = 1e-5 and eps = 1e-3.
 pub fn smoothed(alpha: f64) -> Smoothed<Caricature> {
-    Smoothed { system: Caricature::with_reinjection(alpha, 1e-5), transition: Transition::Tanh, eps: 1e-3 }
+    Smoothed {
+        system: Caricature::with_reinjection(alpha, 1e-5),
+        transition: Transition::Tanh,
+        eps: 1e-3,
+    }
 }
 
-/// The hysteretic caricature, eq. (10) read literally, with beta = 1e-5, eps = 1e-3 and eps' = 1e-2.
+/// The hysteretic caricature, eq. (10) read literally, with beta = 1e-5, eps = 1e-3 and eps' =
+/// 1e-2.
 pub fn hysteretic(alpha: f64) -> Hysteretic<Caricature> {
     Hysteretic {
         system: Caricature::with_reinjection(alpha, 1e-5),
@@ -112,10 +121,18 @@ pub fn hysteretic(alpha: f64) -> Hysteretic<Caricature> {
 }
 
 /// A problem whose equation exists as Rust.
-fn problem<const N: usize>(name: &'static str, field: &impl VectorField<N>, start: [f64; N]) -> Problem<N> {
+fn problem<const N: usize>(
+    name: &'static str,
+    field: &impl VectorField<N>,
+    start: [f64; N],
+) -> Problem<N> {
     const NAMES: [&str; 8] = ["a", "b", "c", "d", "e", "f", "g", "h"];
     let field = Field::record(std::array::from_fn(|i| NAMES[i]), field);
-    Problem { name, field: field.bind().expect("as many states as it was recorded with"), start: start.into() }
+    Problem {
+        name,
+        field: field.bind().expect("as many states as it was recorded with"),
+        start: start.into(),
+    }
 }
 
 /// Shows every problem to `visitor`.

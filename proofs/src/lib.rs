@@ -17,10 +17,15 @@ pub const BETA: f64 = 1e-5;
 /// eps of both readings.
 pub const EPS: f64 = 1e-3;
 
-/// The smoothed caricature (eqs. 5, 8 and 9 of the paper) with beta = 1e-5, eps = 1e-3, v+ = -1.2, v- = -1.4, all of them the decimal
-/// numbers that are written here.
+/// The smoothed caricature (eqs. 5, 8 and 9 of the paper) with beta = 1e-5, eps = 1e-3, v+ = -1.2,
+/// v- = -1.4, all of them the decimal numbers that are written here.
 pub fn equation(alpha: f64) -> Arc<Tape> {
-    Smoothed { system: Caricature::with_reinjection(alpha, BETA), transition: Transition::Tanh, eps: EPS }.tape()
+    Smoothed {
+        system: Caricature::with_reinjection(alpha, BETA),
+        transition: Transition::Tanh,
+        eps: EPS,
+    }
+    .tape()
 }
 
 /// A number's enclosure, for people: its common digits, and its width.
@@ -29,7 +34,8 @@ pub fn digits(x: Interval) -> String {
         return format!("{:?}", x.lower());
     }
     let (a, b) = (format!("{:.17}", x.lower()), format!("{:.17}", x.upper()));
-    let common: String = a.chars().zip(b.chars()).take_while(|(a, b)| a == b).map(|(a, _)| a).collect();
+    let common: String =
+        a.chars().zip(b.chars()).take_while(|(a, b)| a == b).map(|(a, _)| a).collect();
     format!("{common}... (width {:.1e})", x.width())
 }
 
@@ -38,7 +44,8 @@ pub fn bounds(x: Interval) -> Value {
     json!([x.lower(), x.upper()])
 }
 
-/// A ball in a certificate: it holds the real numbers within `radius` of `high` + `low`, all three exact.
+/// A ball in a certificate: it holds the real numbers within `radius` of `high` + `low`, all three
+/// exact.
 pub fn ball(x: Ball) -> Value {
     json!({ "high": x.midpoint().high(), "low": x.midpoint().low(), "radius": x.radius() })
 }
@@ -46,7 +53,8 @@ pub fn ball(x: Ball) -> Value {
 /// The equation in a certificate.
 pub fn parameters(alpha: f64) -> Value {
     json!({
-        "system": "caricature", "transition": "tanh", "alpha": alpha.to_string(), "beta": BETA.to_string(),
+        "system": "caricature", "transition": "tanh", "alpha": alpha.to_string(),
+            "beta": BETA.to_string(),
         "eps": EPS.to_string(), "v_plus": "-1.2", "v_minus": "-1.4",
     })
 }
@@ -61,9 +69,12 @@ pub fn cycle(c: &Cycle, alpha: f64) -> Value {
         .map(|(t, x, upward)| json!({ "time": bounds(*t), "point": row(*x), "upward": upward }))
         .collect();
     json!({
-        "equation": parameters(alpha), "candidate": row(c.candidate), "value_at_midpoint": row(c.value),
-        "derivative_on_candidate": square(c.slope), "preconditioner": c.preconditioner, "image": row(c.image),
-        "point": row(c.point), "derivative_at_point": square(c.derivative), "period": bounds(c.period),
+        "equation": parameters(alpha), "candidate": row(c.candidate),
+            "value_at_midpoint": row(c.value),
+        "derivative_on_candidate": square(c.slope), "preconditioner": c.preconditioner,
+            "image": row(c.image),
+        "point": row(c.point), "derivative_at_point": square(c.derivative),
+            "period": bounds(c.period),
         "trace": bounds(c.trace), "determinant": bounds(c.determinant), "crossings": crossings,
     })
 }
@@ -87,7 +98,8 @@ pub fn print_cycle(c: &Cycle) {
 /// Writes a certificate to proofs/certificates, or says why not and ends the program.
 pub fn write(name: &str, statement: &str, data: Value) {
     let certificate = json!({ "theorem": name, "statement": statement, "data": data });
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("certificates").join(format!("{name}.json"));
+    let path =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("certificates").join(format!("{name}.json"));
     let text = format!("{certificate:#}\n");
     if let Err(e) = fs::write(&path, text) {
         refuse(&format!("cannot write {}: {e}", path.display()));

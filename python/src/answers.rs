@@ -17,7 +17,9 @@ use twofold::job::question::question_hash;
 use twofold::job::spec::{RunSpec, SwitchSpec};
 use twofold::job::sweep::{Axis, Draws, Outcome, OutcomeQuestion, Rows, Shard, Sweep};
 use twofold::job::table::Cells;
-use twofold::job::{Answer, Classification, Executor, JobError, Question, Run, Stop, Table, encode};
+use twofold::job::{
+    Answer, Classification, Executor, JobError, Question, Run, Stop, Table, encode,
+};
 use twofold::record::Hash;
 
 use crate::errors;
@@ -25,7 +27,8 @@ use crate::supervise::{Work, supervise};
 
 /// A spec from its JSON.
 fn spec(text: &str) -> PyResult<RunSpec> {
-    let spec: RunSpec = serde_json::from_str(text).map_err(|e| errors::SpecError::new_err((e.to_string(), "spec")))?;
+    let spec: RunSpec = serde_json::from_str(text)
+        .map_err(|e| errors::SpecError::new_err((e.to_string(), "spec")))?;
     spec.validate().map_err(|e| errors::spec(&e))?;
     Ok(spec)
 }
@@ -40,7 +43,11 @@ fn answer_to(run: RunSpec, work: &Work) -> Result<Answer, JobError> {
 /// A run: its tables as arrays, and everything else as JSON.
 #[pyfunction]
 #[pyo3(signature = (text, show=None))]
-pub fn run<'py>(py: Python<'py>, text: &str, show: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyDict>> {
+pub fn run<'py>(
+    py: Python<'py>,
+    text: &str,
+    show: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyDict>> {
     let spec = spec(text)?;
     let question = question_hash(&Run(spec.clone()));
     let (answer, hash) = supervise(py, show, move |work| {
@@ -63,13 +70,18 @@ pub fn run<'py>(py: Python<'py>, text: &str, show: Option<&Bound<'py, PyAny>>) -
     Ok(result)
 }
 
-/// A table's columns by name. The vectors themselves change hands; words are their codes and a vocabulary.
+/// A table's columns by name. The vectors themselves change hands; words are their codes and a
+/// vocabulary.
 pub fn arrays(py: Python<'_>, table: Table) -> PyResult<Bound<'_, PyDict>> {
     let columns = PyDict::new(py);
     for column in table.columns {
         match column.cells {
-            Cells::Numbers(values) => columns.set_item(column.name, PyArray1::from_vec(py, values))?,
-            Cells::Integers(values) => columns.set_item(column.name, PyArray1::from_vec(py, values))?,
+            Cells::Numbers(values) => {
+                columns.set_item(column.name, PyArray1::from_vec(py, values))?
+            }
+            Cells::Integers(values) => {
+                columns.set_item(column.name, PyArray1::from_vec(py, values))?
+            }
             Cells::Words(words) => {
                 let vocabulary = PyList::new(py, words.vocabulary)?;
                 columns.set_item(column.name, (PyArray1::from_vec(py, words.codes), vocabulary))?;
@@ -80,7 +92,12 @@ pub fn arrays(py: Python<'_>, table: Table) -> PyResult<Bound<'_, PyDict>> {
 }
 
 /// An answer: facts as JSON, tables as arrays.
-pub fn handed<'py>(py: Python<'py>, hash: &str, facts: &Value, tables: Vec<Table>) -> PyResult<Bound<'py, PyDict>> {
+pub fn handed<'py>(
+    py: Python<'py>,
+    hash: &str,
+    facts: &Value,
+    tables: Vec<Table>,
+) -> PyResult<Bound<'py, PyDict>> {
     let result = PyDict::new(py);
     result.set_item("hash", hash)?;
     result.set_item("facts", facts.to_string())?;
@@ -145,7 +162,12 @@ impl Monitor for Counted<'_> {
 /// A run as the bytes that `twofold run` writes: `format` is "csv" or "json".
 #[pyfunction]
 #[pyo3(signature = (text, format, show=None))]
-pub fn written(py: Python<'_>, text: &str, format: &str, show: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<u8>> {
+pub fn written(
+    py: Python<'_>,
+    text: &str,
+    format: &str,
+    show: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Vec<u8>> {
     let spec = spec(text)?;
     let as_csv = match format {
         "csv" => true,
@@ -174,7 +196,8 @@ pub fn classify(py: Python<'_>, text: &str, show: Option<&Bound<'_, PyAny>>) -> 
     })
 }
 
-/// A sweep over axes: its rows as arrays, and as the bytes that `twofold sweep` writes. `random` is how often random axes are drawn, and their seed.
+/// A sweep over axes: its rows as arrays, and as the bytes that `twofold sweep` writes. `random` is
+/// how often random axes are drawn, and their seed.
 #[pyfunction]
 #[pyo3(signature = (text, over, random, threads, show=None))]
 pub fn sweep<'py>(
@@ -186,8 +209,10 @@ pub fn sweep<'py>(
     show: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<(Bound<'py, PyDict>, Vec<u8>)> {
     let wrong = |what: String| errors::SpecError::new_err((what, "over"));
-    let axes =
-        over.iter().map(|axis| axis.parse::<Axis>().map_err(|e| wrong(e.to_string()))).collect::<PyResult<_>>()?;
+    let axes = over
+        .iter()
+        .map(|axis| axis.parse::<Axis>().map_err(|e| wrong(e.to_string())))
+        .collect::<PyResult<_>>()?;
     let random = random.map(|(count, seed)| Draws { count, seed });
     let sweep = Sweep::new(spec(text)?, axes, random).map_err(|e| wrong(e.to_string()))?;
     let rows = supervise(py, show, move |work| {
@@ -214,10 +239,14 @@ pub fn fates(
 ) -> PyResult<Vec<String>> {
     let spec = spec(text)?;
     for start in &starts {
-        RunSpec { start: start.clone(), ..spec.clone() }.validate().map_err(|e| errors::spec(&e))?;
+        RunSpec { start: start.clone(), ..spec.clone() }
+            .validate()
+            .map_err(|e| errors::spec(&e))?;
     }
     supervise(py, show, move |work| {
-        side_by_side(starts, threads, work, |k, start| Ok(outcome(&spec, k, start, work)?.to_string()))
+        side_by_side(starts, threads, work, |k, start| {
+            Ok(outcome(&spec, k, start, work)?.to_string())
+        })
     })
 }
 

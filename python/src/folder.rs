@@ -37,11 +37,16 @@ pub fn paper(folder: &str) -> PyResult<String> {
     let claims: Vec<_> = folder
         .claims
         .iter()
-        .map(|c| json!({ "id": c.id, "place": c.place, "says": c.says, "decided": c.decided, "check": c.kind(), "note": c.note }))
+        .map(|c| {
+            json!({ "id": c.id, "place": c.place, "says": c.says, "decided": c.decided,
+            "check": c.kind(), "note": c.note })
+        })
         .collect();
     Ok(json!({
-        "title": about.title, "authors": about.authors, "year": about.year, "journal": about.journal, "doi": about.doi,
-        "arxiv": about.arxiv, "summary": about.summary, "open": about.open, "figures": figures, "claims": claims,
+        "title": about.title, "authors": about.authors, "year": about.year,
+            "journal": about.journal, "doi": about.doi,
+        "arxiv": about.arxiv, "summary": about.summary, "open": about.open, "figures": figures,
+            "claims": claims,
         "sources": folder.sources.keys().collect::<Vec<_>>(),
     })
     .to_string())

@@ -1,13 +1,16 @@
-//! The native half of the Python package `twofold`: systems, jobs and verdicts of the library, handed to Python.
+//! The native half of the Python package `twofold`: systems, jobs and verdicts of the library,
+//! handed to Python.
 //!
-//! Nothing is computed here. What a call means (defaults, names, shapes) is said in Python (`twofold/`), which hands a run over as the same
-//! JSON spec that `twofold run --spec` reads; so both ask the same question and get the same bytes. Numbers go back as the very
-//! vectors in which the job recorded them.
+//! Nothing is computed here. What a call means (defaults, names, shapes) is said in Python
+//! (`twofold/`), which hands a run over as the same JSON spec that `twofold run --spec` reads; so
+//! both ask the same question and get the same bytes. Numbers go back as the very vectors in which
+//! the job recorded them.
 
 mod answers;
 mod errors;
 mod folder;
-// The names of the platform's mathematics that dependencies ask for, defined as our own; python/build.rs binds them.
+// The names of the platform's mathematics that dependencies ask for, defined as our own;
+// python/build.rs binds them.
 #[cfg(target_os = "linux")]
 #[path = "../../src/bin/twofold/mathematics.rs"]
 mod mathematics;

@@ -1,4 +1,5 @@
-//! Work beside Python: on a thread of its own, with the GIL released, while this thread listens for Ctrl-C and shows progress.
+//! Work beside Python: on a thread of its own, with the GIL released, while this thread listens for
+//! Ctrl-C and shows progress.
 
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -16,9 +17,11 @@ use crate::errors;
 
 /// How often Ctrl-C is looked for and progress is shown.
 const TICK: Duration = Duration::from_millis(100);
-/// How long a computation may take to stop when it is asked to. One that takes longer is left to end by itself.
+/// How long a computation may take to stop when it is asked to. One that takes longer is left to
+/// end by itself.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// The same as the main thread's on most systems: the debug profile needs more than a thread has by itself.
+/// The same as the main thread's on most systems: the debug profile needs more than a thread has by
+/// itself.
 const STACK: usize = 8 << 20;
 
 /// What both sides of a computation see.
@@ -79,7 +82,8 @@ impl Progress for Work {
     }
 }
 
-/// Does `job` on a thread of its own. `show`, if given, is called with the share that is done and what is being computed.
+/// Does `job` on a thread of its own. `show`, if given, is called with the share that is done and
+/// what is being computed.
 ///
 /// Ctrl-C, or an error in `show`, asks the job to stop and is then raised.
 pub fn supervise<T: Send + 'static>(
@@ -104,7 +108,8 @@ pub fn supervise<T: Send + 'static>(
             Ok(answer) => return answer.map_err(|e| errors::job(&e)),
             Err(RecvTimeoutError::Disconnected) => {
                 return Err(errors::InternalError::new_err((
-                    "the computation broke down inside the library; this is a defect, please report it",
+                    "the computation broke down inside the library; this is a defect, please \
+                        report it",
                 )));
             }
             Err(RecvTimeoutError::Timeout) => {}

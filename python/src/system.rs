@@ -29,14 +29,17 @@ impl Definition {
     /// Reads TOML; `origin` names the text in errors.
     #[staticmethod]
     fn from_toml(text: &str, origin: &str) -> PyResult<Self> {
-        let definition = system::Definition::from_toml(text, origin).map_err(|e| errors::diagnostic(&e))?;
+        let definition =
+            system::Definition::from_toml(text, origin).map_err(|e| errors::diagnostic(&e))?;
         Ok(Self(system::System::new(definition)))
     }
 
     /// Reads JSON: a canonical form or a whole definition.
     #[staticmethod]
     fn from_json(text: &str, origin: &str) -> PyResult<Self> {
-        serde_json::from_str(text).map(Self).map_err(|e| errors::definition(format!("{origin}: {e}")))
+        serde_json::from_str(text)
+            .map(Self)
+            .map_err(|e| errors::definition(format!("{origin}: {e}")))
     }
 
     /// The built-in system of this name.
@@ -44,10 +47,16 @@ impl Definition {
     fn builtin(name: &str) -> PyResult<Self> {
         system::System::builtin(name).map(Self).ok_or_else(|| {
             let known: Vec<&str> = library::names().collect();
-            let help = nearest(name, &known).map_or(String::new(), |near| format!(", did you mean {near:?}?"));
+            let help = nearest(name, &known).map_or(String::new(), |near| {
+                format!(
+                    ", did you mean \
+                {near:?}?"
+                )
+            });
             let known = known.join(", ");
             errors::definition(format!(
-                "there is no built-in system {name:?}{help}; built in are {known}; a file's name ends in .toml or .json"
+                "there is no built-in system {name:?}{help}; built in are {known}; a file's name \
+                    ends in .toml or .json"
             ))
         })
     }
@@ -63,7 +72,11 @@ impl Definition {
             } else {
                 let number = value.extract::<f64>();
                 number
-                    .map_err(|_| PyTypeError::new_err(format!("{name}: give a number, or its digits as a string")))?
+                    .map_err(|_| {
+                        PyTypeError::new_err(format!(
+                            "{name}: give a number, or its digits as a string"
+                        ))
+                    })?
                     .into()
             };
             values.push((name.as_str(), value));
@@ -82,7 +95,11 @@ impl Definition {
     }
 
     /// h, f+ and f- at a point.
-    fn evaluate<'py>(&self, py: Python<'py>, x: PyReadonlyArray1<'py, f64>) -> PyResult<Fields<'py>> {
+    fn evaluate<'py>(
+        &self,
+        py: Python<'py>,
+        x: PyReadonlyArray1<'py, f64>,
+    ) -> PyResult<Fields<'py>> {
         let x = x.as_slice()?;
         let n = self.0.dimension();
         if x.len() != n {
@@ -131,7 +148,13 @@ impl Definition {
         let about = self.0.definition().parameters().iter().map(|p| &p.about);
         let values = self.0.parameters();
         let row = |((name, value), about): ((&str, &Decimal), &system::definition::About)| {
-            (name.to_owned(), value.value(), value.to_string(), about.meaning.clone(), about.unit.clone())
+            (
+                name.to_owned(),
+                value.value(),
+                value.to_string(),
+                about.meaning.clone(),
+                about.unit.clone(),
+            )
         };
         values.zip(about).map(row).collect()
     }

@@ -13,12 +13,19 @@ const KNOWN: [&str; 6] = ["csv", "json", "parquet", "png", "svg", "pdf"];
 
 const PICTURES: [&str; 3] = ["png", "svg", "pdf"];
 
-/// The format that a command writes to `out`: the one that is asked for, else the one that the file's name says, else the `usual` one.
+/// The format that a command writes to `out`: the one that is asked for, else the one that the
+/// file's name says, else the `usual` one.
 ///
 /// # Errors
 /// If the name says another one than what is asked for, or one that the command cannot write.
-pub fn format<F: ValueEnum + Clone>(out: Option<&Path>, asked: Option<F>, usual: F) -> Result<F, CliError> {
-    let word = |format: &F| format.to_possible_value().map_or(String::new(), |value| value.get_name().to_owned());
+pub fn format<F: ValueEnum + Clone>(
+    out: Option<&Path>,
+    asked: Option<F>,
+    usual: F,
+) -> Result<F, CliError> {
+    let word = |format: &F| {
+        format.to_possible_value().map_or(String::new(), |value| value.get_name().to_owned())
+    };
     let file = out.filter(|file| !is_standard_output(file));
     let ending = file.and_then(Path::extension).map(|e| e.to_string_lossy().to_ascii_lowercase());
     let Some((file, ending)) = file.zip(ending.filter(|e| KNOWN.contains(&e.as_str()))) else {
@@ -29,14 +36,18 @@ pub fn format<F: ValueEnum + Clone>(out: Option<&Path>, asked: Option<F>, usual:
         (Some(named), None) => Ok(named.clone()),
         (Some(named), Some(asked)) if word(named) == word(&asked) => Ok(asked),
         (_, Some(asked)) => refuse(format!(
-            "the name says {ending}, but {} is asked for; leave one of the two out, or make them agree",
+            "the name says {ending}, but {} is asked for; leave one of the two out, or make them \
+                agree",
             word(&asked)
         )),
         (None, None) => {
             let written: Vec<String> = F::value_variants().iter().map(word).collect();
             let drawn = "; `twofold plot` draws a run, `twofold scan --plot` a scan";
             let drawn = if PICTURES.contains(&ending.as_str()) { drawn } else { "" };
-            refuse(format!("the name says {ending}, but what is written is {}{drawn}", written.join(" or ")))
+            refuse(format!(
+                "the name says {ending}, but what is written is {}{drawn}",
+                written.join(" or ")
+            ))
         }
     }
 }
@@ -71,7 +82,10 @@ mod tests {
     #[test]
     fn what_a_name_promises_is_kept_or_refused() {
         let why = of("a.csv", Some(Format::Json)).unwrap_err();
-        assert!(why.contains("a.csv") && why.contains("says csv") && why.contains("json is asked for"), "{why}");
+        assert!(
+            why.contains("a.csv") && why.contains("says csv") && why.contains("json is asked for"),
+            "{why}"
+        );
         let why = of("a.parquet", None).unwrap_err();
         assert!(why.contains("text or csv or json") && !why.contains("plot"), "{why}");
         let why = of("a.png", None).unwrap_err();

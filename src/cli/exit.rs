@@ -18,7 +18,8 @@ pub enum Exit {
     Fine = 0,
     /// A check failed: something differs, is missing, or was not made by twofold.
     CheckFailed = 1,
-    /// Bad usage or input: a flag, number or file that cannot be used, or a file that cannot be read or written.
+    /// Bad usage or input: a flag, number or file that cannot be used, or a file that cannot be
+    /// read or written.
     Usage = 2,
     /// The computation or the drawing failed, though what was asked for can be asked.
     Failed = 3,
@@ -30,8 +31,10 @@ pub enum Exit {
 
 impl Exit {
     /// All of them, as `--help` says it.
-    pub const HELP: &str = "Exit codes: 0 fine; 1 a check failed; 2 bad usage, bad input, or a file that cannot be read or written; \
-                            3 a computation failed; 130 interrupted (Ctrl-C); 143 terminated (SIGTERM).";
+    pub const HELP: &str = "Exit codes: 0 fine; 1 a check failed; 2 bad usage, bad input, or a \
+        file that cannot be read or written; \
+                            3 a computation failed; 130 interrupted (Ctrl-C); 143 terminated \
+                            (SIGTERM).";
 }
 
 impl From<Exit> for ExitCode {
@@ -112,7 +115,9 @@ impl CliError {
     pub fn exit(&self) -> Exit {
         let of_job = |e: &JobError| if e.is_bad_question() { Exit::Usage } else { Exit::Failed };
         match self {
-            CliError::Job(source) | CliError::Pipeline(PipelineError::Job { source, .. }) => of_job(source),
+            CliError::Job(source) | CliError::Pipeline(PipelineError::Job { source, .. }) => {
+                of_job(source)
+            }
             CliError::Pipeline(PipelineError::Render { .. }) => Exit::Failed,
             CliError::Stopped { exit, .. } => *exit,
             CliError::Differs(_) => Exit::CheckFailed,
@@ -148,7 +153,9 @@ fn advice(error: &FileError) -> &'static str {
         io::ErrorKind::NotADirectory | io::ErrorKind::AlreadyExists => {
             "; a part of this path is a file, choose another place with --out"
         }
-        _ if error.action.starts_with("find") => "; something else removed or changed it meanwhile: run this again",
+        _ if error.action.starts_with("find") => {
+            "; something else removed or changed it meanwhile: run this again"
+        }
         _ => "; choose another place with --out",
     }
 }
@@ -160,11 +167,15 @@ pub fn part_of(file: &std::path::Path) -> PathBuf {
     name.into()
 }
 
-/// Says that beside a finished file lies what an earlier run left that did not finish. It may be all that there is of that run, and is kept.
+/// Says that beside a finished file lies what an earlier run left that did not finish. It may be
+/// all that there is of that run, and is kept.
 pub fn say_older_part(file: &std::path::Path) {
     let part = part_of(file);
     if part.exists() {
-        super::speak::complain(&format!("{} is of an earlier run that did not finish", part.display()));
+        super::speak::complain(&format!(
+            "{} is of an earlier run that did not finish",
+            part.display()
+        ));
     }
 }
 
@@ -178,7 +189,10 @@ mod tests {
             CliError::from(FileError { action, path: "x".into(), source: kind.into() }).to_string()
         };
         assert!(error("write", io::ErrorKind::StorageFull).contains("free some space"));
-        assert!(error("write", io::ErrorKind::NotADirectory).contains("is a file, choose another place with --out"));
+        assert!(
+            error("write", io::ErrorKind::NotADirectory)
+                .contains("is a file, choose another place with --out")
+        );
         assert!(!error("read", io::ErrorKind::PermissionDenied).contains("--out"));
         assert!(error("find again", io::ErrorKind::NotFound).contains("run this again"));
     }

@@ -14,7 +14,9 @@ use super::{CliError, Exit, LONG_VERSION, in_pool, interrupt};
 use crate::integrate::filippov::ExitRule;
 use crate::job::spec::{RunSpec, SwitchSpec};
 use crate::job::{Executor, Store};
-use crate::paper::pipeline::{Computed, PictureRecord, PipelineError, compute_with_tables, questions};
+use crate::paper::pipeline::{
+    Computed, PictureRecord, PipelineError, compute_with_tables, questions,
+};
 use crate::paper::reuse::{ReusablePicture, ReusablePictures};
 use crate::paper::{Alterations, Figure, FigurePanel, Picture, View, figures};
 use crate::record::files::{read, still_there, try_folder};
@@ -56,8 +58,9 @@ pub struct FigureFlags {
     /// The later half of sections alone, as the paper shows them; the picture is marked.
     #[arg(long)]
     late: bool,
-    /// Compute the rows that are committed beside the figure anew, and stop if one comes out otherwise (census, audit, basin: hours; what
-    /// is finished is kept in --out, and the same command goes on with it).
+    /// Compute the rows that are committed beside the figure anew, and stop if one comes out
+    /// otherwise (census, audit, basin: hours; what is finished is kept in --out, and the same
+    /// command goes on with it).
     #[arg(long)]
     recompute: bool,
     #[command(flatten)]
@@ -68,8 +71,10 @@ pub struct FigureFlags {
     /// No progress on standard error.
     #[arg(long)]
     quiet: bool,
-    /// Print the runs' specs as JSON and compute nothing; a single one can be given to `twofold run --spec`.
-    #[arg(long, conflicts_with_all = ["out", "threads", "json", "store", "fresh", "recompute", "late"])]
+    /// Print the runs' specs as JSON and compute nothing; a single one can be given to `twofold run
+    /// --spec`.
+    #[arg(long, conflicts_with_all = ["out", "threads", "json", "store", "fresh", "recompute",
+        "late"])]
     print_spec: bool,
 }
 
@@ -96,7 +101,8 @@ fn command(figure: &Figure) -> clap::Command {
     // Clap keeps names for as long as the program runs, and a program has one figure.
     let id: &'static str = Box::leak(figure.id.to_string().into_boxed_str());
     let caption = figure.pictures.first().map_or("", |p| p.caption.as_str());
-    let about = format!("{id}: {}. Written as PNG, SVG and PDF, with its numbers as CSV.", figure.title);
+    let about =
+        format!("{id}: {}. Written as PNG, SVG and PDF, with its numbers as CSV.", figure.title);
     let mut examples = format!("Examples:\n  {id} --out pictures\n  {id} --json --quiet");
     if figure.pictures.iter().any(|p| p.reading.is_some()) {
         examples += &format!("\n  {id} --reading printed");
@@ -106,7 +112,8 @@ fn command(figure: &Figure) -> clap::Command {
         let only = if several { format!(" --only {}", panel.label) } else { String::new() };
         let reading = if figure.pictures.len() > 1 { " --reading printed" } else { "" };
         examples += &format!(
-            "\n  {id} --t-end 100\n  {id}{only}{reading} --print-spec > spec.json && twofold run --spec spec.json"
+            "\n  {id} --t-end 100\n  {id}{only}{reading} --print-spec > spec.json && twofold run \
+                --spec spec.json"
         );
     }
     Arguments::command()
@@ -120,10 +127,11 @@ fn command(figure: &Figure) -> clap::Command {
 /// Runs a figure binary: parses the command line, computes, writes.
 pub fn main(figure: Figure) -> ExitCode {
     interrupt::listen();
-    let arguments = match command(&figure).try_get_matches().and_then(|m| Arguments::from_arg_matches(&m)) {
-        Ok(arguments) => arguments,
-        Err(error) => return super::commands::usage(&error).into(),
-    };
+    let arguments =
+        match command(&figure).try_get_matches().and_then(|m| Arguments::from_arg_matches(&m)) {
+            Ok(arguments) => arguments,
+            Err(error) => return super::commands::usage(&error).into(),
+        };
     match run(vec![figure], &arguments.flags) {
         Ok(()) => Exit::Fine.into(),
         Err(error) => {
@@ -140,7 +148,8 @@ pub fn main(figure: Figure) -> ExitCode {
 /// See [`CliError`].
 pub fn run(figures: Vec<Figure>, arguments: &FigureFlags) -> Result<(), CliError> {
     refuse_idle(&figures, arguments)?;
-    let figures = figures.into_iter().map(|f| select(f, arguments)).collect::<Result<Vec<_>, _>>()?;
+    let figures =
+        figures.into_iter().map(|f| select(f, arguments)).collect::<Result<Vec<_>, _>>()?;
     if arguments.print_spec {
         return print_specs(&figures);
     }
@@ -150,11 +159,17 @@ pub fn run(figures: Vec<Figure>, arguments: &FigureFlags) -> Result<(), CliError
     let progress = Progress::new(arguments.quiet);
     if arguments.recompute {
         for figure in &figures {
-            recompute(figures::data(&figure.id), &arguments.out.join(&*figure.id), arguments.threads, &progress)?;
+            recompute(
+                figures::data(&figure.id),
+                &arguments.out.join(&*figure.id),
+                arguments.threads,
+                &progress,
+            )?;
         }
     }
     let executor = Executor::new(arguments.store.store(), &progress);
-    let made = in_pool(arguments.threads, || make_what_is_missing(&figures, &arguments.out, &executor))??;
+    let made =
+        in_pool(arguments.threads, || make_what_is_missing(&figures, &arguments.out, &executor))??;
     say_how(&figures, &made, arguments, &progress)?;
     if arguments.json {
         print_json(&made.into_iter().map(|m| m.record).collect::<Vec<_>>())?;
@@ -169,9 +184,13 @@ pub fn run(figures: Vec<Figure>, arguments: &FigureFlags) -> Result<(), CliError
 ///
 /// # Errors
 ///
-/// If a computation or a drawing failed, a file could not be written, or what was written has been removed by the time that all is done;
-/// what could be made is there all the same.
-pub fn make(figures: &[Figure], out: &Path, executor: &Executor<'_>) -> Result<Vec<PictureRecord>, CliError> {
+/// If a computation or a drawing failed, a file could not be written, or what was written has been
+/// removed by the time that all is done; what could be made is there all the same.
+pub fn make(
+    figures: &[Figure],
+    out: &Path,
+    executor: &Executor<'_>,
+) -> Result<Vec<PictureRecord>, CliError> {
     Ok(make_what_is_missing(figures, out, executor)?.into_iter().map(|made| made.record).collect())
 }
 
@@ -183,12 +202,19 @@ struct Made {
     anew: bool,
 }
 
-fn make_what_is_missing(figures: &[Figure], out: &Path, executor: &Executor<'_>) -> Result<Vec<Made>, CliError> {
+fn make_what_is_missing(
+    figures: &[Figure],
+    out: &Path,
+    executor: &Executor<'_>,
+) -> Result<Vec<Made>, CliError> {
     let pictures: Vec<(PathBuf, &Picture)> =
         figures.iter().flat_map(|f| f.pictures.iter().map(|p| (out.join(&*f.id), p))).collect();
     let reusable = executor.store().and_then(ReusablePictures::of);
-    let found = |(folder, picture): &(PathBuf, &Picture)| reusable.as_ref().and_then(|s| s.find(picture, folder));
-    let found_there: Vec<Option<ReusablePicture>> = pictures.par_iter().with_max_len(1).map(found).collect();
+    let found = |(folder, picture): &(PathBuf, &Picture)| {
+        reusable.as_ref().and_then(|s| s.find(picture, folder))
+    };
+    let found_there: Vec<Option<ReusablePicture>> =
+        pictures.par_iter().with_max_len(1).map(found).collect();
     let missing = pictures.iter().zip(&found_there).filter(|(_, found)| found.is_none());
     executor.gather(&questions(missing.map(|((_, picture), _)| *picture)));
     // One by one: in larger portions a thread would be left with several while others have none.
@@ -207,40 +233,58 @@ fn make_what_is_missing(figures: &[Figure], out: &Path, executor: &Executor<'_>)
                 written.push(put(folder, file, bytes)?);
                 Ok(())
             };
-            let computed = compute_with_tables(picture, executor, &mut keep).map_err(|error| match error {
-                PipelineError::Table(file) => CliError::from(file),
-                other => other.into(),
-            })?;
+            let computed =
+                compute_with_tables(picture, executor, &mut keep).map_err(|error| match error {
+                    PipelineError::Table(file) => CliError::from(file),
+                    other => other.into(),
+                })?;
             write_picture(folder, &computed, &mut written)?;
             executor.forget();
             executor.progress().line(&format!("wrote {}", png.display()));
-            if let Some(Err(error)) = reusable.as_ref().map(|s| s.remember(picture, &computed.record)) {
+            if let Some(Err(error)) =
+                reusable.as_ref().map(|s| s.remember(picture, &computed.record))
+            {
                 // The picture is there; only the next run will have to draw it again.
                 executor.progress().line(&format!("not kept for the next run: {error}"));
             }
             Ok((Made { record: computed.record, anew: true }, written))
         })
         .collect();
-    let (made, written): (Vec<_>, Vec<_>) = results.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
+    let (made, written): (Vec<_>, Vec<_>) =
+        results.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
     still_there(&written.concat())?;
     Ok(made)
 }
 
-/// Writes down by which build, with how many threads and in what time the figures were made: for the report. No picture depends on it. Of figures that stood
-/// there already, what was written down when they were made still holds.
-fn say_how(figures: &[Figure], made: &[Made], arguments: &FigureFlags, progress: &Progress) -> Result<(), CliError> {
+/// Writes down by which build, with how many threads and in what time the figures were made: for
+/// the report. No picture depends on it. Of figures that stood there already, what was written down
+/// when they were made still holds.
+fn say_how(
+    figures: &[Figure],
+    made: &[Made],
+    arguments: &FigureFlags,
+    progress: &Progress,
+) -> Result<(), CliError> {
     let anew = |name: &str| made.iter().any(|m| m.anew && m.record.hashes.name == name);
-    let figures: Vec<String> =
-        figures.iter().filter(|f| f.pictures.iter().any(|p| anew(&p.name))).map(|f| f.id.to_string()).collect();
+    let figures: Vec<String> = figures
+        .iter()
+        .filter(|f| f.pictures.iter().any(|p| anew(&p.name)))
+        .map(|f| f.id.to_string())
+        .collect();
     if figures.is_empty() {
         return Ok(());
     }
     let path = arguments.out.join(names::MAKING);
     // What cannot be read is not worth keeping.
-    let before: Makings = read(&path).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok()).unwrap_or_default();
+    let before: Makings =
+        read(&path).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok()).unwrap_or_default();
     let threads = in_pool(arguments.threads, rayon::current_num_threads)?;
     let rounded = |seconds: f64| (1e3 * seconds).round() / 1e3;
-    let computed = progress.computed().into_iter().map(|(what, s)| Timed { what, seconds: rounded(s) }).collect();
+    let computed = progress
+        .computed()
+        .into_iter()
+        .map(|(what, s)| Timed { what, seconds: rounded(s) })
+        .collect();
     let making = Making {
         figures,
         program: concat!("twofold ", env!("CARGO_PKG_VERSION")).into(),
@@ -268,8 +312,13 @@ fn put(folder: &Path, file: &str, bytes: &[u8]) -> Result<Written, FileError> {
     Ok((path, bytes.len() as u64))
 }
 
-/// Writes a picture's files, its tables being there: the record last, so that a record vouches for everything beside it.
-fn write_picture(folder: &Path, computed: &Computed, written: &mut Vec<Written>) -> Result<(), FileError> {
+/// Writes a picture's files, its tables being there: the record last, so that a record vouches for
+/// everything beside it.
+fn write_picture(
+    folder: &Path,
+    computed: &Computed,
+    written: &mut Vec<Written>,
+) -> Result<(), FileError> {
     let name = &computed.record.hashes.name;
     let json = computed.record.to_json();
     let files = [
@@ -298,27 +347,44 @@ fn refuse_idle(figures: &[Figure], arguments: &FigureFlags) -> Result<(), CliErr
     if let Some((flag, _)) = of_runs.into_iter().find(|(_, given)| *given)
         && pictures().all(|p| p.panels.is_empty())
     {
-        return Err(CliError::no_effect(flag, format!("{names}: not made of single runs; leave it out")));
+        return Err(CliError::no_effect(
+            flag,
+            format!("{names}: not made of single runs; leave it out"),
+        ));
     }
     if let Some(only) = &arguments.only
-        && pictures().all(|p| p.panels.len() < 2 && p.panels.iter().all(|panel| panel.label == label(only)))
+        && pictures()
+            .all(|p| p.panels.len() < 2 && p.panels.iter().all(|panel| panel.label == label(only)))
     {
-        return Err(CliError::no_effect("--only", format!("{names}: there is no other panel; leave it out")));
+        return Err(CliError::no_effect(
+            "--only",
+            format!("{names}: there is no other panel; leave it out"),
+        ));
     }
     if arguments.recompute && figures.iter().all(|f| figures::data(&f.id).is_empty()) {
         let why = format!(
-            "{names}: no rows are committed beside it, everything is computed anyway (--fresh takes nothing from the store)"
+            "{names}: no rows are committed beside it, everything is computed anyway (--fresh \
+                takes nothing from the store)"
         );
         return Err(CliError::no_effect("--recompute", why));
     }
     if arguments.late && !pictures().any(|p| matches!(p.view, View::Section { .. })) {
-        return Err(CliError::no_effect("--late", format!("{names}: there is no section to halve; leave it out")));
+        return Err(CliError::no_effect(
+            "--late",
+            format!("{names}: there is no section to halve; leave it out"),
+        ));
     }
     if arguments.reading.is_some() && pictures().all(|p| p.reading.is_none()) {
-        return Err(CliError::no_effect("--reading", format!("{names}: the same in every reading; leave it out")));
+        return Err(CliError::no_effect(
+            "--reading",
+            format!("{names}: the same in every reading; leave it out"),
+        ));
     }
-    let wanted = |panel: &&FigurePanel| arguments.only.as_deref().is_none_or(|only| panel.label == label(only));
-    if arguments.seed.is_some() && !pictures().flat_map(|p| &p.panels).filter(wanted).any(|panel| is_random(&panel.run))
+    let wanted = |panel: &&FigurePanel| {
+        arguments.only.as_deref().is_none_or(|only| panel.label == label(only))
+    };
+    if arguments.seed.is_some()
+        && !pictures().flat_map(|p| &p.panels).filter(wanted).any(|panel| is_random(&panel.run))
     {
         return Err(CliError::no_effect(
             "--seed",
@@ -337,12 +403,21 @@ fn label(only: &str) -> &str {
 fn select(mut figure: Figure, arguments: &FigureFlags) -> Result<Figure, CliError> {
     if let Some(only) = &arguments.only {
         let label = label(only);
-        let mut known: Vec<String> = figure.pictures.iter().flat_map(|p| &p.panels).map(|p| p.label.clone()).collect();
+        let mut known: Vec<String> =
+            figure.pictures.iter().flat_map(|p| &p.panels).map(|p| p.label.clone()).collect();
         if !known.iter().any(|k| k == label) {
             known.sort_by_key(|k| (k.len(), k.clone()));
             known.dedup();
-            let known = if known.is_empty() { "none: it is not made of panels".into() } else { known.join(", ") };
-            return Err(CliError::NoSuchPanel { panel: only.clone(), figure: figure.id.to_string(), known });
+            let known = if known.is_empty() {
+                "none: it is not made of panels".into()
+            } else {
+                known.join(", ")
+            };
+            return Err(CliError::NoSuchPanel {
+                panel: only.clone(),
+                figure: figure.id.to_string(),
+                known,
+            });
         }
         figure.pictures.retain(|p| p.panels.iter().any(|q| q.label == label));
         figure.pictures.iter_mut().for_each(|p| p.keep_only(label));
@@ -365,7 +440,8 @@ fn select(mut figure: Figure, arguments: &FigureFlags) -> Result<Figure, CliErro
 }
 
 fn is_random(run: &RunSpec) -> bool {
-    run.schedule.kick.is_some() || matches!(run.switch, SwitchSpec::Filippov { exit: ExitRule::Random { .. }, .. })
+    run.schedule.kick.is_some()
+        || matches!(run.switch, SwitchSpec::Filippov { exit: ExitRule::Random { .. }, .. })
 }
 
 /// One spec alone, or several under their names.
@@ -374,7 +450,10 @@ fn print_specs(figures: &[Figure]) -> Result<(), CliError> {
         .iter()
         .flat_map(|figure| &figure.pictures)
         .flat_map(|picture| {
-            picture.panels.iter().map(move |panel| (format!("{}-{}", picture.name, panel.label), &panel.run))
+            picture
+                .panels
+                .iter()
+                .map(move |panel| (format!("{}-{}", picture.name, panel.label), &panel.run))
         })
         .collect();
     match specs.as_slice() {
@@ -382,7 +461,9 @@ fn print_specs(figures: &[Figure]) -> Result<(), CliError> {
         several => print_json(
             &several
                 .iter()
-                .map(|(name, run)| (name.clone(), serde_json::to_value(run).expect("specs are plain data")))
+                .map(|(name, run)| {
+                    (name.clone(), serde_json::to_value(run).expect("specs are plain data"))
+                })
                 .collect::<serde_json::Map<_, _>>(),
         ),
     }
@@ -398,12 +479,17 @@ mod tests {
         for figure in figures::all() {
             let mut command = command(&figure);
             command.clone().debug_assert();
-            let (short, long) = (command.render_help().to_string(), command.render_long_help().to_string());
+            let (short, long) =
+                (command.render_help().to_string(), command.render_long_help().to_string());
             let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
             for text in [&short, &long] {
-                assert!(words(text).contains(&format!("{}: {}", figure.id, figure.title)), "{text}");
                 assert!(
-                    text.contains(&format!("{} --out pictures", figure.id)) && words(text).contains(Exit::HELP),
+                    words(text).contains(&format!("{}: {}", figure.id, figure.title)),
+                    "{text}"
+                );
+                assert!(
+                    text.contains(&format!("{} --out pictures", figure.id))
+                        && words(text).contains(Exit::HELP),
                     "{text}"
                 );
             }

@@ -1,7 +1,7 @@
 //! The flags that describe a run, and the table of which of them has an effect when.
 //!
-//! No flag is ever ignored silently: `EFFECTS` names for every flag the runs on which it has an effect, and on others it is refused. A
-//! test tries every flag on every kind of run.
+//! No flag is ever ignored silently: `EFFECTS` names for every flag the runs on which it has an
+//! effect, and on others it is refused. A test tries every flag on every kind of run.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -24,8 +24,8 @@ use crate::system::{self, Definition, ParameterError, System};
 /// The flags that describe a run. What is not given has the default that its help names.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct RunFlags {
-    /// Piecewise-smooth system: a built-in one (caricature, wheel, two-fold, chua ...; `twofold new --list` names all) or a file that
-    /// defines one (.toml, .json) [default: caricature].
+    /// Piecewise-smooth system: a built-in one (caricature, wheel, two-fold, chua ...; `twofold new
+    /// --list` names all) or a file that defines one (.toml, .json) [default: caricature].
     #[arg(long, value_name = "NAME|FILE", help_heading = "System")]
     pub system: Option<String>,
     /// Give a parameter of the system another value; may be repeated.
@@ -34,7 +34,8 @@ pub struct RunFlags {
     /// What stands in for the discontinuity [default: smoothed].
     #[arg(long, value_enum, help_heading = "System")]
     pub switch: Option<Switch>,
-    /// Parameters of the caricature: alpha = 1e-3 as the paper prints it, or 1e-1 as its figures suggest; beta = 1e-5 [default: printed].
+    /// Parameters of the caricature: alpha = 1e-3 as the paper prints it, or 1e-1 as its figures
+    /// suggest; beta = 1e-5 [default: printed].
     #[arg(long, value_enum, help_heading = "System")]
     pub reading: Option<Reading>,
     /// The caricature's alpha, the strength of its drift [default: the reading's].
@@ -61,7 +62,8 @@ pub struct RunFlags {
     /// What a relay begins with where the start lies inside its band [default: sign].
     #[arg(long, value_enum, help_heading = "System")]
     pub inside: Option<Inside>,
-    /// Width of the layer of a smoothed switch, or half the band of a hysteretic one [default: 0.001; with --switch delayed none, which is the sharp rule].
+    /// Width of the layer of a smoothed switch, or half the band of a hysteretic one [default:
+    /// 0.001; with --switch delayed none, which is the sharp rule].
     #[arg(long, allow_hyphen_values = true, help_heading = "System")]
     pub eps: Option<f64>,
     /// Transition function of the smoothed switch [default: tanh].
@@ -73,11 +75,19 @@ pub struct RunFlags {
     /// Relaxation time of the hysteretic switch [default: 10 eps].
     #[arg(long, allow_hyphen_values = true, help_heading = "System")]
     pub eps_prime: Option<f64>,
-    /// How the two divisions by eps-prime in eq. (10) are read: both, as printed, or one [default: literal].
+    /// How the two divisions by eps-prime in eq. (10) are read: both, as printed, or one [default:
+    /// literal].
     #[arg(long, value_enum, help_heading = "System")]
     pub hysteresis: Option<Relaxation>,
-    /// Initial state, one number for each of the system's [default: the one that the system suggests].
-    #[arg(long, value_name = "X,Y,...", value_delimiter = ',', allow_hyphen_values = true, help_heading = "System")]
+    /// Initial state, one number for each of the system's [default: the one that the system
+    /// suggests].
+    #[arg(
+        long,
+        value_name = "X,Y,...",
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        help_heading = "System"
+    )]
     pub start: Option<Vec<f64>>,
     /// Time at which the run of a general system begins [default: 0].
     #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
@@ -88,13 +98,15 @@ pub struct RunFlags {
     /// Integration method [default: lsoda; dopri5 with --switch filippov, delayed or relay].
     #[arg(long, value_enum, help_heading = "Method")]
     pub method: Option<Method>,
-    /// Relative tolerance [default: 10^-7.97727, NDSolve's; with taylor-extended 1e-32 or what --precision allows; of exponents 1e-9, of closed orbits 1e-11].
+    /// Relative tolerance [default: 10^-7.97727, NDSolve's; with taylor-extended 1e-32 or what
+    /// --precision allows; of exponents 1e-9, of closed orbits 1e-11].
     #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
     pub rtol: Option<f64>,
     /// Absolute tolerance [default: that of --rtol's default].
     #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
     pub atol: Option<f64>,
-    /// Longest step, inf for any [default: a tenth of the time between restarts or kicks, NDSolve's].
+    /// Longest step, inf for any [default: a tenth of the time between restarts or kicks,
+    /// NDSolve's].
     #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
     pub max_step: Option<f64>,
     /// Number of steps after which the run is given up [default: 400000000].
@@ -118,15 +130,17 @@ pub struct RunFlags {
     /// Distribution of a kick [default: sphere].
     #[arg(long, value_enum, help_heading = "Schedule")]
     pub kick_law: Option<KickLaw>,
-    /// How repelling sliding ends (with --switch filippov): at-once:SIDE, after-time:T:SIDE, after-arc:L:SIDE, with SIDE plus or
-    /// minus; random:exponential:MEAN or random:uniform:LONGEST (see --seed, --stream, --plus-probability); all. Without it a run ends
-    /// with an error where a choice is needed.
+    /// How repelling sliding ends (with --switch filippov): at-once:SIDE, after-time:T:SIDE,
+    /// after-arc:L:SIDE, with SIDE plus or minus; random:exponential:MEAN or random:uniform:LONGEST
+    /// (see --seed, --stream, --plus-probability); all. Without it a run ends with an error where a
+    /// choice is needed.
     #[arg(long, value_name = "RULE", allow_hyphen_values = true, help_heading = "Filippov motion")]
     pub exit: Option<String>,
-    /// Which mixture a general system takes on several surfaces at once where mixtures of its fields have different velocities
-    /// [default: none, an error]: bilinear (products of one weight for each surface: equally steep smoothed switches), hull-least-norm
-    /// (the shortest velocity of Filippov's hull that stays on the surfaces), or order:EXPRESSION,... (a hierarchy of the switching
-    /// functions that meet, the fastest first).
+    /// Which mixture a general system takes on several surfaces at once where mixtures of its
+    /// fields have different velocities [default: none, an error]: bilinear (products of one weight
+    /// for each surface: equally steep smoothed switches), hull-least-norm (the shortest velocity
+    /// of Filippov's hull that stays on the surfaces), or order:EXPRESSION,... (a hierarchy of the
+    /// switching functions that meet, the fastest first).
     #[arg(long, value_name = "RULE", allow_hyphen_values = true, help_heading = "Filippov motion")]
     pub intersection: Option<String>,
     /// Probability of leaving to h > 0 under a random exit rule [default: 0.5].
@@ -151,15 +165,22 @@ pub struct RunFlags {
     #[arg(long, allow_negative_numbers = true, help_heading = "Random numbers")]
     pub stream: Option<u64>,
     /// Record crossings of a plane instead of the path, such as y=0.
-    #[arg(long, value_name = "COORDINATE=VALUE", allow_hyphen_values = true, help_heading = "Recording")]
+    #[arg(
+        long,
+        value_name = "COORDINATE=VALUE",
+        allow_hyphen_values = true,
+        help_heading = "Recording"
+    )]
     pub section: Option<String>,
-    /// Largest distance between the recorded polyline and the path [default: 0.001; of a picture 0.0001].
+    /// Largest distance between the recorded polyline and the path [default: 0.001; of a picture
+    /// 0.0001].
     #[arg(long, allow_hyphen_values = true, help_heading = "Recording")]
     pub chord: Option<f64>,
     /// Record the state at the multiples of this time, instead of points that follow the path.
     #[arg(long, value_name = "DT", allow_hyphen_values = true, help_heading = "Recording")]
     pub every: Option<f64>,
-    /// Take the whole run from a file made with --print-spec, or from standard input (-); other flags of the run are then refused.
+    /// Take the whole run from a file made with --print-spec, or from standard input (-); other
+    /// flags of the run are then refused.
     #[arg(long, value_name = "FILE")]
     pub spec: Option<PathBuf>,
 }
@@ -258,16 +279,19 @@ impl RunFlags {
     }
 }
 
-const OF_THE_CARICATURE: &str = "it belongs to the caricature, and --set NAME=VALUE comes after it; leave it out, and give parameters of other systems by --set";
-const OF_FUNNELS: &str =
-    "it describes the futures that --switch filippov --exit all follows; leave it out, or follow them";
-const OF_RANDOM: &str = "nothing in this run is random; leave it out, or give --kick-every or a random --exit";
-const NOT_FILIPPOV: &str = "only runs with another --switch than filippov have restarts and kicks, and exponents have kicks; leave it out, or choose another --switch";
+const OF_THE_CARICATURE: &str = "it belongs to the caricature, and --set NAME=VALUE comes after \
+    it; leave it out, and give parameters of other systems by --set";
+const OF_FUNNELS: &str = "it describes the futures that --switch filippov --exit all follows; \
+    leave it out, or follow them";
+const OF_RANDOM: &str =
+    "nothing in this run is random; leave it out, or give --kick-every or a random --exit";
+const NOT_FILIPPOV: &str = "only runs with another --switch than filippov have restarts and kicks, \
+    and exponents have kicks; leave it out, or choose another --switch";
 const OF_DELAYS: &str = "it belongs to the delayed switch; leave it out, or use --switch delayed";
 const OF_RELAYS: &str = "it belongs to the relay; leave it out, or use --switch relay";
 const OF_ORBITS: &str = "a closed orbit's steps are chosen by its tolerance alone; leave it out";
-const OF_EXTENDED: &str =
-    "other methods compute in f64, and choose their order; leave it out, or use --method taylor-extended";
+const OF_EXTENDED: &str = "other methods compute in f64, and choose their order; leave it out, or \
+    use --method taylor-extended";
 const OF_KICKS: &str = "there are no kicks; leave it out, or give --kick-every";
 
 /// The table. Every flag of [`RunFlags`] but --spec stands in it once.
@@ -291,15 +315,37 @@ const EFFECTS: [Effect; 43] = {
             "--reading",
             |f| f.reading.is_some(),
             |f, _| {
-                let given = (f.alpha.is_some() || f.sets("alpha")) && (f.beta.is_some() || f.sets("beta"));
+                let given =
+                    (f.alpha.is_some() || f.sets("alpha")) && (f.beta.is_some() || f.sets("beta"));
                 f.caricature() && !given
             },
-            "a reading gives the caricature's alpha and beta; leave it out with other systems, or where both are given",
+            "a reading gives the caricature's alpha and beta; leave it out with other systems, or \
+                where both are given",
         ),
-        when("--alpha", |f| f.alpha.is_some(), |f, _| f.caricature() && !f.sets("alpha"), OF_THE_CARICATURE),
-        when("--beta", |f| f.beta.is_some(), |f, _| f.caricature() && !f.sets("beta"), OF_THE_CARICATURE),
-        when("--v-plus", |f| f.v_plus.is_some(), |f, _| f.caricature() && !f.sets("v_plus"), OF_THE_CARICATURE),
-        when("--v-minus", |f| f.v_minus.is_some(), |f, _| f.caricature() && !f.sets("v_minus"), OF_THE_CARICATURE),
+        when(
+            "--alpha",
+            |f| f.alpha.is_some(),
+            |f, _| f.caricature() && !f.sets("alpha"),
+            OF_THE_CARICATURE,
+        ),
+        when(
+            "--beta",
+            |f| f.beta.is_some(),
+            |f, _| f.caricature() && !f.sets("beta"),
+            OF_THE_CARICATURE,
+        ),
+        when(
+            "--v-plus",
+            |f| f.v_plus.is_some(),
+            |f, _| f.caricature() && !f.sets("v_plus"),
+            OF_THE_CARICATURE,
+        ),
+        when(
+            "--v-minus",
+            |f| f.v_minus.is_some(),
+            |f, _| f.caricature() && !f.sets("v_minus"),
+            OF_THE_CARICATURE,
+        ),
         when("--delay", |f| f.delay.is_some(), |f, _| f.switch() == Switch::Delayed, OF_DELAYS),
         when("--history", |f| f.history.is_some(), |f, _| f.switch() == Switch::Delayed, OF_DELAYS),
         when("--band", |f| f.band.is_some(), |f, _| f.switch() == Switch::Relay, OF_RELAYS),
@@ -308,25 +354,29 @@ const EFFECTS: [Effect; 43] = {
             "--eps",
             |f| f.eps.is_some(),
             |f, _| !matches!(f.switch(), Switch::Filippov | Switch::Relay),
-            "the discontinuous system and the relay have no eps; leave it out, or choose another --switch",
+            "the discontinuous system and the relay have no eps; leave it out, or choose another \
+                --switch",
         ),
         when(
             "--transition",
             |f| f.transition.is_some(),
             |f, _| f.has_transition(),
-            "it shapes the smoothed switch; leave it out, or use --switch smoothed, or delayed with --eps",
+            "it shapes the smoothed switch; leave it out, or use --switch smoothed, or delayed \
+                with --eps",
         ),
         when(
             "--sigma",
             |f| f.sigma.is_some(),
             |f, _| f.has_transition() && matches!(f.transition, None | Some(Transition::Tanh)),
-            "it perturbs the smoothed switch's tanh; leave it out, or use --switch smoothed and --transition tanh",
+            "it perturbs the smoothed switch's tanh; leave it out, or use --switch smoothed and \
+                --transition tanh",
         ),
         when(
             "--eps-prime",
             |f| f.eps_prime.is_some(),
             |f, _| f.switch() == Switch::Hysteretic,
-            "it is the relaxation time of the hysteretic switch; leave it out, or use --switch hysteretic",
+            "it is the relaxation time of the hysteretic switch; leave it out, or use --switch \
+                hysteretic",
         ),
         when(
             "--hysteresis",
@@ -339,7 +389,8 @@ const EFFECTS: [Effect; 43] = {
             "--t-start",
             |f| f.t_start.is_some(),
             |_, _| false,
-            "equations with h, plus and minus do not see the time, and their runs begin at 0; leave it out (general systems take it)",
+            "equations with h, plus and minus do not see the time, and their runs begin at 0; \
+                leave it out (general systems take it)",
         ),
         when(
             "--t-end",
@@ -351,37 +402,71 @@ const EFFECTS: [Effect; 43] = {
             "--method",
             |f| f.method.is_some(),
             |_, c| c.is_a_run(),
-            "closed orbits and exponents are computed by Dormand-Prince, together with tangent vectors; leave it out",
+            "closed orbits and exponents are computed by Dormand-Prince, together with tangent \
+                vectors; leave it out",
         ),
         always("--rtol", |f| f.rtol.is_some()),
         always("--atol", |f| f.atol.is_some()),
         when("--max-step", |f| f.max_step.is_some(), |_, c| c != Use::Orbit, OF_ORBITS),
         when("--max-steps", |f| f.max_steps.is_some(), |_, c| c != Use::Orbit, OF_ORBITS),
-        when("--precision", |f| f.precision.is_some(), |f, c| f.extended() && c.is_a_run(), OF_EXTENDED),
+        when(
+            "--precision",
+            |f| f.precision.is_some(),
+            |f, c| f.extended() && c.is_a_run(),
+            OF_EXTENDED,
+        ),
         when("--order", |f| f.order.is_some(), |f, c| f.extended() && c.is_a_run(), OF_EXTENDED),
-        when("--restart", |f| f.restart.is_some(), |f, c| !f.filippov() && c.is_a_run(), NOT_FILIPPOV),
-        when("--kick-every", |f| f.kick_every.is_some(), |f, c| !f.filippov() && c != Use::Orbit, NOT_FILIPPOV),
-        when("--kick-size", |f| f.kick_size.is_some(), |f, c| f.kicked() && c != Use::Orbit, OF_KICKS),
-        when("--kick-law", |f| f.kick_law.is_some(), |f, c| f.kicked() && c != Use::Orbit, OF_KICKS),
+        when(
+            "--restart",
+            |f| f.restart.is_some(),
+            |f, c| !f.filippov() && c.is_a_run(),
+            NOT_FILIPPOV,
+        ),
+        when(
+            "--kick-every",
+            |f| f.kick_every.is_some(),
+            |f, c| !f.filippov() && c != Use::Orbit,
+            NOT_FILIPPOV,
+        ),
+        when(
+            "--kick-size",
+            |f| f.kick_size.is_some(),
+            |f, c| f.kicked() && c != Use::Orbit,
+            OF_KICKS,
+        ),
+        when(
+            "--kick-law",
+            |f| f.kick_law.is_some(),
+            |f, c| f.kicked() && c != Use::Orbit,
+            OF_KICKS,
+        ),
         when(
             "--exit",
             |f| f.exit.is_some(),
             |f, c| f.filippov() && (c.is_a_run() || c == Use::Exponent),
-            "smoothed and hysteretic motion leaves repelling sliding by itself, and a closed orbit has no repelling sliding; leave it out, or use --switch filippov",
+            "smoothed and hysteretic motion leaves repelling sliding by itself, and a closed orbit \
+                has no repelling sliding; leave it out, or use --switch filippov",
         ),
         when(
             "--intersection",
             |f| f.intersection.is_some(),
             |_, _| false,
-            "at the intersection of h and the second h nothing is chosen; leave it out (general systems take it)",
+            "at the intersection of h and the second h nothing is chosen; leave it out (general \
+                systems take it)",
         ),
         when(
             "--plus-probability",
             |f| f.plus_probability.is_some(),
             |f, c| f.exit_begins("random") && c.is_a_run(),
-            "it belongs to a random --exit; leave it out, or give one such as random:exponential:0.5",
+            "it belongs to a random --exit; leave it out, or give one such as \
+                random:exponential:0.5",
         ),
-        when("--funnel-times", |f| f.funnel_times.is_some(), |f, c| f.exit_begins("all") && c.is_a_run(), OF_FUNNELS),
+        when(
+            "--funnel-times",
+            |f| f.funnel_times.is_some(),
+            |f, c| f.exit_begins("all") && c.is_a_run(),
+            OF_FUNNELS,
+        ),
         when(
             "--funnel-shortest",
             |f| f.funnel_shortest.is_some(),
@@ -411,14 +496,21 @@ const EFFECTS: [Effect; 43] = {
         when(
             "--chord",
             |f| f.chord.is_some(),
-            |f, command| command.records_a_path() && f.section.is_none() && f.every.is_none() && !f.exit_begins("all"),
-            "it belongs to a recorded path; crossings and --every have none, and futures of a funnel are recorded at fixed points of each step",
+            |f, command| {
+                command.records_a_path()
+                    && f.section.is_none()
+                    && f.every.is_none()
+                    && !f.exit_begins("all")
+            },
+            "it belongs to a recorded path; crossings and --every have none, and futures of a \
+                funnel are recorded at fixed points of each step",
         ),
         when(
             "--every",
             |f| f.every.is_some(),
             |f, command| command.records_a_path() && f.section.is_none() && !f.exit_begins("all"),
-            "it belongs to a recorded path; the crossings of --section are not thinned, and futures of a funnel are recorded at fixed points of each step",
+            "it belongs to a recorded path; the crossings of --section are not thinned, and \
+                futures of a funnel are recorded at fixed points of each step",
         ),
     ]
 };
@@ -427,11 +519,13 @@ const EFFECTS: [Effect; 43] = {
 #[derive(Debug, thiserror::Error)]
 enum Misuse {
     #[error(
-        "--exit \"{0}\" is not a rule; give one such as at-once:plus, after-time:0.3:minus, after-arc:0.2:plus, random:exponential:0.5, random:uniform:1, or all"
+        "--exit \"{0}\" is not a rule; give one such as at-once:plus, after-time:0.3:minus, \
+            after-arc:0.2:plus, random:exponential:0.5, random:uniform:1, or all"
     )]
     Exit(String),
     #[error(
-        "--system {name}: there is no such built-in system{help}; built in are {known}; give a file's name for your own"
+        "--system {name}: there is no such built-in system{help}; built in are {known}; give a \
+            file's name for your own"
     )]
     NoSuchSystem { name: String, help: String, known: String },
     #[error("--system {file}: {problem}")]
@@ -444,12 +538,17 @@ enum Misuse {
     NoStart { system: String, states: usize },
     #[error("--start has {found} numbers; give {wanted}, one for each of {states}")]
     Start { found: usize, wanted: usize, states: String },
-    #[error("--section \"{text}\": {problem}; give one of {known} and a number, such as {example}=0")]
+    #[error(
+        "--section \"{text}\": {problem}; give one of {known} and a number, such as {example}=0"
+    )]
     Section { text: String, problem: &'static str, known: String, example: String },
-    #[error("a closed orbit is looked for through a plane: give one by --section, such as {example}=0")]
+    #[error(
+        "a closed orbit is looked for through a plane: give one by --section, such as {example}=0"
+    )]
     NoPlane { example: String },
     #[error(
-        "--exit \"{0}\": an exponent belongs to one motion; give at-once:plus or at-once:minus, or leave it out where nothing has to be chosen"
+        "--exit \"{0}\": an exponent belongs to one motion; give at-once:plus or at-once:minus, or \
+            leave it out where nothing has to be chosen"
     )]
     ExitOfExponent(String),
     #[error("--switch delayed needs its delay: give one by --delay, such as --delay 0.001")]
@@ -457,20 +556,30 @@ enum Misuse {
     #[error("--switch relay needs its band: give half its width by --band, such as --band 0.001")]
     NoBand,
     #[error(
-        "--switch delayed: the state is the whole past, of which no closed orbits are computed; follow a long run (twofold run, twofold sweep), or give another --switch"
+        "--switch delayed: the state is the whole past, of which no closed orbits are computed; \
+            follow a long run (twofold run, twofold sweep), or give another --switch"
     )]
     Past,
     #[error(
-        "--switch relay: the state has a mode beside it, with which no closed orbits are computed; follow a long run (twofold run, twofold sweep), or give another --switch"
+        "--switch relay: the state has a mode beside it, with which no closed orbits are computed; \
+            follow a long run (twofold run, twofold sweep), or give another --switch"
     )]
     Mode,
     #[error(
-        "--system {system}: a general system (f, events, modes or tables) is taken by `twofold run`, `plot`, `orbit`, `lyapunov`, `rests` and `scan`; this command needs one with h, plus and minus"
+        "--system {system}: a general system (f, events, modes or tables) is taken by `twofold \
+            run`, `plot`, `orbit`, `lyapunov`, `rests` and `scan`; this command needs one with h, \
+            plus and minus"
     )]
     General { system: String },
-    #[error("--exit all follows many futures and records their paths; a sweep needs crossings: give another rule")]
+    #[error(
+        "--exit all follows many futures and records their paths; a sweep needs crossings: give \
+            another rule"
+    )]
     FunnelInSweep,
-    #[error("{file} is not a spec of one run: {reason}; make one with `--only PANEL --reading READING --print-spec`")]
+    #[error(
+        "{file} is not a spec of one run: {reason}; make one with `--only PANEL --reading READING \
+            --print-spec`"
+    )]
     Spec { file: String, reason: String },
 }
 
@@ -481,24 +590,32 @@ impl From<Misuse> for CliError {
 }
 
 impl RunFlags {
-    /// The first flag here that gives a number which every row of a sweep over `axes` replaces, and the axes' name for it.
+    /// The first flag here that gives a number which every row of a sweep over `axes` replaces, and
+    /// the axes' name for it.
     pub fn replaced_by(&self, axes: &[Axis]) -> Option<(&'static str, String)> {
         let varied = |c: &Coordinate| axes.iter().any(|axis| axis.coordinate == *c);
         let parameter = |name: &str| varied(&Coordinate::Parameter(name.to_owned()));
         let tolerance = varied(&Coordinate::Tolerance);
         let plain = |c: Coordinate| varied(&c).then(|| c.to_string());
         let named = |name: &str| parameter(name).then(|| format!("params.{name}"));
-        let starts = axes.iter().filter(|axis| matches!(axis.coordinate, Coordinate::Start(_))).count();
-        let all_started = || self.start.as_ref().is_some_and(|s| s.len() == starts).then(|| "start.NAME".to_owned());
+        let starts =
+            axes.iter().filter(|axis| matches!(axis.coordinate, Coordinate::Start(_))).count();
+        let all_started = || {
+            self.start.as_ref().is_some_and(|s| s.len() == starts).then(|| "start.NAME".to_owned())
+        };
         // A reading is of use where it gives a number in which readings differ.
         let both = || {
             let values = paper::Reading::ALL.map(|r| [r.caricature().alpha, r.caricature().beta]);
             let gives = |i: usize, flag: bool, name: &str| {
-                flag || self.sets(name) || parameter(name) || values.iter().all(|v| v[i] == values[0][i])
+                flag || self.sets(name)
+                    || parameter(name)
+                    || values.iter().all(|v| v[i] == values[0][i])
             };
             let replaced = parameter("alpha") || parameter("beta");
-            (replaced && gives(0, self.alpha.is_some(), "alpha") && gives(1, self.beta.is_some(), "beta"))
-                .then(|| "params.alpha and params.beta".to_owned())
+            (replaced
+                && gives(0, self.alpha.is_some(), "alpha")
+                && gives(1, self.beta.is_some(), "beta"))
+            .then(|| "params.alpha and params.beta".to_owned())
         };
         let set = || {
             let names = self.set.iter().filter_map(|text| text.split('=').next());
@@ -535,7 +652,8 @@ impl RunFlags {
         table.into_iter().find_map(|(flag, given, by)| if given { Some((flag, by?)) } else { None })
     }
 
-    /// --eps also gives eps' and the size of kicks where those have no flag of their own, and says that a delayed switch is the smooth one.
+    /// --eps also gives eps' and the size of kicks where those have no flag of their own, and says
+    /// that a delayed switch is the smooth one.
     fn eps_is_replaced(&self, axes: &[Axis]) -> Option<String> {
         let used_elsewhere = (self.kicked() && self.kick_size.is_none())
             || (self.switch() == Switch::Hysteretic && self.eps_prime.is_none())
@@ -544,8 +662,8 @@ impl RunFlags {
         (varied && !used_elsewhere).then(|| Coordinate::Eps.to_string())
     }
 
-    /// The spec that the flags describe, checked. For [`Use::Crossings`] a path becomes its crossings of the plane where the second
-    /// coordinate is zero.
+    /// The spec that the flags describe, checked. For [`Use::Crossings`] a path becomes its
+    /// crossings of the plane where the second coordinate is zero.
     ///
     /// # Errors
     /// If a flag has no effect, or a value is wrong.
@@ -559,14 +677,20 @@ impl RunFlags {
                     ));
                 }
                 let (text, name) = if file.as_os_str() == "-" {
-                    (read_text_from(io::stdin().lock(), "standard input")?, "standard input".to_owned())
+                    (
+                        read_text_from(io::stdin().lock(), "standard input")?,
+                        "standard input".to_owned(),
+                    )
                 } else {
                     (read_text(file)?, file.display().to_string())
                 };
-                serde_json::from_str(&text).map_err(|e| Misuse::Spec { file: name, reason: e.to_string() })?
+                serde_json::from_str(&text)
+                    .map_err(|e| Misuse::Spec { file: name, reason: e.to_string() })?
             }
             None => {
-                if let Some(idle) = EFFECTS.iter().find(|e| (e.given)(self) && !(e.works)(self, command)) {
+                if let Some(idle) =
+                    EFFECTS.iter().find(|e| (e.given)(self) && !(e.works)(self, command))
+                {
                     return Err(CliError::no_effect(idle.flag, idle.why));
                 }
                 self.unchecked(command)?
@@ -651,12 +775,19 @@ impl RunFlags {
         };
         let start = match &self.start {
             None => {
-                let none = || Misuse::NoStart { system: self.system_name().to_owned(), states: system.dimension() };
+                let none = || Misuse::NoStart {
+                    system: self.system_name().to_owned(),
+                    states: system.dimension(),
+                };
                 system.definition().start().ok_or_else(none)?.to_vec()
             }
             Some(numbers) if numbers.len() != system.dimension() => {
                 let states = system.coordinates().join(", ");
-                return Err(Misuse::Start { found: numbers.len(), wanted: system.dimension(), states });
+                return Err(Misuse::Start {
+                    found: numbers.len(),
+                    wanted: system.dimension(),
+                    states,
+                });
             }
             Some(numbers) => numbers.clone(),
         };
@@ -708,10 +839,12 @@ impl RunFlags {
                 let names = system.coordinates();
                 return Err(Misuse::NoPlane { example: names[1.min(names.len() - 1)].into() });
             }
-            None if self.every.is_some() => Observation::Times { every: self.every.unwrap_or(f64::NAN) },
-            None => {
-                Observation::Path { chord: self.chord.unwrap_or(if command == Use::Picture { 1e-4 } else { 1e-3 }) }
+            None if self.every.is_some() => {
+                Observation::Times { every: self.every.unwrap_or(f64::NAN) }
             }
+            None => Observation::Path {
+                chord: self.chord.unwrap_or(if command == Use::Picture { 1e-4 } else { 1e-3 }),
+            },
             Some(text) => section(text, &system)?,
         };
         Ok(RunSpec {
@@ -733,7 +866,8 @@ impl RunFlags {
             None => from_file(name)?,
         };
         if self.caricature() {
-            let reading = paper::Reading::from(self.reading.unwrap_or(Reading::Printed)).caricature();
+            let reading =
+                paper::Reading::from(self.reading.unwrap_or(Reading::Printed)).caricature();
             let values = [
                 ("alpha", self.alpha.unwrap_or(reading.alpha)),
                 ("beta", self.beta.unwrap_or(reading.beta)),
@@ -749,9 +883,12 @@ impl RunFlags {
         for text in &self.set {
             let refused = |problem: String| Misuse::Set { text: text.clone(), problem };
             let Some((parameter, value)) = text.split_once('=') else {
-                return Err(refused("there is no \"=\"; give it as NAME=VALUE, such as alpha=0.2".into()));
+                return Err(refused(
+                    "there is no \"=\"; give it as NAME=VALUE, such as alpha=0.2".into(),
+                ));
             };
-            let value: Decimal = value.trim().parse().map_err(|e: DecimalError| refused(e.to_string()))?;
+            let value: Decimal =
+                value.trim().parse().map_err(|e: DecimalError| refused(e.to_string()))?;
             system = system.with(parameter.trim(), value).map_err(|e| refused(e.to_string()))?;
         }
         Ok(system)
@@ -793,7 +930,8 @@ impl RunFlags {
 fn from_file(name: &str) -> Result<System, Misuse> {
     let path = Path::new(name);
     let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
-    // A general system's file comes here if it cannot be read as one, and so does a file's name that is misspelt.
+    // A general system's file comes here if it cannot be read as one, and so does a file's name
+    // that is misspelt.
     let is_file = name.contains(['.', '/', '\\']) || path.is_file();
     if !is_file {
         let (help, known) = super::general::known(name);
@@ -818,8 +956,10 @@ fn section(text: &str, system: &System) -> Result<Observation, Misuse> {
         example: names[1.min(names.len() - 1)].into(),
     };
     let (name, value) = text.split_once('=').ok_or_else(|| misuse("there is no \"=\""))?;
-    let coordinate =
-        names.iter().position(|n| *n == name.trim()).ok_or_else(|| misuse("there is no such coordinate"))?;
+    let coordinate = names
+        .iter()
+        .position(|n| *n == name.trim())
+        .ok_or_else(|| misuse("there is no such coordinate"))?;
     let value = value.trim().parse().map_err(|_| misuse("what follows \"=\" is not a number"))?;
     Ok(Observation::Section { coordinate, value })
 }
@@ -831,11 +971,14 @@ mod tests {
 
     fn parse(arguments: &[&str]) -> RunFlags {
         let command = RunFlags::augment_args(clap::Command::new("x").no_binary_name(true));
-        RunFlags::from_arg_matches(&command.try_get_matches_from(arguments).unwrap_or_else(|e| panic!("{e}"))).unwrap()
+        RunFlags::from_arg_matches(
+            &command.try_get_matches_from(arguments).unwrap_or_else(|e| panic!("{e}")),
+        )
+        .unwrap()
     }
 
-    /// Every flag with a value that no default has and that every run allows on which the flag has an effect; several, if
-    /// none differs from every default.
+    /// Every flag with a value that no default has and that every run allows on which the flag has
+    /// an effect; several, if none differs from every default.
     const SAMPLES: [(&str, &[&str]); 43] = [
         ("--system", &["wheel", "two-fold"]),
         ("--set", &["alpha=0.3", "omega0=1.1"]),
@@ -916,27 +1059,37 @@ mod tests {
     #[test]
     fn the_table_holds_every_flag() {
         let command = RunFlags::augment_args(clap::Command::new("x"));
-        let mut flags: Vec<String> =
-            command.get_arguments().filter_map(|a| a.get_long()).map(|l| format!("--{l}")).collect();
+        let mut flags: Vec<String> = command
+            .get_arguments()
+            .filter_map(|a| a.get_long())
+            .map(|l| format!("--{l}"))
+            .collect();
         flags.retain(|f| f != "--spec");
         assert_eq!(flags, EFFECTS.map(|e| e.flag));
         assert_eq!(flags, SAMPLES.map(|s| s.0));
     }
 
-    /// Every flag on every kind of run, under both commands: refused by name, or the question changes.
+    /// Every flag on every kind of run, under both commands: refused by name, or the question
+    /// changes.
     #[test]
     fn no_flag_is_ignored_on_any_run() {
         let (mut tried, mut refused) = (0, 0);
         for command in [Use::Any, Use::Picture, Use::Crossings, Use::Orbit, Use::Exponent] {
             let mut kinds = kinds();
-            kinds.extend([vec!["--every", "0.5"], vec!["--switch", "filippov", "--section", "y=0"]]);
+            kinds
+                .extend([vec!["--every", "0.5"], vec!["--switch", "filippov", "--section", "y=0"]]);
             for kind in kinds {
                 let Ok(plain) = parse(&kind).spec(command) else {
-                    // Refused by name as it stands; what these commands do take is among the others.
+                    // Refused by name as it stands; what these commands do take is among the
+                    // others.
                     let fine = match command {
-                        Use::Any | Use::Picture => kind.contains(&"filippov") && !kind.contains(&"--exit"),
+                        Use::Any | Use::Picture => {
+                            kind.contains(&"filippov") && !kind.contains(&"--exit")
+                        }
                         Use::Crossings => {
-                            kind.contains(&"all") || kind.contains(&"--every") || !kind.contains(&"--exit")
+                            kind.contains(&"all")
+                                || kind.contains(&"--every")
+                                || !kind.contains(&"--exit")
                         }
                         Use::Orbit => {
                             let other = ["--kick-every", "--exit", "delayed", "relay"];
@@ -955,18 +1108,24 @@ mod tests {
                     let mut errors = Vec::new();
                     for value in *values {
                         match parse(&[&kind[..], &[flag, value]].concat()).spec(command) {
-                            // A closed orbit has no method: of a spec it takes what its question holds.
+                            // A closed orbit has no method: of a spec it takes what its question
+                            // holds.
                             Ok(spec) => changed |= spec != plain,
-                            // The wheel has its own coordinates, and a change of system or switch asks for other flags: each error names what
-                            // does not go together.
+                            // The wheel has its own coordinates, and a change of system or switch
+                            // asks for other flags: each error names what does not go together.
                             Err(error) => errors.push(error.to_string()),
                         }
                     }
                     tried += 1;
                     refused += usize::from(!errors.is_empty());
-                    let named =
-                        |e: &String| e.contains(flag) || ["--switch", "--system"].contains(flag) && e.contains("--");
-                    assert!(changed || errors.len() == values.len(), "{kind:?} {flag}: accepted without effect");
+                    let named = |e: &String| {
+                        e.contains(flag)
+                            || ["--switch", "--system"].contains(flag) && e.contains("--")
+                    };
+                    assert!(
+                        changed || errors.len() == values.len(),
+                        "{kind:?} {flag}: accepted without effect"
+                    );
                     assert!(errors.iter().all(named), "{kind:?} {flag}: {errors:?}");
                 }
             }
@@ -974,7 +1133,8 @@ mod tests {
         assert!(tried > 2500 && refused > 900, "{tried} pairs, {refused} refused");
     }
 
-    /// Every flag beside every axis of a sweep: some row asks something else because of the flag, or the flag is refused.
+    /// Every flag beside every axis of a sweep: some row asks something else because of the flag,
+    /// or the flag is refused.
     #[test]
     fn no_flag_is_ignored_beside_an_axis() {
         use crate::job::sweep::Sweep;
@@ -1005,18 +1165,26 @@ mod tests {
             .iter()
             .map(|a| vec![a.parse().unwrap()])
             .chain([vec![axes[0].parse().unwrap(), axes[1].parse().unwrap()]])
-            .chain([["start.x=1", "start.y=1", "start.z=1"].iter().map(|a| a.parse().unwrap()).collect()])
+            .chain([["start.x=1", "start.y=1", "start.z=1"]
+                .iter()
+                .map(|a| a.parse().unwrap())
+                .collect()])
             .collect();
         let rows = |flags: &RunFlags, over: &[Axis]| {
             let sweep = Sweep::new(flags.spec(Use::Crossings).ok()?, over.to_vec(), None).ok()?;
-            Some((0..sweep.rows()).map(|row| sweep.question(row).map(|q| q.0.run)).collect::<Vec<_>>())
+            Some(
+                (0..sweep.rows())
+                    .map(|row| sweep.question(row).map(|q| q.0.run))
+                    .collect::<Vec<_>>(),
+            )
         };
         let (mut tried, mut refused) = (0, 0);
         for kind in kinds() {
             for over in &lists {
                 let Some(plain) = rows(&parse(&kind), over) else { continue };
                 for (flag, values) in SAMPLES.iter().filter(|(flag, _)| !kind.contains(flag)) {
-                    // A value may be the one that the run has anyway; a flag that is refused on its own is another test's business.
+                    // A value may be the one that the run has anyway; a flag that is refused on its
+                    // own is another test's business.
                     let (mut counts, mut works) = (false, false);
                     for value in *values {
                         let with = parse(&[&kind[..], &[flag, value]].concat());
@@ -1046,7 +1214,10 @@ mod tests {
     #[test]
     fn nothing_stands_beside_a_spec() {
         for (flag, values) in SAMPLES {
-            let error = parse(&["--spec", "nowhere.json", flag, values[0]]).spec(Use::Any).unwrap_err().to_string();
+            let error = parse(&["--spec", "nowhere.json", flag, values[0]])
+                .spec(Use::Any)
+                .unwrap_err()
+                .to_string();
             assert!(error.contains(flag) && error.contains("--spec"), "{error}");
         }
     }

@@ -55,14 +55,18 @@ pub fn model(flags: &RunFlags) -> Result<Option<Model>, CliError> {
 pub fn any_model(name: &str, set: &[String]) -> Result<Model, CliError> {
     named(name, set, true)?.ok_or_else(|| {
         let (near, _) = known(name);
-        usage(format!("--system {name}: there is no such built-in system{near}; give a file's name for your own"))
+        usage(format!(
+            "--system {name}: there is no such built-in system{near}; give a file's name \
+            for your own"
+        ))
     })
 }
 
 /// The names of all built-in systems, after advice if one of them is like `name`.
 pub fn known(name: &str) -> (String, String) {
     let known: Vec<&str> = library::names().chain(library::general_names()).collect();
-    let near = nearest(name, &known).map_or(String::new(), |near| format!(", did you mean {near}?"));
+    let near =
+        nearest(name, &known).map_or(String::new(), |near| format!(", did you mean {near}?"));
     (near, known.join(", "))
 }
 
@@ -80,7 +84,11 @@ fn named(name: &str, set: &[String], any: bool) -> Result<Option<Model>, CliErro
             if !any && !is_general(&text, json) {
                 return Ok(None);
             }
-            let read = if json { Definition::from_json(&text, name) } else { Definition::from_toml(&text, name) };
+            let read = if json {
+                Definition::from_json(&text, name)
+            } else {
+                Definition::from_toml(&text, name)
+            };
             (read, path.parent())
         }
     };
@@ -96,10 +104,15 @@ fn named(name: &str, set: &[String], any: bool) -> Result<Option<Model>, CliErro
     for text in set {
         let refused = |problem: String| usage(format!("--set \"{text}\": {problem}"));
         let Some((parameter, value)) = text.split_once('=') else {
-            return Err(refused("there is no \"=\"; give it as NAME=VALUE, such as alpha=0.2".into()));
+            return Err(refused(
+                "there is no \"=\"; give it as NAME=VALUE, such as alpha=0.2".into(),
+            ));
         };
         let value: f64 = value.trim().parse().map_err(|_| {
-            refused(format!("`{}` is not a decimal number; write it like 0.25, -3 or 1e-5", value.trim()))
+            refused(format!(
+                "`{}` is not a decimal number; write it like 0.25, -3 or 1e-5",
+                value.trim()
+            ))
         })?;
         model = model.with(parameter.trim(), value).map_err(|e| refused(e.to_string()))?;
     }
@@ -123,18 +136,26 @@ fn named(name: &str, set: &[String], any: bool) -> Result<Option<Model>, CliErro
 pub fn run_of(flags: &RunFlags) -> Result<Option<GeneralRun>, CliError> {
     let Some(model) = model(flags)? else { return Ok(None) };
     let recording = ["--chord", "--every"];
-    if let Some(flag) = flags.given().into_iter().find(|f| !WORK.contains(f) && !recording.contains(f)) {
+    if let Some(flag) =
+        flags.given().into_iter().find(|f| !WORK.contains(f) && !recording.contains(f))
+    {
         let why = match flag {
             "--switch" => {
-                "a general system is followed exactly, from switch to switch; leave it out, or write the system with h, plus and minus"
+                "a general system is followed exactly, from switch to switch; leave it out, or \
+                    write the system with h, plus and minus"
             }
-            _ => "it belongs to systems with one or two switching surfaces (h, plus, minus); leave it out",
+            _ => {
+                "it belongs to systems with one or two switching surfaces (h, plus, minus); leave \
+                    it out"
+            }
         };
         return Err(CliError::no_effect(flag, why));
     }
     let method = method(flags.method)?;
     let positive = |flag: &str, value: Option<f64>| match value {
-        Some(v) if !(v.is_finite() && v > 0.0) => Err(usage(format!("{flag} {v}: give a finite number above 0"))),
+        Some(v) if !(v.is_finite() && v > 0.0) => {
+            Err(usage(format!("{flag} {v}: give a finite number above 0")))
+        }
         other => Ok(other),
     };
     let defaults = Options::default();
@@ -158,7 +179,9 @@ pub fn run_of(flags: &RunFlags) -> Result<Option<GeneralRun>, CliError> {
             ));
         }
         (Some(text), ..) => Record::Section(section(text, &model)?),
-        (None, Some(every), _) => Record::Times { every: positive("--every", Some(every))?.unwrap_or(every) },
+        (None, Some(every), _) => {
+            Record::Times { every: positive("--every", Some(every))?.unwrap_or(every) }
+        }
         (None, None, chord) => Record::Path { chord: positive("--chord", chord)?.unwrap_or(1e-3) },
     };
     let exit = match flags.exit.as_deref() {
@@ -166,7 +189,9 @@ pub fn run_of(flags: &RunFlags) -> Result<Option<GeneralRun>, CliError> {
         Some("at-once:plus") => Side::Plus,
         Some("at-once:minus") => Side::Minus,
         Some(other) => {
-            return Err(usage(format!("--exit \"{other}\": of a general system give at-once:plus or at-once:minus")));
+            return Err(usage(format!(
+                "--exit \"{other}\": of a general system give at-once:plus or at-once:minus"
+            )));
         }
     };
     if let Some(start) = &flags.start
@@ -191,7 +216,10 @@ pub fn run_of(flags: &RunFlags) -> Result<Option<GeneralRun>, CliError> {
         record,
         exit,
         method,
-        intersection: flags.intersection.as_deref().map_or(Ok(Rule::Undecided), |text| intersection(text, &model))?,
+        intersection: flags
+            .intersection
+            .as_deref()
+            .map_or(Ok(Rule::Undecided), |text| intersection(text, &model))?,
     };
     Ok(Some(GeneralRun { model, options }))
 }
@@ -202,18 +230,23 @@ fn method(named: Option<Named>) -> Result<Method, CliError> {
         None | Some(Named::Dopri5) => return Ok(Method::Dopri5),
         Some(Named::Radau5) => return Ok(Method::Radau5),
         Some(Named::Taylor) => return Ok(Method::Taylor),
-        Some(Named::Lsoda) => {
-            ("lsoda", "it builds up its order over many steps, and every switch or event begins anew")
+        Some(Named::Lsoda) => (
+            "lsoda",
+            "it builds up its order over many steps, and every switch or event begins anew",
+        ),
+        Some(Named::TaylorExtended) => {
+            ("taylor-extended", "switches and events are located in double precision")
         }
-        Some(Named::TaylorExtended) => ("taylor-extended", "switches and events are located in double precision"),
         Some(Named::Layered) => ("layered", "it belongs to a smoothed switch"),
     };
     Err(usage(format!(
-        "--method {name}: general systems are followed by dopri5, radau5 where they are stiff, or taylor for many digits; {why}"
+        "--method {name}: general systems are followed by dopri5, radau5 where they are stiff, or \
+            taylor for many digits; {why}"
     )))
 }
 
-/// Filippov's motion of a system with h, plus and minus, if the flags ask for it, as the run of a general one.
+/// Filippov's motion of a system with h, plus and minus, if the flags ask for it, as the run of a
+/// general one.
 ///
 /// # Errors
 /// If a flag has no effect, or a value is wrong.
@@ -225,14 +258,20 @@ pub fn filippov_run(flags: &RunFlags) -> Result<Option<GeneralRun>, CliError> {
         ExitRule::AtOnce { side: filippov::Side::Minus } => Side::Minus,
         _ => Side::Undecided,
     };
-    // The tolerances of general systems, whose states have sizes of their own, unless others are given.
-    let (defaults, whole) = (Options::default(), flags.spec.as_ref().map(|_| spec.method.tolerance));
+    // The tolerances of general systems, whose states have sizes of their own, unless others are
+    // given.
+    let (defaults, whole) =
+        (Options::default(), flags.spec.as_ref().map(|_| spec.method.tolerance));
     let options = Options {
         t_end: spec.t_end,
         start: Some(spec.start),
         rtol: whole.map(|t| t.rtol).or(flags.rtol).unwrap_or(defaults.rtol),
         atol: whole.map(|t| t.atol).or(flags.atol),
-        max_step: if let StepCap::Absolute(h) = spec.method.step_cap { h } else { defaults.max_step },
+        max_step: if let StepCap::Absolute(h) = spec.method.step_cap {
+            h
+        } else {
+            defaults.max_step
+        },
         max_steps: spec.method.max_steps,
         exit,
         ..defaults
@@ -247,7 +286,11 @@ fn intersection(text: &str, model: &Model) -> Result<Rule, CliError> {
         "bilinear" => return Ok(Rule::Bilinear),
         "hull-least-norm" => return Ok(Rule::HullLeastNorm),
         other => other.strip_prefix("order:").ok_or_else(|| {
-            wrong("give bilinear, hull-least-norm, or order: and the switching functions that meet, the fastest first, such as order:x,y".into())
+            wrong(
+                "give bilinear, hull-least-norm, or order: and the switching functions that \
+                meet, the fastest first, such as order:x,y"
+                    .into(),
+            )
         })?,
     };
     let (mut order, mut depth, mut from) = (Vec::new(), 0, 0);
@@ -274,15 +317,20 @@ fn expression(text: &str, model: &Model) -> Result<Expression, String> {
     let terms = definition.document().terms.0.iter().map(|(n, _)| n.as_str());
     let tables = definition.tables().iter().map(|(n, _)| n.as_str());
     let parameters = definition.parameters().iter().map(|p| p.name.as_str());
-    let names: Vec<&str> = model.coordinates().into_iter().chain(parameters).chain(terms).chain(tables).collect();
-    Expression::parse_general(text, &names)
-        .map_err(|e| format!("{}{}", e.message, e.help.map_or(String::new(), |h| format!(" ({h})"))))
+    let names: Vec<&str> =
+        model.coordinates().into_iter().chain(parameters).chain(terms).chain(tables).collect();
+    Expression::parse_general(text, &names).map_err(|e| {
+        format!("{}{}", e.message, e.help.map_or(String::new(), |h| format!(" ({h})")))
+    })
 }
 
 /// Reads "x - y = 0".
 fn section(text: &str, model: &Model) -> Result<Expression, CliError> {
     let wrong = |problem: &str| {
-        usage(format!("--section \"{text}\": {problem}; give an equation such as {}=0", model.coordinates()[0]))
+        usage(format!(
+            "--section \"{text}\": {problem}; give an equation such as {}=0",
+            model.coordinates()[0]
+        ))
     };
     let (left, right) = text.split_once('=').ok_or_else(|| wrong("there is no \"=\""))?;
     let read = |side: &str| {
@@ -296,7 +344,9 @@ fn section(text: &str, model: &Model) -> Result<Expression, CliError> {
 /// What a failed run says under the command line.
 pub fn failed(error: HybridError) -> CliError {
     match error {
-        HybridError::Equation(_) | HybridError::Start(_) | HybridError::Bad(_) => usage(error.to_string()),
+        HybridError::Equation(_) | HybridError::Start(_) | HybridError::Bad(_) => {
+            usage(error.to_string())
+        }
         other => CliError::Job(JobError::Other(other.to_string())),
     }
 }

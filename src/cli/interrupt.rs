@@ -1,9 +1,9 @@
 //! Ctrl-C and SIGTERM: the program ends within a second, prints one line, and leaves no temporary
 //! files.
 //!
-//! Most programs here write every picture as soon as it is finished: for them a signal removes the temporary files and ends the
-//! process. A command whose result grows row by row can ask for grace ([`Grace`]): it is told, and has a moment to keep the
-//! rows that it has.
+//! Most programs here write every picture as soon as it is finished: for them a signal removes the
+//! temporary files and ends the process. A command whose result grows row by row can ask for grace
+//! ([`Grace`]): it is told, and has a moment to keep the rows that it has.
 
 use std::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
 
@@ -45,7 +45,8 @@ impl Drop for Grace {
     }
 }
 
-/// Starts to listen. Where there are no such signals, or no thread can be had, they keep their ordinary effect.
+/// Starts to listen. Where there are no such signals, or no thread can be had, they keep their
+/// ordinary effect.
 pub fn listen() {
     #[cfg(unix)]
     unix::listen();
@@ -67,10 +68,12 @@ mod unix {
     use crate::record;
 
     pub fn listen() {
-        // A file grown beyond its limit (SIGXFSZ) is then an error of that write, with a message, instead of a silent end. It is
-        // taken before anything is written, not by the thread, which may start later than a short run ends.
+        // A file grown beyond its limit (SIGXFSZ) is then an error of that write, with a message,
+        // instead of a silent end. It is taken before anything is written, not by the thread, which
+        // may start later than a short run ends.
         let _ = signal_hook::flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)));
-        // The other signals are taken over by the thread itself: where it cannot be started, they are not.
+        // The other signals are taken over by the thread itself: where it cannot be started, they
+        // are not.
         let _ = thread::Builder::new().name("signals".into()).spawn(|| {
             if let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) {
                 wait(&mut signals);
@@ -83,7 +86,8 @@ mod unix {
         let exit = if signal == SIGTERM { Exit::Terminated } else { Exit::Interrupted };
         CAME.store(exit as u8, Ordering::SeqCst);
         if GRACES.load(Ordering::SeqCst) > 0 {
-            // The main thread ends the process when it has kept what it has. A second signal ends the waiting.
+            // The main thread ends the process when it has kept what it has. A second signal ends
+            // the waiting.
             for _ in 0..GRACE_MS / 10 {
                 thread::sleep(Duration::from_millis(10));
                 if signals.pending().next().is_some() {

@@ -1,10 +1,15 @@
-//! The command line: flags, progress, errors in words, exit codes. Nothing below this module prints, exits or reads the environment.
+//! The command line: flags, progress, errors in words, exit codes. Nothing below this module
+//! prints, exits or reads the environment.
 //!
-//! - [`figure`]: the command line that every figure's binary shares. [`commands`]: that of `twofold`.
-//! - [`flags`]: the flags that describe a run, and the table of which of them has an effect when. [`words`]: values by name.
+//! - [`figure`]: the command line that every figure's binary shares. [`commands`]: that of
+//!   `twofold`.
+//! - [`flags`]: the flags that describe a run, and the table of which of them has an effect when.
+//!   [`words`]: values by name.
 //! - [`general`]: the same for general systems.
-//! - [`rows`]: rows of a sweep, kept as they finish. [`recompute`]: those that are committed beside a figure, computed anew.
-//! - [`exit`]: exit codes and errors. [`speak`]: the two streams. [`progress`]: bars. [`interrupt`]: Ctrl-C.
+//! - [`rows`]: rows of a sweep, kept as they finish. [`recompute`]: those that are committed beside
+//!   a figure, computed anew.
+//! - [`exit`]: exit codes and errors. [`speak`]: the two streams. [`progress`]: bars.
+//!   [`interrupt`]: Ctrl-C.
 //!
 //! ```
 //! use twofold::cli::{CliError, Exit, in_pool};
@@ -42,16 +47,19 @@ pub const MOST_THREADS: usize = 1024;
 /// If there are more than [`MOST_THREADS`], or the system refuses them.
 pub fn in_pool<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> Result<T, CliError> {
     if threads > MOST_THREADS {
-        return Err(CliError::Threads { threads, reason: format!("at most {MOST_THREADS} are started") });
+        return Err(CliError::Threads {
+            threads,
+            reason: format!("at most {MOST_THREADS} are started"),
+        });
     }
     if cfg!(target_family = "wasm") {
-        // There are no threads to start: what is asked side by side is computed one after the other.
+        // There are no threads to start: what is asked side by side is computed one after the
+        // other.
         return Ok(work());
     }
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .map_err(|e| CliError::Threads { threads, reason: format!("the system refuses them ({e})") })?;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|e| {
+        CliError::Threads { threads, reason: format!("the system refuses them ({e})") }
+    })?;
     Ok(pool.install(work))
 }
 

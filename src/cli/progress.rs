@@ -46,7 +46,9 @@ impl Progress {
         let style = if quiet {
             Style::Quiet
         } else if io::stderr().is_terminal() {
-            let bars = BARS.get_or_init(|| MultiProgress::with_draw_target(ProgressDrawTarget::stderr_with_hz(8)));
+            let bars = BARS.get_or_init(|| {
+                MultiProgress::with_draw_target(ProgressDrawTarget::stderr_with_hz(8))
+            });
             Style::Bars(bars.clone())
         } else {
             Style::Lines
@@ -145,7 +147,11 @@ impl Monitor for RunProgress<'_> {
         if let Some(bar) = &self.bar {
             bar.set_position((t / self.t_end * RESOLUTION as f64) as u64);
         }
-        if self.progress.asked_to_stop().is_none() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        if self.progress.asked_to_stop().is_none() {
+            ControlFlow::Continue(())
+        } else {
+            ControlFlow::Break(())
+        }
     }
 }
 
@@ -167,7 +173,8 @@ struct TallyState {
     next: Duration,
 }
 
-/// The first line comes after this, each next one after twice the time that passed, at most [`LINE_EVERY`] later.
+/// The first line comes after this, each next one after twice the time that passed, at most
+/// [`LINE_EVERY`] later.
 const FIRST_LINE: Duration = Duration::from_millis(200);
 /// The longest time between two lines.
 const LINE_EVERY: Duration = Duration::from_secs(60);
@@ -202,7 +209,8 @@ impl<'a> Tally<'a> {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         state.finished += 1;
         state.failed += u64::from(failed);
-        let failures = if state.failed > 0 { format!(", {} failed", state.failed) } else { String::new() };
+        let failures =
+            if state.failed > 0 { format!(", {} failed", state.failed) } else { String::new() };
         if let Some(bar) = &self.bar {
             bar.set_position(state.finished);
             bar.set_message(failures);
@@ -212,8 +220,13 @@ impl<'a> Tally<'a> {
         if spent >= state.next && state.finished < self.total {
             state.next = (2 * spent).min(spent + LINE_EVERY);
             let left = spent.mul_f64((self.total - state.finished) as f64 / state.finished as f64);
-            let line =
-                format!("{} of {} {}{failures}, about {} left", state.finished, self.total, self.unit, human(left));
+            let line = format!(
+                "{} of {} {}{failures}, about {} left",
+                state.finished,
+                self.total,
+                self.unit,
+                human(left)
+            );
             self.progress.line(&line);
         }
     }
@@ -237,7 +250,11 @@ struct Silent<'a>(&'a Progress);
 
 impl Monitor for Silent<'_> {
     fn reached(&self, _: f64) -> ControlFlow<()> {
-        if self.0.asked_to_stop().is_none() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        if self.0.asked_to_stop().is_none() {
+            ControlFlow::Continue(())
+        } else {
+            ControlFlow::Break(())
+        }
     }
 }
 

@@ -10,14 +10,20 @@ use crate::job::sweep::Rows;
 use crate::record::Journal;
 use crate::record::files::write;
 
-/// Computes every row of these CSV files (name, content) anew and compares it with the committed one. What was computed is kept in
-/// `folder` under the same names, with a journal until a file is whole, from which the next call goes on.
+/// Computes every row of these CSV files (name, content) anew and compares it with the committed
+/// one. What was computed is kept in `folder` under the same names, with a journal until a file is
+/// whole, from which the next call goes on.
 ///
 /// # Errors
 ///
 /// [`CliError::Differs`] if a row comes out otherwise, with how many and the first;
 /// [`CliError::Stopped`] if the user asked to stop; if a file cannot be read or written.
-pub fn recompute(data: &[(&str, &[u8])], folder: &Path, threads: usize, progress: &Progress) -> Result<(), CliError> {
+pub fn recompute(
+    data: &[(&str, &[u8])],
+    folder: &Path,
+    threads: usize,
+    progress: &Progress,
+) -> Result<(), CliError> {
     let mut otherwise = Vec::new();
     for (name, bytes) in data {
         let unusable = |e: &dyn std::fmt::Display| CliError::Usage(format!("{name}: {e}"));
@@ -33,16 +39,21 @@ pub fn recompute(data: &[(&str, &[u8])], folder: &Path, threads: usize, progress
             let old = Rows::from_journal(&lines).map_err(|e| unusable(&e))?;
             if old.numerics().any(|n| n != NUMERICS) {
                 let path = journal_of(&file);
-                return Err(unusable(&format!("{} is from another version of the program; remove it", path.display())));
+                return Err(unusable(&format!(
+                    "{} is from another version of the program; remove it",
+                    path.display()
+                )));
             }
             rows.merge(old).map_err(|e| unusable(&e))?;
         }
-        let pending: Vec<u64> = committed.iter().map(|row| row.number()).filter(|n| rows.get(*n).is_none()).collect();
+        let pending: Vec<u64> =
+            committed.iter().map(|row| row.number()).filter(|n| rows.get(*n).is_none()).collect();
         progress.line(&format!("{name}: {} of {} rows to compute", pending.len(), committed.len()));
         let rows = compute(rows, Pending::these(pending), Some(&mut journal), threads, progress)?;
         if let (Some(exit), true) = (progress.asked_to_stop(), rows.len() < committed.len()) {
             let said = format!(
-                "interrupted: {} of {} rows of {name} are finished and kept in {}; the same command goes on with them",
+                "interrupted: {} of {} rows of {name} are finished and kept in {}; the same \
+                    command goes on with them",
                 rows.len(),
                 committed.len(),
                 journal_of(&file).display()

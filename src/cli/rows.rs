@@ -11,7 +11,8 @@ use super::{CliError, in_pool};
 use crate::job::sweep::{Row, Rows, Shard};
 use crate::record::Journal;
 
-/// Fewest and most rows that a thread takes at once for its lanes, of which there are eight to thirty-two: the last of many rows leave few lanes empty for long.
+/// Fewest and most rows that a thread takes at once for its lanes, of which there are eight to
+/// thirty-two: the last of many rows leave few lanes empty for long.
 const LEAST: usize = 16;
 const MOST: usize = 192;
 
@@ -99,8 +100,9 @@ pub fn compute(
     };
     in_pool(threads, || {
         let threads = rayon::current_num_threads();
-        // Rows are taken in order, so that what is finished at any moment is a fair part of the whole: those that may share lanes a few at a time, and
-        // fewer towards the end, lest one thread be left with many.
+        // Rows are taken in order, so that what is finished at any moment is a fair part of the
+        // whole: those that may share lanes a few at a time, and fewer towards the end, lest one
+        // thread be left with many.
         let some = || {
             let mut next = next.lock().unwrap_or_else(PoisonError::into_inner);
             let share = usize::try_from(next.left).unwrap_or(usize::MAX) / (2 * threads);

@@ -23,10 +23,13 @@ pub fn print(text: &str) -> Result<(), CliError> {
 pub fn print_json<T: serde::Serialize>(value: &T) -> Result<(), CliError> {
     let text = serde_json::to_string_pretty(value)
         .expect("what is printed is plain data: string keys, no failing serialisers");
-    // In JSON controls stand only in strings. Those below a space are escaped already, the others may be.
+    // In JSON controls stand only in strings. Those below a space are escaped already, the others
+    // may be.
     let escaped: String = text
         .chars()
-        .map(|c| if steers(c) && c != '\n' { format!("\\u{:04x}", u32::from(c)) } else { c.to_string() })
+        .map(|c| {
+            if steers(c) && c != '\n' { format!("\\u{:04x}", u32::from(c)) } else { c.to_string() }
+        })
         .collect();
     print_bytes(format!("{escaped}\n").as_bytes())
 }
@@ -97,7 +100,8 @@ pub fn harmless(text: &str) -> String {
 }
 
 fn steers(c: char) -> bool {
-    c.is_control() || matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    c.is_control()
+        || matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
 #[cfg(test)]

@@ -8,7 +8,8 @@ use crate::system;
 
 /// Mirrors an enum of another crate: same variants, documented for `--help`.
 macro_rules! mirror {
-    ($(#[$meta:meta])* $name:ident = $other:path { $($(#[doc = $doc:literal])* $variant:ident,)* }) => {
+    ($(#[$meta:meta])* $name:ident = $other:path { $($(#[doc =
+        $doc:literal])* $variant:ident,)* }) => {
         $(#[$meta])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
         pub enum $name {
@@ -25,7 +26,8 @@ macro_rules! mirror {
         }
 
         impl $name {
-            /// The word for a value. It is here so that a variant added elsewhere and forgotten here does not compile.
+            /// The word for a value. It is here so that a variant added elsewhere and forgotten
+            /// here does not compile.
             pub fn of(value: $other) -> Self {
                 use $other as Other;
                 match value {
@@ -49,7 +51,8 @@ mirror! {
         Taylor,
         /// The same in double-double arithmetic, about 32 digits.
         TaylorExtended,
-        /// Taylor series outside the layer, its own variable inside: smoothed systems that are polynomials outside.
+        /// Taylor series outside the layer, its own variable inside: smoothed systems that are
+        /// polynomials outside.
         Layered,
     }
 }
@@ -156,7 +159,10 @@ mod tests {
             assert_eq!(word.to_possible_value().unwrap().get_name(), method.name());
         }
         for reading in paper::Reading::ALL {
-            assert_eq!(Reading::of(reading).to_possible_value().unwrap().get_name(), reading.word());
+            assert_eq!(
+                Reading::of(reading).to_possible_value().unwrap().get_name(),
+                reading.word()
+            );
         }
     }
 }

@@ -83,7 +83,8 @@ struct OddsFile {
     /// Of the random numbers [default: 2013].
     #[serde(default = "seed")]
     seed: u64,
-    /// The share of runs in which the check has to hold, at the lower end of its 95 % interval; without it the run of the file alone decides.
+    /// The share of runs in which the check has to hold, at the lower end of its 95 % interval;
+    /// without it the run of the file alone decides.
     at_least: Option<f64>,
 }
 
@@ -140,7 +141,8 @@ enum Take {
 enum Check {
     /// A number is the paper's.
     Value { read: Read, equals: f64, within: f64 },
-    /// A number of one answer over that of another one is the paper's: an exponent, from two values of a parameter.
+    /// A number of one answer over that of another one is the paper's: an exponent, from two values
+    /// of a parameter.
     Ratio { read: Read, other: Read, equals: f64, within: f64 },
     /// A number is less or greater than another one, or than another answer's.
     Order { read: Read, less: bool, than: Option<f64>, other: Option<Read> },
@@ -213,8 +215,14 @@ impl Claim {
         let Some((kind, takes)) = KINDS.iter().find(|(kind, _)| kind == c.check.get_ref()) else {
             let kinds = KINDS.map(|(kind, _)| kind);
             let help = nearest(c.check.get_ref(), &kinds)
-                .map_or(format!("there are {}", kinds.join(", ")), |near| format!("did you mean `{near}`?"));
-            return Err(wrong(c.check.span(), format!("there is no check `{}`", c.check.get_ref()), help));
+                .map_or(format!("there are {}", kinds.join(", ")), |near| {
+                    format!("did you mean `{near}`?")
+                });
+            return Err(wrong(
+                c.check.span(),
+                format!("there is no check `{}`", c.check.get_ref()),
+                help,
+            ));
         };
         let given = [
             ("read", c.read.as_ref().map(Spanned::span)),
@@ -232,7 +240,9 @@ impl Claim {
             ("at", c.at.as_ref().map(Spanned::span)),
             ("and", c.and.as_ref().map(Spanned::span)),
         ];
-        if let Some((key, Some(at))) = given.iter().find(|(key, at)| at.is_some() && !takes.contains(key)) {
+        if let Some((key, Some(at))) =
+            given.iter().find(|(key, at)| at.is_some() && !takes.contains(key))
+        {
             return Err(wrong(
                 at.clone(),
                 format!("`{key}` has no effect on a check of {kind}"),
@@ -241,15 +251,21 @@ impl Claim {
         }
         known(&c.of)?;
         c.and.as_ref().map_or(Ok(()), known)?;
-        let missing = |what: &str| wrong(place.clone(), format!("a check of {kind} needs {what}"), String::new());
+        let missing = |what: &str| {
+            wrong(place.clone(), format!("a check of {kind} needs {what}"), String::new())
+        };
         let number = |value: &Option<Spanned<f64>>, what: &str| match value {
             Some(v) if v.get_ref().is_finite() => Ok(*v.get_ref()),
-            Some(v) => Err(wrong(v.span(), format!("{what} is not a finite number"), String::new())),
+            Some(v) => {
+                Err(wrong(v.span(), format!("{what} is not a finite number"), String::new()))
+            }
             None => Err(missing(what)),
         };
         let tolerance = |default: Option<f64>| match (&c.within, default) {
             (Some(v), _) if v.get_ref().is_finite() && *v.get_ref() >= 0.0 => Ok(*v.get_ref()),
-            (Some(v), _) => Err(wrong(v.span(), "`within` is a finite number, 0 or more".into(), String::new())),
+            (Some(v), _) => {
+                Err(wrong(v.span(), "`within` is a finite number, 0 or more".into(), String::new()))
+            }
             (None, Some(default)) => Ok(default),
             (None, None) => Err(missing("`within`, the largest difference that still agrees")),
         };
@@ -268,7 +284,12 @@ impl Claim {
                     Some(path) => Read::Fact { path: path.get_ref().clone(), modulus: false },
                     None => read.clone(),
                 };
-                Check::Ratio { read, other, equals: number(&c.equals, "`equals`")?, within: tolerance(None)? }
+                Check::Ratio {
+                    read,
+                    other,
+                    equals: number(&c.equals, "`equals`")?,
+                    within: tolerance(None)?,
+                }
             }
             "order" => {
                 let less = match c.relation.as_ref().map(|r| (r.get_ref().as_str(), r.span())) {
@@ -282,10 +303,16 @@ impl Claim {
                 };
                 let read = reading(origin, &place, &c)?;
                 let other = match (&c.and, &c.and_read, &c.than) {
-                    (Some(_), Some(path), None) => Some(Read::Fact { path: path.get_ref().clone(), modulus: false }),
+                    (Some(_), Some(path), None) => {
+                        Some(Read::Fact { path: path.get_ref().clone(), modulus: false })
+                    }
                     (Some(_), None, None) => Some(read.clone()),
                     (None, None, Some(_)) => None,
-                    _ => return Err(missing("`than`, a number, or `and`, another panel or measure")),
+                    _ => {
+                        return Err(missing(
+                            "`than`, a number, or `and`, another panel or measure",
+                        ));
+                    }
                 };
                 let than = if other.is_none() { Some(number(&c.than, "`than`")?) } else { None };
                 Check::Order { read, less, than, other }
@@ -294,7 +321,11 @@ impl Claim {
                 is: match &c.is {
                     Some(n) if (1..=LONGEST as u64).contains(n.get_ref()) => *n.get_ref(),
                     Some(n) => {
-                        return Err(wrong(n.span(), format!("a period is 1 to {LONGEST} crossings"), String::new()));
+                        return Err(wrong(
+                            n.span(),
+                            format!("a period is 1 to {LONGEST} crossings"),
+                            String::new(),
+                        ));
                     }
                     None => return Err(missing("`is`, the number of crossings")),
                 },
@@ -309,7 +340,12 @@ impl Claim {
                 Check::Attractors { same: *same.get_ref(), within: tolerance(Some(ALIKE))? }
             }
             _ => Check::Bifurcation {
-                kind: c.kind.as_ref().ok_or_else(|| missing("`kind`, such as period-doubling"))?.get_ref().clone(),
+                kind: c
+                    .kind
+                    .as_ref()
+                    .ok_or_else(|| missing("`kind`, such as period-doubling"))?
+                    .get_ref()
+                    .clone(),
                 at: number(&c.at, "`at`")?,
                 within: tolerance(None)?,
             },
@@ -318,13 +354,16 @@ impl Claim {
             let OddsFile { starts, spread, at_least, .. } = odds.get_ref();
             let share = at_least.is_none_or(|s| s > 0.0 && s < 1.0);
             if !((1..=1_000_000).contains(starts) && spread.is_finite() && *spread > 0.0 && share) {
-                let why = "odds have 1 to 1000000 starts, a spread above 0, and at-least between 0 and 1".to_owned();
+                let why =
+                    "odds have 1 to 1000000 starts, a spread above 0, and at-least between 0 and 1"
+                        .to_owned();
                 return Err(wrong(odds.span(), why, String::new()));
             }
         }
         let odds = c.odds.map(Spanned::into_inner);
         let rule = Hash::of_json(&json!({
-            "check": check, "odds": odds, "of": c.of.get_ref(), "and": c.and.as_ref().map(Spanned::get_ref),
+            "check": check, "odds": odds, "of": c.of.get_ref(),
+                "and": c.and.as_ref().map(Spanned::get_ref),
         }));
         Ok(Self {
             id: c.id.into_inner(),
@@ -364,14 +403,16 @@ impl Claim {
     /// # Errors
     /// If a repeated run cannot be asked for.
     pub fn questions(&self, folder: &Folder) -> Result<Vec<AnyQuestion>, FolderError> {
-        let mut all: Vec<AnyQuestion> = self.reads().map(|name| folder.sources[name].question.clone()).collect();
+        let mut all: Vec<AnyQuestion> =
+            self.reads().map(|name| folder.sources[name].question.clone()).collect();
         for repeated in self.repeated(folder)? {
             all.extend(repeated);
         }
         Ok(all)
     }
 
-    /// The questions of each repetition: those of the sources from starts that are moved by the same numbers.
+    /// The questions of each repetition: those of the sources from starts that are moved by the
+    /// same numbers.
     fn repeated(&self, folder: &Folder) -> Result<Vec<Vec<AnyQuestion>>, FolderError> {
         let Some(odds) = &self.odds else { return Ok(Vec::new()) };
         let sources: Vec<&Source> = self.reads().map(|name| &folder.sources[name]).collect();
@@ -380,7 +421,8 @@ impl Claim {
         for stream in 0..odds.starts {
             let mut random = RandomStream::new(odds.seed, stream);
             let longest = starts.iter().map(Vec::len).max().unwrap_or(0);
-            let moves: Vec<f64> = (0..longest).map(|_| random.uniform_in(-odds.spread, odds.spread)).collect();
+            let moves: Vec<f64> =
+                (0..longest).map(|_| random.uniform_in(-odds.spread, odds.spread)).collect();
             let asked = sources.iter().zip(&starts).map(|(source, start)| {
                 let moved: Vec<f64> = start.iter().zip(&moves).map(|(x, d)| x + d).collect();
                 source.said.from_start(&moved).question(source.ask, &folder.root)
@@ -396,12 +438,17 @@ impl Claim {
     /// If an answer could not be computed, or has nothing of what is read.
     pub fn judge(&self, folder: &Folder, executor: &Executor<'_>) -> Result<Verdict, JobError> {
         let ask = |questions: &[AnyQuestion]| {
-            questions.iter().map(|q| executor.ask(&**q)).collect::<Result<Vec<Arc<Answer>>, JobError>>()
+            questions
+                .iter()
+                .map(|q| executor.ask(&**q))
+                .collect::<Result<Vec<Arc<Answer>>, JobError>>()
         };
-        let own: Vec<AnyQuestion> = self.reads().map(|name| folder.sources[name].question.clone()).collect();
+        let own: Vec<AnyQuestion> =
+            self.reads().map(|name| folder.sources[name].question.clone()).collect();
         let answers = ask(&own)?;
         let (mut agrees, mut found) = self.check.of(&answers).map_err(JobError::Other)?;
-        let mut hashes: Vec<String> = answers.iter().map(|a| a.hash().as_str().to_owned()).collect();
+        let mut hashes: Vec<String> =
+            answers.iter().map(|a| a.hash().as_str().to_owned()).collect();
         let mut odds = None;
         if let Some(rule) = &self.odds {
             let mut hits = 0;
@@ -412,7 +459,12 @@ impl Claim {
                 executor.forget();
             }
             let [low, high] = wilson(hits, rule.starts, 0.95);
-            found += &format!("; so in {hits} of {} runs ({:.0} to {:.0} %)", rule.starts, 100.0 * low, 100.0 * high);
+            found += &format!(
+                "; so in {hits} of {} runs ({:.0} to {:.0} %)",
+                rule.starts,
+                100.0 * low,
+                100.0 * high
+            );
             if let Some(least) = rule.at_least {
                 agrees = low >= least;
             }
@@ -434,23 +486,33 @@ impl Claim {
 /// Where a source's run begins.
 fn start(source: &Source) -> Result<Vec<f64>, FolderError> {
     let json = source.question.json();
-    let numbers = json["start"].as_array().map(|list| list.iter().filter_map(Value::as_f64).collect::<Vec<_>>());
+    let numbers = json["start"]
+        .as_array()
+        .map(|list| list.iter().filter_map(Value::as_f64).collect::<Vec<_>>());
     match numbers {
         Some(start) if !start.is_empty() && source.ask != Ask::Rests => Ok(start),
-        _ => Err(source.said.complain("odds move the start of a run, and this has none; give start")),
+        _ => {
+            Err(source.said.complain("odds move the start of a run, and this has none; give start"))
+        }
     }
 }
 
 /// What a claim reads of its first source.
 fn reading(origin: &Origin, place: &Range<usize>, c: &ClaimFile) -> Result<Read, FolderError> {
-    let wrong = |at: Range<usize>, why: String, help: &str| FolderError::at(origin, at, why, Some(help.to_owned()));
+    let wrong = |at: Range<usize>, why: String, help: &str| {
+        FolderError::at(origin, at, why, Some(help.to_owned()))
+    };
     match (&c.read, &c.column) {
         (Some(path), None) => {
             let modulus = match c.take.as_ref().map(|t| (t.get_ref().as_str(), t.span())) {
                 None => false,
                 Some(("modulus", _)) => true,
                 Some((other, at)) => {
-                    return Err(wrong(at, format!("`{other}` is taken of a column"), "give modulus, or leave it out"));
+                    return Err(wrong(
+                        at,
+                        format!("`{other}` is taken of a column"),
+                        "give modulus, or leave it out",
+                    ));
                 }
             };
             if let Some(table) = &c.table {
@@ -500,37 +562,44 @@ impl Read {
                 let mut parts = path.split('/');
                 let name = parts.next().unwrap_or_default();
                 let known = || answer.facts.keys().cloned().collect::<Vec<_>>().join(", ");
-                let mut at = answer
-                    .facts
-                    .get(name)
-                    .ok_or_else(|| format!("the answer has no fact \"{name}\"; it has {}", known()))?;
+                let mut at = answer.facts.get(name).ok_or_else(|| {
+                    format!("the answer has no fact \"{name}\"; it has {}", known())
+                })?;
                 for part in parts {
                     let inner = match at {
                         Value::Array(list) => part.parse::<usize>().ok().and_then(|i| list.get(i)),
                         Value::Object(map) => map.get(part),
                         _ => None,
                     };
-                    at = inner.ok_or_else(|| format!("\"{path}\": there is no \"{part}\" in {at}"))?;
+                    at = inner
+                        .ok_or_else(|| format!("\"{path}\": there is no \"{part}\" in {at}"))?;
                 }
                 let number = |v: &Value| v.as_f64();
                 match (at, modulus) {
-                    (Value::Array(pair), true) if pair.len() == 2 => match (number(&pair[0]), number(&pair[1])) {
-                        (Some(re), Some(im)) => Ok((re * re + im * im).sqrt()),
-                        _ => Err(format!("\"{path}\" is {at}, which is no complex number")),
-                    },
-                    (value, false) if number(value).is_some() => Ok(number(value).unwrap_or(f64::NAN)),
+                    (Value::Array(pair), true) if pair.len() == 2 => {
+                        match (number(&pair[0]), number(&pair[1])) {
+                            (Some(re), Some(im)) => Ok((re * re + im * im).sqrt()),
+                            _ => Err(format!("\"{path}\" is {at}, which is no complex number")),
+                        }
+                    }
+                    (value, false) if number(value).is_some() => {
+                        Ok(number(value).unwrap_or(f64::NAN))
+                    }
                     _ => Err(format!("\"{path}\" is {at}, which is no number")),
                 }
             }
             Read::Column { table, column, take } => {
                 let table = match table {
-                    Some(name) => answer.table(name).ok_or_else(|| format!("the answer has no table \"{name}\""))?,
+                    Some(name) => answer
+                        .table(name)
+                        .ok_or_else(|| format!("the answer has no table \"{name}\""))?,
                     None => answer.tables.first().ok_or("the answer has no table")?,
                 };
                 let values = crate::paper::plots::column(table, column)?;
                 let sum = || values.iter().sum::<f64>() / values.len() as f64;
-                let (low, high) =
-                    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
+                let (low, high) = values
+                    .iter()
+                    .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
                 if values.is_empty() && *take != Take::Count {
                     return Err(format!("column \"{column}\" has no rows"));
                 }
@@ -556,7 +625,10 @@ impl Check {
             Check::Value { read, equals, within } => {
                 let found = read.of(first)?;
                 let off = (found - equals).abs();
-                Ok((off <= *within, format!("{} ({equals} in the paper, {} off)", short(found), short(off))))
+                Ok((
+                    off <= *within,
+                    format!("{} ({equals} in the paper, {} off)", short(found), short(off)),
+                ))
             }
             Check::Ratio { read, other, equals, within } => {
                 let (over, under) = (read.of(first)?, other.of(answers.last().unwrap_or(first))?);
@@ -591,7 +663,10 @@ impl Check {
             }
             Check::Chaos => {
                 let (value, half) = largest_exponent(first)?;
-                Ok((value - half > 0.0, format!("largest exponent {} ± {}", short(value), short(half))))
+                Ok((
+                    value - half > 0.0,
+                    format!("largest exponent {} ± {}", short(value), short(half)),
+                ))
             }
             Check::Attractors { same, within } => {
                 let (a, b) = (section(first)?, section(answers.last().unwrap_or(first))?);
@@ -601,20 +676,26 @@ impl Check {
                 Ok((alike == *same, format!("{word}: {} of their extent apart", short(distance))))
             }
             Check::Bifurcation { kind, at, within } => {
-                let table = first.table("bifurcations").ok_or("the measure follows no branch; give along")?;
+                let table = first
+                    .table("bifurcations")
+                    .ok_or("the measure follows no branch; give along")?;
                 let parameter = &table.columns[1].name;
                 let values = table.numbers(parameter);
                 let mut near: Option<f64> = None;
                 for (word, value) in table.words("change").zip(values) {
-                    if word == kind && near.is_none_or(|old| (value - at).abs() < (old - at).abs()) {
+                    if word == kind && near.is_none_or(|old| (value - at).abs() < (old - at).abs())
+                    {
                         near = Some(*value);
                     }
                 }
                 Ok(match near {
                     Some(value) => {
                         let off = (value - at).abs();
-                        let said =
-                            format!("{kind} at {parameter} = {} ({at} in the paper, {} off)", short(value), short(off));
+                        let said = format!(
+                            "{kind} at {parameter} = {} ({at} in the paper, {} off)",
+                            short(value),
+                            short(off)
+                        );
                         (off <= *within, said)
                     }
                     None => (false, format!("no {kind} on the branch")),
@@ -628,7 +709,9 @@ impl Check {
 fn short(value: f64) -> String {
     let text = format!("{value:.6e}");
     match text.parse::<f64>() {
-        Ok(rounded) if rounded == 0.0 || (1e-4..1e6).contains(&rounded.abs()) => format!("{rounded}"),
+        Ok(rounded) if rounded == 0.0 || (1e-4..1e6).contains(&rounded.abs()) => {
+            format!("{rounded}")
+        }
         Ok(rounded) => format!("{rounded:e}"),
         Err(_) => text,
     }
@@ -646,18 +729,27 @@ fn largest_exponent(answer: &Answer) -> Result<(f64, f64), String> {
     Ok((value, half))
 }
 
-/// The later half of a section's crossings, by rows, one direction of crossing alone if the section knows it.
+/// The later half of a section's crossings, by rows, one direction of crossing alone if the section
+/// knows it.
 fn section(answer: &Answer) -> Result<Vec<Vec<f64>>, String> {
-    let table = answer.table("section").ok_or("the run has no section; give section, such as section = \"y=0\"")?;
+    let table = answer
+        .table("section")
+        .ok_or("the run has no section; give section, such as section = \"y=0\"")?;
     let t = table.numbers("t");
-    let (Some(first), Some(last)) = (t.first(), t.last()) else { return Err("the section was never crossed".into()) };
+    let (Some(first), Some(last)) = (t.first(), t.last()) else {
+        return Err("the section was never crossed".into());
+    };
     let half = 0.5 * (first + last);
     let columns: Vec<&[f64]> = states(table);
     let directions: Vec<&str> = table.words("direction").collect();
     let wanted = directions.first().copied();
     let rows = (0..t.len()).filter(|i| t[*i] > half && directions.get(*i).copied() == wanted);
     let found: Vec<Vec<f64>> = rows.map(|i| columns.iter().map(|c| c[i]).collect()).collect();
-    if found.is_empty() { Err("the section was never crossed in the later half".into()) } else { Ok(found) }
+    if found.is_empty() {
+        Err("the section was never crossed in the later half".into())
+    } else {
+        Ok(found)
+    }
 }
 
 fn states(table: &Table) -> Vec<&[f64]> {
@@ -668,12 +760,14 @@ fn states(table: &Table) -> Vec<&[f64]> {
 /// The largest extent of points along a state.
 fn extent(points: &[Vec<f64>]) -> f64 {
     let along = |i: usize| {
-        let (low, high) =
-            points.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(p[i]), b.max(p[i])));
+        let (low, high) = points
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(p[i]), b.max(p[i])));
         (high - low, high.abs().max(low.abs()))
     };
-    let (span, size) =
-        (0..points[0].len()).map(along).fold((0.0, 0.0), |(a, b), (c, d)| (f64::max(a, c), f64::max(b, d)));
+    let (span, size) = (0..points[0].len())
+        .map(along)
+        .fold((0.0, 0.0), |(a, b), (c, d)| (f64::max(a, c), f64::max(b, d)));
     // One point: its own size.
     if span > 1e-9 * size { span } else { size.max(f64::MIN_POSITIVE) }
 }
@@ -686,7 +780,8 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
 fn period(points: &[Vec<f64>], within: f64) -> Option<usize> {
     let near = within * extent(points);
     // At least three times around.
-    (1..=LONGEST.min(points.len() / 3)).find(|n| points.iter().zip(&points[*n..]).all(|(a, b)| distance(a, b) <= near))
+    (1..=LONGEST.min(points.len() / 3))
+        .find(|n| points.iter().zip(&points[*n..]).all(|(a, b)| distance(a, b) <= near))
 }
 
 /// How far two sets of points lie apart (Hausdorff's distance), relative to their extent.
@@ -700,7 +795,9 @@ fn apart(a: &[Vec<f64>], b: &[Vec<f64>]) -> Result<f64, String> {
     };
     let (a, b) = (thin(a), thin(b));
     let one_way = |from: &[Vec<f64>], to: &[Vec<f64>]| {
-        from.iter().map(|p| to.iter().map(|q| distance(p, q)).fold(f64::INFINITY, f64::min)).fold(0.0, f64::max)
+        from.iter()
+            .map(|p| to.iter().map(|q| distance(p, q)).fold(f64::INFINITY, f64::min))
+            .fold(0.0, f64::max)
     };
     let both: Vec<Vec<f64>> = a.iter().chain(&b).cloned().collect();
     Ok(one_way(&a, &b).max(one_way(&b, &a)) / extent(&both))
@@ -743,14 +840,18 @@ mod tests {
         for v in [3.0, 1.0, 2.0] {
             table.push(vec![crate::job::Entry::Number(v)]);
         }
-        let answer = Answer::of_tables(vec![table]).with_fact("multipliers", &[[3.0, 4.0], [0.5, 0.0]]);
+        let answer =
+            Answer::of_tables(vec![table]).with_fact("multipliers", &[[3.0, 4.0], [0.5, 0.0]]);
         let fact = |path: &str, modulus| Read::Fact { path: path.into(), modulus }.of(&answer);
         assert_eq!(fact("multipliers/1/0", false), Ok(0.5));
         assert_eq!(fact("multipliers/0", true), Ok(5.0));
         assert!(fact("multiplier", false).unwrap_err().contains("it has multipliers"));
         assert!(fact("multipliers/7/0", false).unwrap_err().contains("no \"7\""));
-        let column = |take| Read::Column { table: None, column: "p".into(), take }.of(&answer).unwrap();
-        let found = [Take::Last, Take::First, Take::Max, Take::Min, Take::Mean, Take::Span, Take::Count].map(column);
+        let column =
+            |take| Read::Column { table: None, column: "p".into(), take }.of(&answer).unwrap();
+        let found =
+            [Take::Last, Take::First, Take::Max, Take::Min, Take::Mean, Take::Span, Take::Count]
+                .map(column);
         assert_eq!(found, [2.0, 3.0, 3.0, 1.0, 2.0, 2.0, 3.0]);
     }
 }

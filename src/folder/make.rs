@@ -83,7 +83,9 @@ impl Finding {
             State::Differs { what } => format!("{name}: DIFFERS in its {what}"),
             State::New => format!("{name}: NEW: nothing is expected of it yet"),
             State::Failed { why } => format!("{name}: FAILED: {why}"),
-            State::Gone => format!("{name}: GONE: it is expected, and the folder has no such picture or claim"),
+            State::Gone => {
+                format!("{name}: GONE: it is expected, and the folder has no such picture or claim")
+            }
         }
     }
 }
@@ -98,11 +100,12 @@ impl Folder {
         self.root.join("expected")
     }
 
-    /// Makes every figure and scores every claim: all questions side by side, each once. Answers that the executor's store keeps are not
-    /// computed again.
+    /// Makes every figure and scores every claim: all questions side by side, each once. Answers
+    /// that the executor's store keeps are not computed again.
     ///
     /// # Errors
-    /// If a figure could not be computed, drawn or written, or a repeated run cannot be asked for. A claim that cannot be scored says so in the result.
+    /// If a figure could not be computed, drawn or written, or a repeated run cannot be asked for.
+    /// A claim that cannot be scored says so in the result.
     pub fn make(&self, executor: &Executor<'_>) -> Result<Made<'_>, CliError> {
         try_folder(&self.out())?;
         let mut asked: Vec<AnyQuestion> = questions(self.figures.iter().flat_map(|f| &f.pictures));
@@ -119,8 +122,9 @@ impl Folder {
                 let verdict = claim.judge(self, executor).map(|mut found| {
                     let known = before.verdicts.iter().find(|v| v.claim == claim.id);
                     // The data were known: was it by this rule that they were first judged?
-                    found.rule_after_data =
-                        known.is_some_and(|v| v.data == found.data && (v.rule != found.rule || v.rule_after_data));
+                    found.rule_after_data = known.is_some_and(|v| {
+                        v.data == found.data && (v.rule != found.rule || v.rule_after_data)
+                    });
                     executor.progress().line(&format!("scored {}", claim.id));
                     found
                 });
@@ -131,7 +135,8 @@ impl Folder {
             })
             .collect();
         let made = Made { pictures, claims };
-        let mut json = serde_json::to_vec_pretty(&made.outcomes()).expect("verdicts are plain data");
+        let mut json =
+            serde_json::to_vec_pretty(&made.outcomes()).expect("verdicts are plain data");
         json.push(b'\n');
         record::write(&self.out().join("claims.json"), &json)?;
         Ok(made)
@@ -145,7 +150,10 @@ impl Folder {
         let path = self.out().join("report.html");
         record::write(&path, page::page(self, made).as_bytes())?;
         record::write(&self.out().join("codecheck.yml"), page::codecheck(self, made).as_bytes())?;
-        record::write(&self.out().join("ro-crate-metadata.json"), &page::crate_metadata(self, made))?;
+        record::write(
+            &self.out().join("ro-crate-metadata.json"),
+            &page::crate_metadata(self, made),
+        )?;
         Ok(path)
     }
 
@@ -164,10 +172,16 @@ impl Folder {
                     None => State::New,
                     Some(old) => match old.first_difference(&picture.hashes) {
                         None => State::Same,
-                        Some(d) if d.panels.is_empty() => State::Differs { what: d.layer.name().to_owned() },
-                        Some(d) => {
-                            State::Differs { what: format!("{} (panel {})", d.layer.name(), record::listed(&d.panels)) }
+                        Some(d) if d.panels.is_empty() => {
+                            State::Differs { what: d.layer.name().to_owned() }
                         }
+                        Some(d) => State::Differs {
+                            what: format!(
+                                "{} (panel {})",
+                                d.layer.name(),
+                                record::listed(&d.panels)
+                            ),
+                        },
                     },
                 };
                 findings.push(Finding { name, state });
@@ -185,13 +199,16 @@ impl Folder {
                 (Err(why), _) => State::Failed { why: why.to_string() },
                 (Ok(_), None) => State::New,
                 (Ok(now), Some(old)) if now.rule != old.rule => {
-                    let known = if now.rule_after_data { ", changed when the data were known" } else { "" };
+                    let known =
+                        if now.rule_after_data { ", changed when the data were known" } else { "" };
                     State::Differs { what: format!("rule{known}") }
                 }
                 (Ok(now), Some(old)) if now.agrees != old.agrees => {
                     State::Differs { what: format!("outcome: {}", now.found) }
                 }
-                (Ok(now), Some(old)) if now.data != old.data => State::Differs { what: "data".into() },
+                (Ok(now), Some(old)) if now.data != old.data => {
+                    State::Differs { what: "data".into() }
+                }
                 _ => State::Same,
             };
             findings.push(Finding { name: claim.id.clone(), state });
@@ -214,7 +231,9 @@ impl Folder {
         if let Some(Finding { name, state: State::Failed { why } }) =
             findings.iter().find(|f| matches!(f.state, State::Failed { .. }))
         {
-            return Err(CliError::Job(JobError::Other(format!("{name}: {why}; what fails is not blessed"))));
+            return Err(CliError::Job(JobError::Other(format!(
+                "{name}: {why}; what fails is not blessed"
+            ))));
         }
         let changed: Vec<String> = findings
             .iter()
@@ -234,15 +253,27 @@ impl Folder {
                 version: VERSION,
                 figure: figure.id.to_string(),
                 made_by: env!("CARGO_PKG_VERSION").to_owned(),
-                pictures: pictures.by_ref().take(figure.pictures.len()).map(|p| p.hashes.clone()).collect(),
+                pictures: pictures
+                    .by_ref()
+                    .take(figure.pictures.len())
+                    .map(|p| p.hashes.clone())
+                    .collect(),
             };
-            record::write(&self.expected().join(format!("{}.json", figure.id)), &manifest.to_json())?;
+            record::write(
+                &self.expected().join(format!("{}.json", figure.id)),
+                &manifest.to_json(),
+            )?;
         }
-        let mut json = serde_json::to_vec_pretty(&made.outcomes()).expect("verdicts are plain data");
+        let mut json =
+            serde_json::to_vec_pretty(&made.outcomes()).expect("verdicts are plain data");
         json.push(b'\n');
         record::write(&self.expected().join("claims.json"), &json)?;
         let log = self.expected().join("CHANGES.md");
-        let mut text = if log.exists() { read_text(&log)? } else { "# Why expectations changed\n\n".to_owned() };
+        let mut text = if log.exists() {
+            read_text(&log)?
+        } else {
+            "# Why expectations changed\n\n".to_owned()
+        };
         text += &format!("- {reason}: {}\n", changed.join(", "));
         record::write(&log, text.as_bytes())?;
         Ok(changed)
@@ -262,8 +293,11 @@ impl Folder {
         if !path.exists() {
             return Ok(Outcomes::default());
         }
-        let wrong = |why: String| CliError::Usage(format!("{}: {why}; bless the paper anew", path.display()));
-        let outcomes: Outcomes = serde_json::from_str(&read_text(&path)?).map_err(|e| wrong(e.to_string()))?;
+        let wrong = |why: String| {
+            CliError::Usage(format!("{}: {why}; bless the paper anew", path.display()))
+        };
+        let outcomes: Outcomes =
+            serde_json::from_str(&read_text(&path)?).map_err(|e| wrong(e.to_string()))?;
         if outcomes.version == 1 {
             Ok(outcomes)
         } else {
@@ -274,7 +308,10 @@ impl Folder {
 
 impl Made<'_> {
     fn outcomes(&self) -> Outcomes {
-        Outcomes { version: 1, verdicts: self.claims.iter().filter_map(|s| s.verdict.as_ref().ok().cloned()).collect() }
+        Outcomes {
+            version: 1,
+            verdicts: self.claims.iter().filter_map(|s| s.verdict.as_ref().ok().cloned()).collect(),
+        }
     }
 
     /// The claims of panels (`says`), and whether they hold.

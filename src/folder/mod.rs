@@ -1,16 +1,18 @@
-//! A paper as a folder: its systems, figures and claims as data, which are made, checked and blessed with `twofold paper`.
+//! A paper as a folder: its systems, figures and claims as data, which are made, checked and
+//! blessed with `twofold paper`.
 //!
 //! ```text
-//! paper.toml       citation, what holds for all runs, readings of the paper's parameters, what it leaves open
+//! paper.toml       citation, defaults of all runs, readings of the parameters, open questions
 //! systems/*.toml   its equations
 //! figures/*.toml   its figures, panel by panel
 //! measures.toml    what its claims rest on beside the figures: orbits, exponents, rests, runs
-//! claims.toml      what it says, each sentence with a check and the day on which its rule was fixed
+//! claims.toml      its claims, each with a check and the day on which its rule was fixed
 //! data/*.csv       numbers read off the paper, drawn over panels
 //! expected/        the hashes and outcomes that were found before
 //! ```
 //!
-//! Questions are written in the words of the command line ([`words`]); `docs/papers.md` has every key.
+//! Questions are written in the words of the command line ([`words`]); `docs/papers.md` has every
+//! key.
 
 pub mod check;
 pub mod make;
@@ -71,7 +73,8 @@ pub struct Folder {
     pub figures: Vec<Figure>,
     /// What in the paper each figure shows, in the same order.
     pub shows: Vec<String>,
-    /// Everything that claims may read, by name: "fig3/a" for a panel, in a reading "fig3/a@printed"; a measure by its own.
+    /// Everything that claims may read, by name: "fig3/a" for a panel, in a reading
+    /// "fig3/a@printed"; a measure by its own.
     pub sources: BTreeMap<String, Source>,
     /// What it says.
     pub claims: Vec<Claim>,
@@ -122,7 +125,8 @@ pub struct About {
     /// Words that hold for every run of a panel.
     #[serde(default)]
     run: Words,
-    /// Readings of its parameters, if it can be read in more than one way: a picture of each figure is made for each.
+    /// Readings of its parameters, if it can be read in more than one way: a picture of each figure
+    /// is made for each.
     #[serde(default)]
     readings: BTreeMap<Spanned<String>, ReadingFile>,
 }
@@ -181,9 +185,11 @@ struct PanelFile {
     /// What a reading changes in the run.
     #[serde(default)]
     r#in: BTreeMap<Spanned<String>, Spanned<Words>>,
-    /// What the paper says of a section or path drawn as `halves` or `surface`; the picture shows the verdict.
+    /// What the paper says of a section or path drawn as `halves` or `surface`; the picture shows
+    /// the verdict.
     says: Option<Spanned<PanelClaim>>,
-    /// Committed runs that repeat it, by study and name; the picture shows the share that supports the claim.
+    /// Committed runs that repeat it, by study and name; the picture shows the share that supports
+    /// the claim.
     repeats: Option<Spanned<String>>,
     /// States on the axes.
     axes: Option<Spanned<Vec<String>>>,
@@ -246,7 +252,8 @@ struct PointsFile {
 struct MeasureFile {
     /// A run, as `twofold run` follows it: the facts of its answer, and its table.
     run: Option<Spanned<Words>>,
-    /// A closed orbit, as `twofold orbit` finds it: period, point, multipliers; with `along` its branch.
+    /// A closed orbit, as `twofold orbit` finds it: period, point, multipliers; with `along` its
+    /// branch.
     orbit: Option<Spanned<Words>>,
     /// Lyapunov exponents, as `twofold lyapunov` computes them.
     lyapunov: Option<Spanned<Words>>,
@@ -290,19 +297,25 @@ impl Files {
     fn names(&self, part: &str) -> Result<Vec<String>, FolderError> {
         let paths: Vec<String> = match self {
             Files::Disk(root) if root.join(part).is_dir() => {
-                let tree = read_tree(&root.join(part), &|path| path.ends_with(".toml") && !path.contains('/'))?;
+                let tree = read_tree(&root.join(part), &|path| {
+                    path.ends_with(".toml") && !path.contains('/')
+                })?;
                 tree.files.into_iter().map(|f| f.path).collect()
             }
             Files::Disk(_) => Vec::new(),
-            Files::Embedded(all) => {
-                all.iter().filter_map(|f| f.0.strip_prefix(part)?.strip_prefix('/').map(str::to_owned)).collect()
-            }
+            Files::Embedded(all) => all
+                .iter()
+                .filter_map(|f| f.0.strip_prefix(part)?.strip_prefix('/').map(str::to_owned))
+                .collect(),
         };
         let mut names = Vec::new();
         for path in paths {
             let name = path.trim_end_matches(".toml").to_owned();
             if !is_plain_name(&name) {
-                let why = format!("{part}/{}: no plain name; use letters, digits, - and _", path.escape_debug());
+                let why = format!(
+                    "{part}/{}: no plain name; use letters, digits, - and _",
+                    path.escape_debug()
+                );
                 return Err(FolderError::Missing(why));
             }
             names.push(name);
@@ -326,7 +339,8 @@ impl Files {
 }
 
 impl Folder {
-    /// Reads a folder, all of it, and checks that every question can be asked and every claim reads something.
+    /// Reads a folder, all of it, and checks that every question can be asked and every claim reads
+    /// something.
     ///
     /// # Errors
     /// What is wrong first, with its file, place and remedy.
@@ -345,13 +359,19 @@ impl Folder {
     fn read_from(root: &Path, files: Files) -> Result<Self, FolderError> {
         let (origin, about): (Origin, About) = files.parsed("paper.toml")?.ok_or_else(|| {
             FolderError::Missing(format!(
-                "{}: there is no paper.toml; name a paper's folder, or make one with twofold paper new",
+                "{}: there is no paper.toml; name a paper's folder, or make one with twofold paper \
+                    new",
                 root.display()
             ))
         })?;
         if *about.format.get_ref() != 1 {
             let why = format!("format {} is not known to this program", about.format.get_ref());
-            return Err(FolderError::at(&origin, about.format.span(), why, Some("write format = 1".into())));
+            return Err(FolderError::at(
+                &origin,
+                about.format.span(),
+                why,
+                Some("write format = 1".into()),
+            ));
         }
         let readings = readings(&origin, &about)?;
         let mut folder = Self {
@@ -374,15 +394,24 @@ impl Folder {
 
     fn read_measures(&mut self) -> Result<(), FolderError> {
         type Measures = BTreeMap<Spanned<String>, Spanned<MeasureFile>>;
-        let Some((origin, measures)) = self.files.parsed::<Measures>("measures.toml")? else { return Ok(()) };
+        let Some((origin, measures)) = self.files.parsed::<Measures>("measures.toml")? else {
+            return Ok(());
+        };
         for (name, measure) in measures {
             plain(&origin, &name, "measure")?;
             let place = measure.span();
             let MeasureFile { run, orbit, lyapunov, rests } = measure.into_inner();
-            let given = [(Ask::Run, run), (Ask::Orbit, orbit), (Ask::Lyapunov, lyapunov), (Ask::Rests, rests)];
-            let mut given: Vec<_> = given.into_iter().filter_map(|(ask, words)| Some((ask, words?))).collect();
+            let given = [
+                (Ask::Run, run),
+                (Ask::Orbit, orbit),
+                (Ask::Lyapunov, lyapunov),
+                (Ask::Rests, rests),
+            ];
+            let mut given: Vec<_> =
+                given.into_iter().filter_map(|(ask, words)| Some((ask, words?))).collect();
             let (Some((ask, words)), true) = (given.pop(), given.is_empty()) else {
-                let why = format!("measure `{}` asks no question, or more than one", name.get_ref());
+                let why =
+                    format!("measure `{}` asks no question, or more than one", name.get_ref());
                 let help = "give it one of run, orbit, lyapunov, rests".to_owned();
                 return Err(FolderError::at(&origin, place, why, Some(help)));
             };
@@ -397,11 +426,21 @@ impl Folder {
         let path = format!("figures/{id}.toml");
         let Some((origin, figure)) = self.files.parsed::<FigureFile>(&path)? else { return Ok(()) };
         if figure.panel.is_empty() {
-            return Err(FolderError::at(&origin, 0..0, "the figure has no panel", Some("add [[panel]]".into())));
+            return Err(FolderError::at(
+                &origin,
+                0..0,
+                "the figure has no panel",
+                Some("add [[panel]]".into()),
+            ));
         }
         let columns = match &figure.columns {
             Some(columns) if !(1..=6).contains(columns.get_ref()) => {
-                return Err(FolderError::at(&origin, columns.span(), "one to six panels stand in a row", None));
+                return Err(FolderError::at(
+                    &origin,
+                    columns.span(),
+                    "one to six panels stand in a row",
+                    None,
+                ));
             }
             Some(columns) => *columns.get_ref(),
             None => figure.panel.len().clamp(1, 3),
@@ -423,7 +462,11 @@ impl Folder {
             let picture = self.picture(&origin, id, &figure, columns, (reading, readings))?;
             pictures.push(picture);
         }
-        self.figures.push(Figure { id: id.to_owned().into(), title: figure.title.into(), pictures });
+        self.figures.push(Figure {
+            id: id.to_owned().into(),
+            title: figure.title.into(),
+            pictures,
+        });
         self.shows.push(figure.shows);
         Ok(())
     }
@@ -451,8 +494,14 @@ impl Folder {
             }
             panel.r#in.keys().try_for_each(|name| known(origin, name, readings))?;
             let Some(draw) = panel.draw.as_ref().or(figure.draw.as_ref()) else {
-                let help = "give draw, such as \"series\", in the panel or for the whole figure".to_owned();
-                return Err(FolderError::at(origin, place, "nothing says how the panel is drawn", Some(help)));
+                let help = "give draw, such as \"series\", in the panel or for the whole figure"
+                    .to_owned();
+                return Err(FolderError::at(
+                    origin,
+                    place,
+                    "nothing says how the panel is drawn",
+                    Some(help),
+                ));
             };
             let drawn = Drawn {
                 draw,
@@ -462,16 +511,24 @@ impl Folder {
             let said = panel.run.as_ref().map(|words| {
                 let mut defaults = vec![&self.about.run];
                 defaults.extend(&reading.words);
-                let over = panel.r#in.iter().find(|(name, _)| *name.get_ref() == reading.name).map(|(_, words)| words);
-                Said::new(origin, words, &self.common, &defaults).and_then(|said| said.over(over.map(Spanned::get_ref)))
+                let over = panel
+                    .r#in
+                    .iter()
+                    .find(|(name, _)| *name.get_ref() == reading.name)
+                    .map(|(_, words)| words);
+                Said::new(origin, words, &self.common, &defaults)
+                    .and_then(|said| said.over(over.map(Spanned::get_ref)))
             });
             let said = said.transpose()?;
             let question = if let Draw::Halves | Draw::Surface = draw.get_ref() {
                 let (spec, view) = self.spec_and_view(origin, place, said.as_ref(), &drawn)?;
                 let mut shown = FigurePanel::new(label.get_ref(), panel.title.clone(), spec);
                 shown.claim = panel.says.as_ref().map(|c| *c.get_ref());
-                shown.repeats =
-                    panel.repeats.as_ref().map(|name| Self::repeats(origin, name, &reading.name)).transpose()?;
+                shown.repeats = panel
+                    .repeats
+                    .as_ref()
+                    .map(|name| Self::repeats(origin, name, &reading.name))
+                    .transpose()?;
                 let question: AnyQuestion = Recorded::Surfaces(shown.run.clone()).question();
                 panels.push(shown);
                 views.push((view, draw.span()));
@@ -483,7 +540,8 @@ impl Folder {
                 ] {
                     if let Some(at) = at {
                         let why = format!("`{key}` has no effect on a panel drawn in this way");
-                        let help = "draw it as halves or surface, or score it in claims.toml".to_owned();
+                        let help =
+                            "draw it as halves or surface, or score it in claims.toml".to_owned();
                         return Err(FolderError::at(origin, at, why, Some(help)));
                     }
                 }
@@ -493,7 +551,10 @@ impl Folder {
                 question
             };
             if let Some(said) = said {
-                self.sources.insert(format!("{id}/{}{at}", label.get_ref()), Source { said, ask: Ask::Run, question });
+                self.sources.insert(
+                    format!("{id}/{}{at}", label.get_ref()),
+                    Source { said, ask: Ask::Run, question },
+                );
             }
         }
         let mut caption = figure.caption.clone();
@@ -505,21 +566,36 @@ impl Folder {
                 View::Plots(Plots { columns, plots }.into())
             }
             Some((first, _)) => {
-                let other = views.iter().find(|(view, _)| !alike(view, first)).map(|(_, place)| place.clone());
-                if let Some(place) = other.or_else(|| (!plots.is_empty()).then(|| views[0].1.clone())) {
-                    let why = "panels drawn as halves or surface stand in a figure of their own, with the same axes and camera";
+                let other = views
+                    .iter()
+                    .find(|(view, _)| !alike(view, first))
+                    .map(|(_, place)| place.clone());
+                if let Some(place) =
+                    other.or_else(|| (!plots.is_empty()).then(|| views[0].1.clone()))
+                {
+                    let why = "panels drawn as halves or surface stand in a figure of their own, \
+                        with the same axes and camera";
                     return Err(FolderError::at(origin, place, why, None));
                 }
                 if let Some(columns) = &figure.columns {
                     let why = "`columns` has no effect on a figure drawn in this way";
-                    return Err(FolderError::at(origin, columns.span(), why, Some("leave it out".into())));
+                    return Err(FolderError::at(
+                        origin,
+                        columns.span(),
+                        why,
+                        Some("leave it out".into()),
+                    ));
                 }
                 first.clone()
             }
         };
         Ok(Picture {
             name: format!("{id}{suffix}"),
-            reading: if panels.is_empty() { None } else { Reading::ALL.into_iter().find(|r| r.word() == reading.name) },
+            reading: if panels.is_empty() {
+                None
+            } else {
+                Reading::ALL.into_iter().find(|r| r.word() == reading.name)
+            },
             title: figure.title.clone().into(),
             caption,
             view,
@@ -550,26 +626,43 @@ impl Folder {
         let wrong = |at: Range<usize>, why: String| FolderError::at(origin, at, why, None);
         let frame = plot::Frame::from(&spec);
         let given = drawn.axes.map_or(Ok(Vec::new()), |axes| states(origin, axes, &frame))?;
-        let kind = if *drawn.draw.get_ref() == Draw::Halves { PictureKind::Section } else { PictureKind::Space };
-        let axes = plot::axes(&frame, kind, &given).map_err(|e| wrong(drawn.draw.span(), e.to_string()))?;
+        let kind = if *drawn.draw.get_ref() == Draw::Halves {
+            PictureKind::Section
+        } else {
+            PictureKind::Space
+        };
+        let axes = plot::axes(&frame, kind, &given)
+            .map_err(|e| wrong(drawn.draw.span(), e.to_string()))?;
         let view = match (kind, axes.as_slice(), drawn.camera) {
             (PictureKind::Section, _, Some(camera)) => {
                 return Err(wrong(camera.span(), "`camera` has no effect on a section".to_owned()));
             }
-            (PictureKind::Section, &[horizontal, vertical], None) => View::Section { horizontal, vertical },
+            (PictureKind::Section, &[horizontal, vertical], None) => {
+                View::Section { horizontal, vertical }
+            }
             (PictureKind::Section, ..) => {
-                return Err(wrong(drawn.draw.span(), "a section in halves has two axes".to_owned()));
+                return Err(wrong(
+                    drawn.draw.span(),
+                    "a section in halves has two axes".to_owned(),
+                ));
             }
             (_, axes, camera) => {
-                let (azimuth, elevation) = camera.map_or(Ok((-60.0, 18.0)), |c| angles(origin, c))?;
-                View::Space { camera: Camera { axes: [axes[0], axes[1], axes[2]], azimuth, elevation } }
+                let (azimuth, elevation) =
+                    camera.map_or(Ok((-60.0, 18.0)), |c| angles(origin, c))?;
+                View::Space {
+                    camera: Camera { axes: [axes[0], axes[1], axes[2]], azimuth, elevation },
+                }
             }
         };
         Ok((spec, view))
     }
 
     /// The runs that repeat a panel: "STUDY/NAME".
-    fn repeats(origin: &Origin, name: &Spanned<String>, reading: &str) -> Result<Repeats, FolderError> {
+    fn repeats(
+        origin: &Origin,
+        name: &Spanned<String>,
+        reading: &str,
+    ) -> Result<Repeats, FolderError> {
         let found = name.get_ref().split_once('/').and_then(|(study, panel)| {
             let reading = Reading::ALL.into_iter().find(|r| r.word() == reading)?;
             Some(Repeats { panel: panel.to_owned(), reading, count: figures::counts(study)? })
@@ -599,17 +692,24 @@ impl Folder {
         let points = panel.points.as_ref().map(|points| self.points(origin, points)).transpose()?;
         let draw = *drawn.draw.get_ref();
         if draw == Draw::Columns {
-            let idle =
-                [("run", panel.run.as_ref().map(Spanned::span)), ("axes", panel.axes.as_ref().map(Spanned::span))];
+            let idle = [
+                ("run", panel.run.as_ref().map(Spanned::span)),
+                ("axes", panel.axes.as_ref().map(Spanned::span)),
+            ];
             if let Some((key, Some(at))) = idle.into_iter().find(|(_, at)| at.is_some()) {
-                return Err(wrong(at, format!("`{key}` has no effect on draw = \"columns\""), "leave it out"));
+                return Err(wrong(
+                    at,
+                    format!("`{key}` has no effect on draw = \"columns\""),
+                    "leave it out",
+                ));
             }
             let (Some(of), Some(x), false) = (&panel.of, &panel.x, panel.y.is_empty()) else {
                 let help = "give of = \"MEASURE\", x = \"COLUMN\" and y = [\"COLUMN\"]";
                 return Err(wrong(drawn.draw.span(), "columns of which table?".into(), help));
             };
             let names = panel.names.as_ref().map(|n| n.get_ref().clone()).unwrap_or_default();
-            if let Some(given) = panel.names.as_ref().filter(|n| n.get_ref().len() != panel.y.len()) {
+            if let Some(given) = panel.names.as_ref().filter(|n| n.get_ref().len() != panel.y.len())
+            {
                 let why = format!("{} names for {} columns", names.len(), panel.y.len());
                 return Err(wrong(given.span(), why, "give one for each of y"));
             }
@@ -637,10 +737,18 @@ impl Folder {
         ];
         if let Some((key, Some(at))) = idle.into_iter().find(|(_, at)| at.is_some()) {
             let help = if key == "of" { "give run = { ... }" } else { "leave it out" };
-            return Err(wrong(at, format!("`{key}` has an effect on draw = \"columns\" alone"), help));
+            return Err(wrong(
+                at,
+                format!("`{key}` has an effect on draw = \"columns\" alone"),
+                help,
+            ));
         }
         let Some(said) = said else {
-            return Err(wrong(place, "the panel shows no run".into(), "give run = { system = \"...\", ... }"));
+            return Err(wrong(
+                place,
+                "the panel shows no run".into(),
+                "give run = { system = \"...\", ... }",
+            ));
         };
         let recorded = said.recorded(&self.root, Use::Picture)?;
         let frame = recorded.frame();
@@ -663,7 +771,8 @@ impl Folder {
             }
         };
         let look = Look { kind, axes, camera, title: None };
-        plot::axes(&frame, kind, &look.axes).map_err(|e| wrong(drawn.draw.span(), e.to_string(), ""))?;
+        plot::axes(&frame, kind, &look.axes)
+            .map_err(|e| wrong(drawn.draw.span(), e.to_string(), ""))?;
         Ok(Plot {
             label: panel.label.get_ref().clone(),
             title: panel.title.clone(),
@@ -679,8 +788,10 @@ impl Folder {
         if !Path::new(file).components().all(|c| matches!(c, Component::Normal(_))) {
             return Err(wrong(format!("the file `{file}` does not lie in this folder")));
         }
-        let text = self.files.text(file)?.ok_or_else(|| wrong(format!("there is no file `{file}`")))?;
-        let rows = text.lines().map(str::trim).filter(|l| !l.is_empty() && !l.starts_with('#')).skip(1);
+        let text =
+            self.files.text(file)?.ok_or_else(|| wrong(format!("there is no file `{file}`")))?;
+        let rows =
+            text.lines().map(str::trim).filter(|l| !l.is_empty() && !l.starts_with('#')).skip(1);
         let mut found = Vec::new();
         for row in rows {
             let mut numbers = row.split(',').map(|n| n.trim().parse::<f64>());
@@ -698,7 +809,9 @@ impl Folder {
             let known: Vec<&str> = self.sources.keys().map(String::as_str).collect();
             let help = match nearest(name.get_ref(), &known) {
                 Some(near) => format!("did you mean `{near}`?"),
-                None if known.is_empty() => "add a panel to figures/ or a measure to measures.toml".to_owned(),
+                None if known.is_empty() => {
+                    "add a panel to figures/ or a measure to measures.toml".to_owned()
+                }
                 None => format!("there are {}", known.join(", ")),
             };
             let why = format!("there is no panel or measure `{}`", name.get_ref());
@@ -707,7 +820,9 @@ impl Folder {
     }
 
     fn read_claims(&mut self) -> Result<(), FolderError> {
-        let Some((origin, file)) = self.files.parsed::<ClaimsFile>("claims.toml")? else { return Ok(()) };
+        let Some((origin, file)) = self.files.parsed::<ClaimsFile>("claims.toml")? else {
+            return Ok(());
+        };
         let mut known = BTreeSet::new();
         for claim in file.claim {
             plain(&origin, &claim.get_ref().id, "claim")?;
@@ -715,7 +830,8 @@ impl Folder {
                 let why = format!("there are two claims `{}`", claim.get_ref().id.get_ref());
                 return Err(FolderError::at(&origin, claim.get_ref().id.span(), why, None));
             }
-            let claim = Claim::read(&origin, claim, &|name| self.source(&origin, name).map(|_| ()))?;
+            let claim =
+                Claim::read(&origin, claim, &|name| self.source(&origin, name).map(|_| ()))?;
             self.claims.push(claim);
         }
         Ok(())
@@ -743,8 +859,11 @@ fn readings(origin: &Origin, about: &About) -> Result<Vec<Given>, FolderError> {
                 return Err(FolderError::at(origin, extends.span(), why, None));
             };
             if seen.contains(&base.get_ref().as_str()) {
-                let why =
-                    format!("readings extend each other in a circle: {} -> {}", seen.join(" -> "), base.get_ref());
+                let why = format!(
+                    "readings extend each other in a circle: {} -> {}",
+                    seen.join(" -> "),
+                    base.get_ref()
+                );
                 return Err(FolderError::at(
                     origin,
                     extends.span(),
@@ -765,20 +884,27 @@ fn readings(origin: &Origin, about: &About) -> Result<Vec<Given>, FolderError> {
 fn alike(one: &View, other: &View) -> bool {
     match (one, other) {
         (View::Space { camera: a }, View::Space { camera: b }) => a == b,
-        (View::Section { horizontal: x, vertical: y }, View::Section { horizontal: u, vertical: v }) => {
-            (x, y) == (u, v)
-        }
+        (
+            View::Section { horizontal: x, vertical: y },
+            View::Section { horizontal: u, vertical: v },
+        ) => (x, y) == (u, v),
         _ => false,
     }
 }
 
 /// The states that are named.
-fn states(origin: &Origin, given: &Spanned<Vec<String>>, frame: &plot::Frame<'_>) -> Result<Vec<usize>, FolderError> {
+fn states(
+    origin: &Origin,
+    given: &Spanned<Vec<String>>,
+    frame: &plot::Frame<'_>,
+) -> Result<Vec<usize>, FolderError> {
     let names: Vec<&str> = frame.states.iter().map(|s| s.name.as_str()).collect();
     let index = |name: &String| {
         names.iter().position(|n| *n == name.as_str()).ok_or_else(|| {
             let help = nearest(name, &names)
-                .map_or(format!("states are {}", names.join(", ")), |near| format!("did you mean `{near}`?"));
+                .map_or(format!("states are {}", names.join(", ")), |near| {
+                    format!("did you mean `{near}`?")
+                });
             FolderError::at(origin, given.span(), format!("there is no state `{name}`"), Some(help))
         })
     };
@@ -802,7 +928,12 @@ fn known(origin: &Origin, name: &Spanned<String>, readings: &[Given]) -> Result<
         return Ok(());
     }
     let help = nearest(name.get_ref(), &names).map(|near| format!("did you mean `{near}`?"));
-    Err(FolderError::at(origin, name.span(), format!("there is no reading `{}`", name.get_ref()), help))
+    Err(FolderError::at(
+        origin,
+        name.span(),
+        format!("there is no reading `{}`", name.get_ref()),
+        help,
+    ))
 }
 
 /// A name that files, pages and addresses can carry as it is.

@@ -11,10 +11,13 @@ use crate::paper::verdict::PanelVerdict;
 use crate::record::Hash;
 use crate::report::escape;
 
-const STYLE: &str = "body{font:16px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem;color:#1a1a1a;background:#fff}\
+const STYLE: &str = "body{font:16px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem \
+    auto;padding:0 1rem;color:#1a1a1a;background:#fff}\
 h1{font-size:1.6rem;line-height:1.25}h2{font-size:1.2rem;margin-top:2.5rem}img{max-width:100%;height:auto}table{border-collapse:collapse;width:100%}\
-th,td{text-align:left;vertical-align:top;padding:.4rem .6rem;border-bottom:1px solid #ccc}code{overflow-wrap:anywhere}\
-.agrees{color:#00583c;font-weight:600}.differs{color:#9c2f00;font-weight:600}figure{margin:1.5rem 0}small{color:#444}";
+th,td{text-align:left;vertical-align:top;padding:.4rem .6rem;border-bottom:1px solid \
+#ccc}code{overflow-wrap:anywhere}\
+.agrees{color:#00583c;font-weight:600}.differs{color:#9c2f00;font-weight:600}figure{margin:1.5rem \
+0}small{color:#444}";
 
 /// The page.
 pub fn page(folder: &Folder, made: &Made<'_>) -> String {
@@ -26,7 +29,10 @@ pub fn page(folder: &Folder, made: &Made<'_>) -> String {
         let _ = writeln!(out, "{text}");
     };
     put(format!(
-        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width\">\n<title>{}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<main>",
+        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta \
+            name=\"viewport\" \
+            content=\"width=device-width\">\n<title>{}</title>\n<style>{STYLE}</style>\n</head>\n\
+            <body>\n<main>",
         escape(&about.title)
     ));
     put(format!("<h1>{}</h1>", escape(&about.title)));
@@ -34,7 +40,10 @@ pub fn page(folder: &Folder, made: &Made<'_>) -> String {
     put(format!("<p>{}</p>", escape(&about.summary)));
     put(format!("<p>{holds} of {all} claims agree with what was computed.</p>"));
     if !made.claims.is_empty() || made.panels().next().is_some() {
-        put("<h2>Claims</h2>\n<table>\n<thead><tr><th scope=\"col\">where</th><th scope=\"col\">what it says</th><th scope=\"col\">outcome</th><th scope=\"col\">rule</th></tr></thead>\n<tbody>".to_owned());
+        put("<h2>Claims</h2>\n<table>\n<thead><tr><th scope=\"col\">where</th><th \
+            scope=\"col\">what it says</th><th scope=\"col\">outcome</th><th \
+            scope=\"col\">rule</th></tr></thead>\n<tbody>"
+            .to_owned());
         for scored in &made.claims {
             put(row(scored));
         }
@@ -58,7 +67,8 @@ pub fn page(folder: &Folder, made: &Made<'_>) -> String {
         put("</ul>".to_owned());
     }
     put(format!(
-        "<p><small>Computed by twofold {}. The same version makes the same bytes on every machine; <code>twofold paper check</code> compares.</small></p>\n</main>\n</body>\n</html>",
+        "<p><small>Computed by twofold {}. The same version makes the same bytes on every machine; \
+            <code>twofold paper check</code> compares.</small></p>\n</main>\n</body>\n</html>",
         env!("CARGO_PKG_VERSION")
     ));
     out
@@ -66,19 +76,36 @@ pub fn page(folder: &Folder, made: &Made<'_>) -> String {
 
 fn row(scored: &Scored<'_>) -> String {
     let claim = scored.claim;
-    let quote = if claim.quote.is_empty() { String::new() } else { format!("<br><q>{}</q>", escape(&claim.quote)) };
-    let note =
-        if claim.note.is_empty() { String::new() } else { format!("<br><small>{}</small>", escape(&claim.note)) };
+    let quote = if claim.quote.is_empty() {
+        String::new()
+    } else {
+        format!("<br><q>{}</q>", escape(&claim.quote))
+    };
+    let note = if claim.note.is_empty() {
+        String::new()
+    } else {
+        format!("<br><small>{}</small>", escape(&claim.note))
+    };
     let (found, after) = match &scored.verdict {
         Ok(v) => {
             let word = outcome(v.agrees);
-            (format!("<span class=\"{word}\">{word}</span>: {}", escape(&v.found)), v.rule_after_data)
+            (
+                format!("<span class=\"{word}\">{word}</span>: {}", escape(&v.found)),
+                v.rule_after_data,
+            )
         }
-        Err(why) => (format!("<span class=\"differs\">cannot be scored</span>: {}", escape(&why.to_string())), false),
+        Err(why) => (
+            format!(
+                "<span class=\"differs\">cannot be scored</span>: {}",
+                escape(&why.to_string())
+            ),
+            false,
+        ),
     };
     let after = if after { "<br><strong>changed when its data were known</strong>" } else { "" };
     format!(
-        "<tr id=\"{}\"><td>{}</td><td>{}{quote}</td><td>{found}{note}</td><td>{}, fixed {}{after}</td></tr>",
+        "<tr id=\"{}\"><td>{}</td><td>{}{quote}</td><td>{found}{note}</td><td>{}, fixed \
+            {}{after}</td></tr>",
         escape(&claim.id),
         escape(&claim.place),
         escape(&claim.says),
@@ -91,7 +118,9 @@ fn panel_row(verdict: &PanelVerdict) -> String {
     let PanelVerdict { picture, panel, claim_text, found, because, agrees, .. } = verdict;
     let word = outcome(*agrees);
     format!(
-        "<tr><td><a href=\"#{picture}\">{picture}</a> ({})</td><td>{}</td><td><span class=\"{word}\">{word}</span>: {}<br><small>{}</small></td><td>the panel's own</td></tr>",
+        "<tr><td><a href=\"#{picture}\">{picture}</a> ({})</td><td>{}</td><td><span \
+            class=\"{word}\">{word}</span>: {}<br><small>{}</small></td><td>the panel's \
+            own</td></tr>",
         escape(panel),
         escape(claim_text),
         escape(found),
@@ -103,8 +132,10 @@ fn drawn(figure: &str, shows: &str, picture: &PictureRecord) -> String {
     let name = &picture.hashes.name;
     let shows = if shows.is_empty() { String::new() } else { format!(" ({})", escape(shows)) };
     format!(
-        "<figure id=\"{name}\">\n<img src=\"{figure}/{name}.png\" alt=\"{}\" loading=\"lazy\">\n<figcaption><strong>{}{shows}</strong> {} \
-         <small><a href=\"{figure}/{name}.svg\">SVG</a>, <a href=\"{figure}/{name}.pdf\">PDF</a>, <a href=\"{figure}/{name}.json\">hashes</a>, data {}</small></figcaption>\n</figure>",
+        "<figure id=\"{name}\">\n<img src=\"{figure}/{name}.png\" alt=\"{}\" \
+            loading=\"lazy\">\n<figcaption><strong>{}{shows}</strong> {} \
+         <small><a href=\"{figure}/{name}.svg\">SVG</a>, <a href=\"{figure}/{name}.pdf\">PDF</a>, \
+         <a href=\"{figure}/{name}.json\">hashes</a>, data {}</small></figcaption>\n</figure>",
         escape(&picture.caption),
         escape(&picture.title),
         escape(&picture.caption),
@@ -134,15 +165,17 @@ fn files(folder: &Folder, made: &Made<'_>) -> Vec<(String, Hash, String)> {
     let mut pictures = made.pictures.iter();
     for figure in &folder.figures {
         for picture in pictures.by_ref().take(figure.pictures.len()) {
-            let named =
-                |(file, hash): (String, &Hash)| (format!("{}/{file}", figure.id), hash.clone(), picture.title.clone());
+            let named = |(file, hash): (String, &Hash)| {
+                (format!("{}/{file}", figure.id), hash.clone(), picture.title.clone())
+            };
             all.extend(picture.files().into_iter().map(named));
         }
     }
     all
 }
 
-/// The fields of a CODECHECK certificate (codecheck.yml, version 1.0) that a computation can fill; names and the date are the checker's.
+/// The fields of a CODECHECK certificate (codecheck.yml, version 1.0) that a computation can fill;
+/// names and the date are the checker's.
 pub fn codecheck(folder: &Folder, made: &Made<'_>) -> String {
     // JSON's strings are YAML's double-quoted ones.
     let text = |s: &str| Value::from(s).to_string();
@@ -159,7 +192,9 @@ pub fn codecheck(folder: &Folder, made: &Made<'_>) -> String {
         (doi, _) => format!("https://doi.org/{doi}"),
     };
     let _ = writeln!(out, "  reference: {}\nmanifest:", text(&reference));
-    for (file, hash, title) in files(folder, made).into_iter().filter(|(file, ..)| !file.ends_with(".csv")) {
+    for (file, hash, title) in
+        files(folder, made).into_iter().filter(|(file, ..)| !file.ends_with(".csv"))
+    {
         let comment = format!("{title}; sha256 {}", hash.as_str());
         let _ = writeln!(out, "  - file: {}\n    comment: {}", text(&file), text(&comment));
     }
@@ -176,30 +211,46 @@ pub fn codecheck(folder: &Folder, made: &Made<'_>) -> String {
 pub fn crate_metadata(folder: &Folder, made: &Made<'_>) -> Vec<u8> {
     let about = &folder.about;
     let files = files(folder, made);
-    let authors: Vec<(String, &String)> =
-        about.authors.iter().enumerate().map(|(i, name)| (format!("#author-{}", i + 1), name)).collect();
-    let identifiers: Vec<&String> = [&about.doi, &about.arxiv].into_iter().filter(|i| !i.is_empty()).collect();
+    let authors: Vec<(String, &String)> = about
+        .authors
+        .iter()
+        .enumerate()
+        .map(|(i, name)| (format!("#author-{}", i + 1), name))
+        .collect();
+    let identifiers: Vec<&String> =
+        [&about.doi, &about.arxiv].into_iter().filter(|i| !i.is_empty()).collect();
     let mut graph = vec![
         json!({
             "@id": "ro-crate-metadata.json", "@type": "CreativeWork", "about": { "@id": "./" },
             "conformsTo": { "@id": "https://w3id.org/ro/crate/1.1" },
         }),
         json!({
-            "@id": "./", "@type": "Dataset", "name": format!("Figures and claims of \"{}\", recomputed", about.title),
-            "description": about.summary, "citation": { "@id": "#article" }, "mainEntity": { "@id": "report.html" },
-            "hasPart": files.iter().map(|(file, ..)| json!({ "@id": file })).chain([json!({ "@id": "report.html" }), json!({ "@id": "claims.json" })]).collect::<Vec<_>>(),
+            "@id": "./", "@type": "Dataset", "name": format!("Figures and claims of \"{}\", \
+                recomputed", about.title),
+            "description": about.summary, "citation": { "@id": "#article" },
+                "mainEntity": { "@id": "report.html" },
+            "hasPart": files.iter().map(|(file,
+                ..)| json!({ "@id": file })).chain([json!({ "@id": "report.html" }),
+                    json!({ "@id": "claims.json" })]).collect::<Vec<_>>(),
         }),
         json!({
-            "@id": "#article", "@type": "ScholarlyArticle", "name": about.title, "datePublished": about.year.to_string(),
+            "@id": "#article", "@type": "ScholarlyArticle", "name": about.title,
+                "datePublished": about.year.to_string(),
             "author": authors.iter().map(|(id, _)| json!({ "@id": id })).collect::<Vec<_>>(),
             "identifier": identifiers,
         }),
-        json!({ "@id": "#software", "@type": "SoftwareApplication", "name": "twofold", "softwareVersion": env!("CARGO_PKG_VERSION") }),
-        json!({ "@id": "#computation", "@type": "CreateAction", "instrument": { "@id": "#software" }, "result": { "@id": "./" } }),
-        json!({ "@id": "report.html", "@type": "File", "name": "report", "encodingFormat": "text/html" }),
-        json!({ "@id": "claims.json", "@type": "File", "name": "outcomes of the claims", "encodingFormat": "application/json" }),
+        json!({ "@id": "#software", "@type": "SoftwareApplication", "name": "twofold",
+            "softwareVersion": env!("CARGO_PKG_VERSION") }),
+        json!({ "@id": "#computation", "@type": "CreateAction",
+            "instrument": { "@id": "#software" }, "result": { "@id": "./" } }),
+        json!({ "@id": "report.html", "@type": "File", "name": "report",
+            "encodingFormat": "text/html" }),
+        json!({ "@id": "claims.json", "@type": "File", "name": "outcomes of the \
+            claims", "encodingFormat": "application/json" }),
     ];
-    graph.extend(authors.iter().map(|(id, name)| json!({ "@id": id, "@type": "Person", "name": name })));
+    graph.extend(
+        authors.iter().map(|(id, name)| json!({ "@id": id, "@type": "Person", "name": name })),
+    );
     // RO-Crate asks for both; they are the publisher's to give.
     if let Some(day) = &about.published {
         graph[1]["datePublished"] = day.to_string().into();
@@ -209,11 +260,10 @@ pub fn crate_metadata(folder: &Folder, made: &Made<'_>) -> Vec<u8> {
         graph[1]["license"] = json!({ "@id": id });
         graph.push(json!({ "@id": id, "@type": "CreativeWork", "name": about.license }));
     }
-    graph.extend(
-        files
-            .iter()
-            .map(|(file, hash, title)| json!({ "@id": file, "@type": "File", "name": title, "sha256": hash.as_str() })),
-    );
+    graph.extend(files.iter().map(|(file, hash, title)| {
+        json!({ "@id": file, "@type": "File", "name": title,
+                "sha256": hash.as_str() })
+    }));
     let crate_ = json!({ "@context": "https://w3id.org/ro/crate/1.1/context", "@graph": graph });
     let mut bytes = serde_json::to_vec_pretty(&crate_).expect("plain data");
     bytes.push(b'\n');

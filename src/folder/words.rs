@@ -1,5 +1,5 @@
-//! Questions in the words of the command line: `run = { system = "systems/relay.toml", t-end = 10 }` asks what `twofold run
-//! --system systems/relay.toml --t-end 10` asks.
+//! Questions in the words of the command line: `run = { system = "systems/relay.toml", t-end = 10
+//! }` asks what `twofold run --system systems/relay.toml --t-end 10` asks.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -59,7 +59,8 @@ pub enum Ask {
     Rests,
 }
 
-/// Flags that say where an answer goes, and one that reads a whole run from elsewhere: not a question's.
+/// Flags that say where an answer goes, and one that reads a whole run from elsewhere: not a
+/// question's.
 const NOT_ASKED: [&str; 5] = ["spec", "out", "format", "quiet", "help"];
 
 /// Flags that are given several times rather than as a list.
@@ -69,8 +70,8 @@ impl Words {
     fn flags(&self, origin: &Origin) -> Result<Vec<Flag>, FolderError> {
         let flag = |(key, value): (&Spanned<String>, &Spanned<Value>)| {
             let name = key.get_ref().clone();
-            let values =
-                texts(&name, value.get_ref()).map_err(|why| FolderError::at(origin, value.span(), why, None))?;
+            let values = texts(&name, value.get_ref())
+                .map_err(|why| FolderError::at(origin, value.span(), why, None))?;
             Ok(Flag { name, values, place: Some((origin.clone(), key.span())) })
         };
         self.0.iter().map(flag).collect()
@@ -84,15 +85,18 @@ fn texts(key: &str, value: &Value) -> Result<Vec<String>, String> {
         Value::Integer(number) => Ok(number.to_string()),
         // The shortest decimal that is this number.
         Value::Float(number) => Ok(format!("{number:?}")),
-        Value::Boolean(_) | Value::Datetime(_) | Value::Array(_) | Value::Table(_) => {
-            Err(format!("`{key}` is a {}; give a number, a text, or a list of those", value.type_str()))
-        }
+        Value::Boolean(_) | Value::Datetime(_) | Value::Array(_) | Value::Table(_) => Err(format!(
+            "`{key}` is a {}; give a number, a text, or a list of those",
+            value.type_str()
+        )),
     };
     match value {
         Value::Boolean(true) => Ok(Vec::new()),
         Value::Boolean(false) => Err(format!("`{key} = false` has no effect; leave it out")),
         Value::Array(list) if REPEATED.contains(&key) => list.iter().map(one).collect(),
-        Value::Array(list) => Ok(vec![list.iter().map(one).collect::<Result<Vec<_>, _>>()?.join(",")]),
+        Value::Array(list) => {
+            Ok(vec![list.iter().map(one).collect::<Result<Vec<_>, _>>()?.join(",")])
+        }
         Value::Table(table) if key == "set" => {
             table.iter().map(|(name, value)| Ok(format!("{name}={}", one(value)?))).collect()
         }
@@ -113,8 +117,8 @@ fn add(flags: &mut Vec<Flag>, flag: Flag) {
 }
 
 impl Said {
-    /// The words of a question over those that hold for all (`defaults`, of the file `common`): a later word replaces an earlier one, and
-    /// parameters (`set`) add up.
+    /// The words of a question over those that hold for all (`defaults`, of the file `common`): a
+    /// later word replaces an earlier one, and parameters (`set`) add up.
     ///
     /// # Errors
     /// If a value is of a kind that no flag takes.
@@ -125,7 +129,8 @@ impl Said {
         defaults: &[&Words],
     ) -> Result<Self, FolderError> {
         let mut flags: Vec<Flag> = Vec::new();
-        let layers = defaults.iter().map(|w| (*w, common)).chain(std::iter::once((words.get_ref(), origin)));
+        let layers =
+            defaults.iter().map(|w| (*w, common)).chain(std::iter::once((words.get_ref(), origin)));
         for (layer, origin) in layers {
             for flag in layer.flags(origin)? {
                 add(&mut flags, flag);
@@ -155,7 +160,12 @@ impl Said {
         other
     }
 
-    fn wrong(&self, key: Option<&str>, why: impl Into<String>, help: Option<String>) -> FolderError {
+    fn wrong(
+        &self,
+        key: Option<&str>,
+        why: impl Into<String>,
+        help: Option<String>,
+    ) -> FolderError {
         let flag = key.and_then(|key| self.flags.iter().find(|f| f.name == key));
         let place = flag.and_then(|f| f.place.clone());
         let (origin, place) = place.unwrap_or_else(|| (self.origin.clone(), self.place.clone()));
@@ -167,7 +177,11 @@ impl Said {
         let mut all = Vec::new();
         for Flag { name: key, values, .. } in &self.flags {
             if NOT_ASKED.contains(&key.as_str()) {
-                return Err(self.wrong(Some(key), format!("`{key}` is not part of a question; leave it out"), None));
+                return Err(self.wrong(
+                    Some(key),
+                    format!("`{key}` is not part of a question; leave it out"),
+                    None,
+                ));
             }
             for value in values {
                 let value = if key == "system" { self.system(root, value)? } else { value.clone() };
@@ -190,7 +204,8 @@ impl Said {
                 Some("system"),
                 why,
                 Some(
-                    "name a file of this folder, such as systems/relay.toml, or a built-in system (twofold new --list)"
+                    "name a file of this folder, such as systems/relay.toml, or a built-in system \
+                        (twofold new --list)"
                         .into(),
                 ),
             )
@@ -212,18 +227,22 @@ impl Said {
         let known = asked::known::<T>();
         for Flag { name: key, .. } in &self.flags {
             if !known.contains(key) && !NOT_ASKED.contains(&key.as_str()) {
-                let known: Vec<&str> = known.iter().map(String::as_str).filter(|k| !NOT_ASKED.contains(k)).collect();
+                let known: Vec<&str> =
+                    known.iter().map(String::as_str).filter(|k| !NOT_ASKED.contains(k)).collect();
                 let help = nearest(key, &known).map(|near| format!("did you mean `{near}`?"));
                 return Err(self.wrong(Some(key), format!("unknown key `{key}`"), help));
             }
         }
-        asked::parsed(self.arguments(root)?).map_err(|said| self.wrong(self.named_in(&said).as_deref(), said, None))
+        asked::parsed(self.arguments(root)?)
+            .map_err(|said| self.wrong(self.named_in(&said).as_deref(), said, None))
     }
 
     /// The flag that a message of the command line names.
     fn named_in(&self, message: &str) -> Option<String> {
         let keys = self.flags.iter().map(|f| f.name.as_str());
-        keys.filter(|key| message.contains(&format!("--{key}"))).max_by_key(|key| key.len()).map(str::to_owned)
+        keys.filter(|key| message.contains(&format!("--{key}")))
+            .max_by_key(|key| key.len())
+            .map(str::to_owned)
     }
 
     fn refused(&self, error: &CliError) -> FolderError {
@@ -252,7 +271,8 @@ impl Said {
             Ask::Orbit => self.parsed::<orbit::Arguments>(root)?.question().map_err(refused),
             Ask::Lyapunov => self.parsed::<lyapunov::Arguments>(root)?.question().map_err(refused),
             Ask::Rests => {
-                let question = self.parsed::<rests::Arguments>(root)?.question().map_err(refused)?;
+                let question =
+                    self.parsed::<rests::Arguments>(root)?.question().map_err(refused)?;
                 Ok(Arc::new(question))
             }
         }

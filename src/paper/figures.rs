@@ -25,13 +25,18 @@ macro_rules! files {
 /// The paper's folder, so that an installed program can make and check its figures anywhere.
 pub const FILES: Embedded = files! {
     "paper.toml"
-    "figures/fig2.toml" "figures/fig5.toml" "figures/fig6.toml" "figures/fig7.toml" "figures/fig8.toml" "figures/fig9.toml"
-    "expected/fig2.json" "expected/fig5.json" "expected/fig6.json" "expected/fig7.json" "expected/fig8.json" "expected/fig9.json"
+    "figures/fig2.toml" "figures/fig5.toml" "figures/fig6.toml"
+    "figures/fig7.toml" "figures/fig8.toml" "figures/fig9.toml"
+    "expected/fig2.json" "expected/fig5.json" "expected/fig6.json"
+    "expected/fig7.json" "expected/fig8.json" "expected/fig9.json"
 };
 
 fn folder() -> &'static Folder {
     static OWN: OnceLock<Folder> = OnceLock::new();
-    OWN.get_or_init(|| Folder::embedded(FOLDER, FILES).expect("the embedded folder is well formed: a test reads it"))
+    OWN.get_or_init(|| {
+        Folder::embedded(FOLDER, FILES)
+            .expect("the embedded folder is well formed: a test reads it")
+    })
 }
 
 /// Every figure, in the paper's order, then the project's own.
@@ -58,8 +63,8 @@ pub fn reference(id: &str) -> Option<&'static str> {
     FILES.iter().find(|f| f.0 == file).map(|f| f.1).or_else(|| twofold_jeffrey_2013::reference(id))
 }
 
-/// Where the references in `expected` (a checkout's `figures`, or a folder of the same form) keep that of a figure: NAME/expected.json there, or in
-/// the paper's folder if it is one of its own.
+/// Where the references in `expected` (a checkout's `figures`, or a folder of the same form) keep
+/// that of a figure: NAME/expected.json there, or in the paper's folder if it is one of its own.
 pub fn reference_file(expected: &Path, id: &str) -> PathBuf {
     let own = expected.join("..").join(FOLDER).join(format!("expected/{id}.json"));
     if own.exists() { own } else { expected.join(id).join("expected.json") }
@@ -70,13 +75,17 @@ pub fn reference_file(expected: &Path, id: &str) -> PathBuf {
 /// # Errors
 /// If a file cannot be read.
 pub fn references_in(expected: &Path) -> Result<Vec<FileBytes>, FileError> {
-    let mut files = read_tree(expected, &|path| path.ends_with(".json") || path.ends_with(".png"))?.files;
+    let mut files =
+        read_tree(expected, &|path| path.ends_with(".json") || path.ends_with(".png"))?.files;
     let own = expected.join("..").join(FOLDER).join("expected");
     if own.exists() {
         for FileBytes { path, bytes } in
             read_tree(&own, &|path| path.starts_with("fig") && path.ends_with(".json"))?.files
         {
-            files.push(FileBytes { path: format!("{}/expected.json", path.trim_end_matches(".json")), bytes });
+            files.push(FileBytes {
+                path: format!("{}/expected.json", path.trim_end_matches(".json")),
+                bytes,
+            });
         }
     }
     Ok(files)
@@ -101,10 +110,15 @@ mod tests {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join(FOLDER);
         let files = read_tree(&root, &|path| !path.starts_with("out/")).unwrap().files;
         let known = |path: &str| FILES.iter().find(|f| f.0 == path).map(|f| f.1.as_bytes());
-        let ours =
-            |path: &str| path == "paper.toml" || path.starts_with("figures/") || path.starts_with("expected/fig");
+        let ours = |path: &str| {
+            path == "paper.toml" || path.starts_with("figures/") || path.starts_with("expected/fig")
+        };
         for file in files.iter().filter(|f| ours(&f.path)) {
-            assert!(known(&file.path) == Some(file.bytes.as_slice()), "{} is not embedded", file.path);
+            assert!(
+                known(&file.path) == Some(file.bytes.as_slice()),
+                "{} is not embedded",
+                file.path
+            );
         }
         assert_eq!(FILES.len(), files.iter().filter(|f| ours(&f.path)).count());
         let read = Folder::read(&root).unwrap();

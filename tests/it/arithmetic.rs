@@ -1,8 +1,11 @@
-//! What every hash rests on and no source can say: that the compiler carries out the arithmetic that is written. Nothing fused, nothing reordered, no
-//! reciprocals for divisions, no subnormals flushed, no intermediate results of more digits than f64 has (the x87 unit's habit). The idea of such a
-//! test: REBOUND (Rein & Tamayo 2017).
-#![allow(clippy::disallowed_methods)] // the fused product is called to show that it differs
-#![allow(clippy::needless_range_loop)] // a loop by index is one of the shapes that compilers like to turn into lanes
+//! What every hash rests on and no source can say: that the compiler carries out the arithmetic
+//! that is written. Nothing fused, nothing reordered, no reciprocals for divisions, no subnormals
+//! flushed, no intermediate results of more digits than f64 has (the x87 unit's habit). The idea of
+//! such a test: REBOUND (Rein & Tamayo 2017).
+#![allow(clippy::disallowed_methods)]
+// the fused product is called to show that it differs
+// a loop by index is one of the shapes that compilers like to turn into lanes
+#![allow(clippy::needless_range_loop)]
 
 use std::hint::black_box;
 
@@ -16,14 +19,16 @@ const BELOW: f64 = 1.0 - f64::EPSILON / 2.0;
 
 #[test]
 fn products_and_sums_are_not_fused() {
-    // (1 + u)(1 - u/2) = 1 + u/2 - u^2/2 rounds to 1 (a tie broken to even, less a little); a fused operation would keep the rest.
+    // (1 + u)(1 - u/2) = 1 + u/2 - u^2/2 rounds to 1 (a tie broken to even, less a little); a fused
+    // operation would keep the rest.
     let (a, b) = (black_box(ABOVE), black_box(BELOW));
     assert_eq!((a * b - 1.0).to_bits(), 0.0_f64.to_bits());
     assert!(a.mul_add(b, -1.0) != 0.0, "the example tells fused from unfused");
     let c = black_box(-1.0);
     let separate = |a: f64, b: f64, c: f64| a * b + c;
     assert_eq!(separate(a, b, c), 0.0);
-    // The same in the shapes in which the integrators compute: a vector plus a product, sums of products.
+    // The same in the shapes in which the integrators compute: a vector plus a product, sums of
+    // products.
     let (x, k) = (black_box(vector![-1.0, -1.0, -1.0]), black_box(vector![ABOVE, ABOVE, ABOVE]));
     assert_eq!(x + k * b, SVector::<f64, 3>::zeros());
     let mut sum = -1.0;
@@ -79,11 +84,21 @@ fn no_number_is_flushed_or_widened() {
     let least = black_box(f64::MIN_POSITIVE);
     assert_eq!((least / 2.0).to_bits(), 1 << 51);
     assert_eq!(black_box(f64::from_bits(1)) * black_box(0.75), f64::from_bits(1));
-    assert_eq!(black_box(f64::from_bits(3)) * black_box(0.5), f64::from_bits(2), "a tie goes to the even one");
-    // In 64 bits of mantissa and rounded again these come out otherwise (double rounding); in an exponent of 15 bits nothing overflows.
+    assert_eq!(
+        black_box(f64::from_bits(3)) * black_box(0.5),
+        f64::from_bits(2),
+        "a tie goes to the even one"
+    );
+    // In 64 bits of mantissa and rounded again these come out otherwise (double rounding); in an
+    // exponent of 15 bits nothing overflows.
     assert_eq!(black_box(1e16) + black_box(2.9999), 10_000_000_000_000_002.0);
     assert_eq!(black_box(f64::MAX) * black_box(2.0) / black_box(2.0), f64::INFINITY);
-    assert_eq!(black_box(f64::MIN_POSITIVE) * black_box(f64::EPSILON / 2.0) * black_box(2.0 / f64::EPSILON), 0.0);
+    assert_eq!(
+        black_box(f64::MIN_POSITIVE)
+            * black_box(f64::EPSILON / 2.0)
+            * black_box(2.0 / f64::EPSILON),
+        0.0
+    );
 }
 
 #[test]
@@ -94,7 +109,8 @@ fn square_roots_are_correctly_rounded() {
         let root = sqrt(x);
         assert_eq!(root.to_bits(), x.sqrt().to_bits());
         // |root - exact| <= half a unit: the neighbours' squares enclose x.
-        let (below, above) = (f64::from_bits(root.to_bits() - 1), f64::from_bits(root.to_bits() + 1));
+        let (below, above) =
+            (f64::from_bits(root.to_bits() - 1), f64::from_bits(root.to_bits() + 1));
         assert!((below + root) / 2.0 * ((below + root) / 2.0) <= x * (1.0 + 1e-15));
         assert!((above + root) / 2.0 * ((above + root) / 2.0) >= x * (1.0 - 1e-15));
     }

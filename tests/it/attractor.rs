@@ -2,10 +2,14 @@
 #![allow(clippy::disallowed_methods)] // exact solutions are compared to tolerances, not hashed
 
 use nalgebra::{SVector, vector};
-use twofold::analyse::attractor::{Evidence, Question, SectionPoint, Thresholds, Verdict, classify};
+use twofold::analyse::attractor::{
+    Evidence, Question, SectionPoint, Thresholds, Verdict, classify,
+};
 use twofold::analyse::floquet::{self, ReturnPlane, closed_orbit};
 use twofold::analyse::lyapunov::{self, largest};
-use twofold::integrate::{Dopri5, DriveOptions, Flow, Ignore, Observer, Step, StepCap, Tolerance, drive, roots};
+use twofold::integrate::{
+    Dopri5, DriveOptions, Flow, Ignore, Observer, Step, StepCap, Tolerance, drive, roots,
+};
 use twofold::num::Elementary;
 use twofold::num::random::RandomStream;
 use twofold::paper::claim::Claim;
@@ -37,9 +41,9 @@ impl VectorField<2> for VanDerPol {
     }
 }
 
-/// Circles around the closed orbit r = 2, z = 0 of unit angular speed: with r the distance from the z axis,
-/// r' = -omega z - gamma (r - 2), z' = omega (r - 2) - gamma z. Nested tori for gamma = 0; else every orbit spirals onto the closed one at
-/// the rate gamma, turning by 2 pi omega a turn.
+/// Circles around the closed orbit r = 2, z = 0 of unit angular speed: with r the distance from the
+/// z axis, r' = -omega z - gamma (r - 2), z' = omega (r - 2) - gamma z. Nested tori for gamma = 0;
+/// else every orbit spirals onto the closed one at the rate gamma, turning by 2 pi omega a turn.
 struct Torus {
     omega: f64,
     gamma: f64,
@@ -65,10 +69,16 @@ struct Section {
 
 impl<const N: usize> Observer<N> for Section {
     fn step(&mut self, step: &Step<'_, N>) -> Flow {
-        for roots::Crossing { theta, .. } in self.passages.through_plane(step, self.axis, self.value) {
+        for roots::Crossing { theta, .. } in
+            self.passages.through_plane(step, self.axis, self.value)
+        {
             let x = step.at(theta);
             let upward = step.x1[self.axis] > step.x0[self.axis];
-            self.points.push(SectionPoint { t: step.time(theta), u: self.shown.map(|k| x[k]), upward });
+            self.points.push(SectionPoint {
+                t: step.time(theta),
+                u: self.shown.map(|k| x[k]),
+                upward,
+            });
         }
         Flow::Continue
     }
@@ -95,7 +105,13 @@ fn section_to<const N: usize, F: VectorField<N>>(
     shown: [usize; 2],
 ) -> Vec<SectionPoint> {
     let tolerance = Tolerance { rtol: tolerance, atol: tolerance };
-    let mut seen = Section { axis, value, shown, points: Vec::new(), passages: roots::CrossingFinder::default() };
+    let mut seen = Section {
+        axis,
+        value,
+        shown,
+        points: Vec::new(),
+        passages: roots::CrossingFinder::default(),
+    };
     let mut stepper = Dopri5::new(tolerance);
     let options = DriveOptions { step_cap: StepCap::Absolute(0.5), ..DriveOptions::to(t_end) };
     let end = drive(field, x0, &options, &mut stepper, &mut seen, &()).unwrap();
@@ -109,7 +125,11 @@ fn judge(points: &[SectionPoint]) -> Evidence {
 
 /// A sequence of plane points as a section crossed upwards once per unit time.
 fn sequence(points: impl IntoIterator<Item = [f64; 2]>) -> Vec<SectionPoint> {
-    points.into_iter().enumerate().map(|(i, u)| SectionPoint { t: i as f64, u, upward: true }).collect()
+    points
+        .into_iter()
+        .enumerate()
+        .map(|(i, u)| SectionPoint { t: i as f64, u, upward: true })
+        .collect()
 }
 
 fn henon(n: usize) -> Vec<[f64; 2]> {
@@ -134,31 +154,42 @@ fn logistic(mu: f64, n: usize) -> Vec<SectionPoint> {
 
 #[test]
 fn lorenz() {
-    let settings = lyapunov::LyapunovOptions { transient: 20.0, duration: 2000.0, ..Default::default() };
+    let settings =
+        lyapunov::LyapunovOptions { transient: 20.0, duration: 2000.0, ..Default::default() };
     let e = largest::<3, 6, _>(&Lorenz, vector![1.0, 1.0, 20.0], &settings).unwrap();
     // 0.9056 (Sprott 2003, "Chaos and Time-Series Analysis", appendix A).
     assert!(e.standard_error < 0.02, "{e:?}");
     assert!((e.value - 0.9056).abs() < 3.0 * e.standard_error, "{e:?}");
     let points = section(&Lorenz, vector![1.0, 1.0, 20.0], 1000.0, 2, 27.0, [0, 1]);
     for lyapunov in [None, Some(e)] {
-        let found = classify(&points, &Question { lyapunov, ..Question::default() }, &Thresholds::default());
+        let found = classify(
+            &points,
+            &Question { lyapunov, ..Question::default() },
+            &Thresholds::default(),
+        );
         assert_eq!(found.name, "chaotic", "{found:?}");
     }
 }
 
 #[test]
 fn rossler() {
-    let settings = lyapunov::LyapunovOptions { transient: 200.0, duration: 6000.0, ..Default::default() };
+    let settings =
+        lyapunov::LyapunovOptions { transient: 200.0, duration: 6000.0, ..Default::default() };
     let e = largest::<3, 6, _>(&Rossler(5.7), vector![1.0, 1.0, 1.0], &settings).unwrap();
     // 0.0714 (Sprott 2003).
     assert!(e.standard_error < 0.004, "{e:?}");
     assert!((e.value - 0.0714).abs() < 3.0 * e.standard_error, "{e:?}");
     let chaotic = judge(&section(&Rossler(5.7), vector![1.0, 1.0, 1.0], 3000.0, 1, 0.0, [0, 2]));
     assert_eq!(chaotic.name, "chaotic", "{chaotic:?}");
-    // Before its period doublings: one loop at c = 2.5, two at 3.5 (Rossler's cascade; periods 1 and 2).
+    // Before its period doublings: one loop at c = 2.5, two at 3.5 (Rossler's cascade; periods 1
+    // and 2).
     for (c, period) in [(2.5, 1), (3.5, 2)] {
         let e = judge(&section(&Rossler(c), vector![1.0, 1.0, 1.0], 3000.0, 1, 0.0, [0, 2]));
-        assert_eq!((e.name.as_str(), e.verdict.cycle().unwrap().period), ("periodic", period), "c = {c}: {e:?}");
+        assert_eq!(
+            (e.name.as_str(), e.verdict.cycle().unwrap().period),
+            ("periodic", period),
+            "c = {c}: {e:?}"
+        );
         assert_eq!(e.verdict.cycle().unwrap().points.len(), 2 * period);
     }
 }
@@ -185,11 +216,17 @@ fn van_der_pol() {
     assert!(cycle.settled_at.unwrap() < 50.0);
 
     let plane = ReturnPlane { axis: 1, value: 0.0, upward: true };
-    let o =
-        closed_orbit::<2, 6, _>(&VanDerPol, plane, 1, vector![-2.2, 0.0], &floquet::FloquetOptions::default()).unwrap();
+    let o = closed_orbit::<2, 6, _>(
+        &VanDerPol,
+        plane,
+        1,
+        vector![-2.2, 0.0],
+        &floquet::FloquetOptions::default(),
+    )
+    .unwrap();
     assert!((o.period - 6.663_286_86).abs() < 1e-8, "{o:?}");
-    // Liouville: the only non-trivial multiplier is exp(integral of the divergence 1 - x^2 over a turn), here by a third
-    // equation beside the orbit.
+    // Liouville: the only non-trivial multiplier is exp(integral of the divergence 1 - x^2 over a
+    // turn), here by a third equation beside the orbit.
     struct WithDivergence;
     impl VectorField<3> for WithDivergence {
         fn eval<S: Elementary>(&self, s: &SVector<S, 3>) -> SVector<S, 3> {
@@ -199,7 +236,9 @@ fn van_der_pol() {
     }
     let mut stepper = Dopri5::new(Tolerance { rtol: 1e-12, atol: 1e-12 });
     let x0 = vector![o.points[0][0], o.points[0][1], 0.0];
-    let turn = drive(&WithDivergence, x0, &DriveOptions::to(o.period), &mut stepper, &mut Ignore, &()).unwrap();
+    let turn =
+        drive(&WithDivergence, x0, &DriveOptions::to(o.period), &mut stepper, &mut Ignore, &())
+            .unwrap();
     assert!((o.multipliers[0][0].ln() - turn.x[2]).abs() < 1e-5, "{o:?} {}", turn.x[2]);
 }
 
@@ -213,7 +252,10 @@ fn torus_is_quasi_periodic() {
     assert!((cycle.radius - 0.7).abs() < 1e-3, "{cycle:?}");
     // One turn is 2 pi, so the section turns by omega circles; counted in (-1/2, 1/2].
     assert!((cycle.rotation.unwrap() - (torus.omega - 1.0)).abs() < 1e-4, "{cycle:?}");
-    assert!(cycle.points.iter().all(|p| (p.u[0] - if p.upward { 2.0 } else { -2.0 }).abs() < 5e-3), "{cycle:?}");
+    assert!(
+        cycle.points.iter().all(|p| (p.u[0] - if p.upward { 2.0 } else { -2.0 }).abs() < 5e-3),
+        "{cycle:?}"
+    );
 }
 
 #[test]
@@ -233,24 +275,43 @@ fn damped_spiral_has_its_rate() {
         assert_eq!(cycle.period, 1);
         let rate = cycle.approach.unwrap();
         assert!((rate.per_time / gamma - 1.0).abs() < 0.02, "{rate:?}");
-        assert!((rate.per_time - gamma).abs() < 5.0 * rate.standard_error.max(1e-3 * gamma), "{rate:?}");
+        assert!(
+            (rate.per_time - gamma).abs() < 5.0 * rate.standard_error.max(1e-3 * gamma),
+            "{rate:?}"
+        );
         assert!(cycle.captured_at < 0.1 * 12_000.0 && cycle.settled_at.is_none(), "{cycle:?}");
     }
     // Faster, the same approach ends in dots.
-    let e = judge(&section(&Torus { omega: 0.3636, gamma: 3e-3 }, vector![2.3, 0.0, 0.0], 12_000.0, 1, 0.0, [0, 2]));
+    let e = judge(&section(
+        &Torus { omega: 0.3636, gamma: 3e-3 },
+        vector![2.3, 0.0, 0.0],
+        12_000.0,
+        1,
+        0.0,
+        [0, 2],
+    ));
     let Verdict::Periodic(cycle) = &e.verdict else { panic!("{e:?}") };
     assert!((cycle.approach.unwrap().per_time / 3e-3 - 1.0).abs() < 0.02, "{cycle:?}");
     // Distance 0.3 exp(-gamma t) falls to the dot's size at this time.
     let expected = (0.3 / (e.thresholds.dot * e.extent)).ln() / 3e-3;
-    assert!((cycle.settled_at.unwrap() / expected - 1.0).abs() < 0.03, "{cycle:?}, expected {expected}");
+    assert!(
+        (cycle.settled_at.unwrap() / expected - 1.0).abs() < 0.03,
+        "{cycle:?}, expected {expected}"
+    );
 }
 
 #[test]
 fn closed_orbit_of_the_torus_has_its_multipliers() {
     let torus = Torus { omega: 0.3, gamma: 2e-3 };
     let plane = ReturnPlane { axis: 1, value: 0.0, upward: true };
-    let o = closed_orbit::<3, 12, _>(&torus, plane, 1, vector![2.1, 0.0, 0.05], &floquet::FloquetOptions::default())
-        .unwrap();
+    let o = closed_orbit::<3, 12, _>(
+        &torus,
+        plane,
+        1,
+        vector![2.1, 0.0, 0.05],
+        &floquet::FloquetOptions::default(),
+    )
+    .unwrap();
     let tau = std::f64::consts::TAU;
     assert!((o.period - tau).abs() < 1e-8 && (o.rate - 2e-3).abs() < 1e-8, "{o:?}");
     let size = (-2e-3 * tau).exp();
@@ -260,7 +321,8 @@ fn closed_orbit_of_the_torus_has_its_multipliers() {
 
 #[test]
 fn logistic_windows() {
-    // Period 3 at 3.83, period 6 after its first doubling at 3.845, period 5 at 3.74 (May 1976); chaos at 3.9.
+    // Period 3 at 3.83, period 6 after its first doubling at 3.845, period 5 at 3.74 (May 1976);
+    // chaos at 3.9.
     for (mu, period) in [(3.83, 3), (3.845, 6), (3.74, 5), (3.2, 2), (2.9, 1)] {
         let e = judge(&logistic(mu, 3000));
         assert!(matches!(&e.verdict, Verdict::Periodic(c) if c.period == period), "{mu}: {e:?}");
@@ -297,16 +359,24 @@ fn short_sections() {
 
 #[test]
 fn chaos_that_ends_in_a_spiral_has_its_lifetime() {
-    // 3000 turns of the Henon map, then a slow spiral that keeps well inside: the switch is at t = 3000.
+    // 3000 turns of the Henon map, then a slow spiral that keeps well inside: the switch is at t =
+    // 3000.
     let spiral = (0..3000).map(|i| {
         let (r, a) = (0.2 * (-1e-4 * f64::from(i)).exp(), 2.3 * f64::from(i));
         [0.4 + r * a.cos(), 0.1 + 0.5 * r * a.sin()]
     });
     let points = sequence(henon(3000).into_iter().chain(spiral));
-    let e = classify(&points, &Question { shown_from: 2000.0, ..Question::default() }, &Thresholds::default());
+    let e = classify(
+        &points,
+        &Question { shown_from: 2000.0, ..Question::default() },
+        &Thresholds::default(),
+    );
     let Verdict::Spiralling(cycle) = &e.verdict else { panic!("{e:?}") };
     // Known to within a block of turns.
-    assert!(cycle.captured_at >= 3000.0 && cycle.captured_at <= 3000.0 + e.thresholds.block as f64, "{cycle:?}");
+    assert!(
+        cycle.captured_at >= 3000.0 && cycle.captured_at <= 3000.0 + e.thresholds.block as f64,
+        "{cycle:?}"
+    );
     assert!((cycle.approach.unwrap().per_time / 1e-4 - 1.0).abs() < 0.02, "{cycle:?}");
     assert!(e.mixed);
 }
@@ -330,7 +400,8 @@ fn noise_is_noise() {
     assert_eq!(e.name, "noisy", "{e:?}");
 }
 
-/// Chirikov's (1979) standard map: a sea around islands, where kicks let the orbit leak into the islands.
+/// Chirikov's (1979) standard map: a sea around islands, where kicks let the orbit leak into the
+/// islands.
 fn standard(n: usize, start: f64, kick: f64, stream: u64) -> Vec<[f64; 2]> {
     let mut r = RandomStream::new(2, stream);
     let tau = std::f64::consts::TAU;
@@ -351,10 +422,12 @@ fn kicked_sections_keep_less_structure_the_harder_the_kicks() {
         (0..4).map(|k| sequence(standard(30_000, 0.01 + 1e-6 * f64::from(k), 0.0, 0))).collect();
     // Many short runs: in a single one chance decides how long it stays in an island.
     let contrast = |kick: f64| {
-        let runs = (0..100_u32).flat_map(|k| standard(100, 0.02 + 1e-4 * f64::from(k), kick, u64::from(k)));
+        let runs = (0..100_u32)
+            .flat_map(|k| standard(100, 0.02 + 1e-4 * f64::from(k), kick, u64::from(k)));
         let kicked = sequence(runs);
         let question = Question { kicked: true, reference: Some(&free), ..Question::default() };
-        let Verdict::Noisy { contrast, around: None } = classify(&kicked, &question, &Thresholds::default()).verdict
+        let Verdict::Noisy { contrast, around: None } =
+            classify(&kicked, &question, &Thresholds::default()).verdict
         else {
             panic!("kicks make noise")
         };
@@ -364,7 +437,10 @@ fn kicked_sections_keep_less_structure_the_harder_the_kicks() {
     let values = found.map(|c| c.value);
     assert!(values[0] > 0.95 && found[0].free[0] > 0.9, "{found:?}");
     // A program outside this project gives 0.75 to 0.85, 0.05 to 0.23 and 0.02, by the seed.
-    assert!((values[1] - 0.8).abs() < 0.15 && (values[2] - 0.14).abs() < 0.2 && values[3].abs() < 0.15, "{found:?}");
+    assert!(
+        (values[1] - 0.8).abs() < 0.15 && (values[2] - 0.14).abs() < 0.2 && values[3].abs() < 0.15,
+        "{found:?}"
+    );
 }
 
 #[test]
@@ -372,16 +448,28 @@ fn a_cloud_around_a_cycle_is_recognised() {
     let mut r = RandomStream::new(3, 0);
     let dots = [[1.0, 0.5], [-0.3, 0.8], [0.1, -0.9]];
     let points = sequence((0..3000).map(|i| dots[i % 3].map(|c| c + 0.01 * r.normal())));
-    let e = classify(&points, &Question { kicked: true, ..Question::default() }, &Thresholds::default());
+    let e = classify(
+        &points,
+        &Question { kicked: true, ..Question::default() },
+        &Thresholds::default(),
+    );
     assert!(matches!(&e.verdict, Verdict::Noisy { around: Some(c), .. } if c.period == 3), "{e:?}");
 }
 
 #[test]
 fn silence_and_scarcity() {
     let points = logistic(3.83, 500);
-    let escaped = classify(&points, &Question { t_end: Some(1000.0), ..Question::default() }, &Thresholds::default());
+    let escaped = classify(
+        &points,
+        &Question { t_end: Some(1000.0), ..Question::default() },
+        &Thresholds::default(),
+    );
     assert!(matches!(escaped.verdict, Verdict::Escaped { last_crossing: 499.0 }), "{escaped:?}");
-    let whole = classify(&points, &Question { t_end: Some(500.0), ..Question::default() }, &Thresholds::default());
+    let whole = classify(
+        &points,
+        &Question { t_end: Some(500.0), ..Question::default() },
+        &Thresholds::default(),
+    );
     assert_eq!(whole.name, "periodic");
     assert!(matches!(judge(&points[..12]).verdict, Verdict::TooFew { points: 12 }));
     assert!(matches!(judge(&[]).verdict, Verdict::TooFew { points: 0 }));
@@ -395,7 +483,14 @@ fn a_verdict_does_not_depend_on_units() {
     let scaled = |p: &[SectionPoint], a: f64| -> Vec<SectionPoint> {
         p.iter().map(|q| SectionPoint { t: 3.0 * q.t, u: q.u.map(|c| a * c), ..*q }).collect()
     };
-    let torus = section(&Torus { omega: 0.3636, gamma: 1e-4 }, vector![2.3, 0.0, 0.0], 8000.0, 1, 0.0, [0, 2]);
+    let torus = section(
+        &Torus { omega: 0.3636, gamma: 1e-4 },
+        vector![2.3, 0.0, 0.0],
+        8000.0,
+        1,
+        0.0,
+        [0, 2],
+    );
     for points in [logistic(3.83, 2000), logistic(3.9, 2000), torus] {
         let plain = judge(&points);
         for a in [1e-6, 1e4] {
@@ -406,7 +501,9 @@ fn a_verdict_does_not_depend_on_units() {
 
 #[test]
 fn no_known_answer_hangs_on_the_last_digit_of_a_threshold() {
-    let torus = |gamma| section(&Torus { omega: 0.618, gamma }, vector![2.3, 0.0, 0.0], 12_000.0, 1, 0.0, [0, 2]);
+    let torus = |gamma| {
+        section(&Torus { omega: 0.618, gamma }, vector![2.3, 0.0, 0.0], 12_000.0, 1, 0.0, [0, 2])
+    };
     let known = [
         (logistic(3.83, 2000), "periodic"),
         (logistic(3.9, 2000), "chaotic"),
@@ -416,7 +513,9 @@ fn no_known_answer_hangs_on_the_last_digit_of_a_threshold() {
     ];
     // Fewer points for the 0-1 test, for speed.
     let quick = Thresholds { zero_one_points: 800, ..Thresholds::default() };
-    let serde_json::Value::Object(defaults) = serde_json::to_value(quick).unwrap() else { panic!() };
+    let serde_json::Value::Object(defaults) = serde_json::to_value(quick).unwrap() else {
+        panic!()
+    };
     for (name, value) in &defaults {
         for factor in [0.75, 1.33] {
             let mut changed = defaults.clone();
@@ -448,7 +547,11 @@ fn claims_are_scored_by_one_rule() {
     let three = judge(&logistic(3.83, 1000));
     // Settled before the shown part begins, or not.
     let late = |shown_from| {
-        classify(&logistic(3.83, 1000), &Question { shown_from, ..Question::default() }, &Thresholds::default())
+        classify(
+            &logistic(3.83, 1000),
+            &Question { shown_from, ..Question::default() },
+            &Thresholds::default(),
+        )
     };
     assert!(late(500.0).dots_only && !late(0.0).dots_only);
     assert!(agrees(Claim::Period(3), &late(500.0)));
@@ -458,20 +561,41 @@ fn claims_are_scored_by_one_rule() {
     assert!(agrees(Claim::Chaos, &chaos) && !agrees(Claim::Period(1), &chaos));
     // Period one in the end, but chaos in the shown part.
     let points = sequence(henon(1500).into_iter().chain(std::iter::repeat_n([0.4, 0.1], 1500)));
-    let mixed = classify(&points, &Question { shown_from: 1000.0, ..Question::default() }, &Thresholds::default());
-    assert!(mixed.mixed && !agrees(Claim::Period(1), &mixed) && !agrees(Claim::Chaos, &mixed), "{mixed:?}");
-    let shown = classify(&points, &Question { shown_from: 2000.0, ..Question::default() }, &Thresholds::default());
+    let mixed = classify(
+        &points,
+        &Question { shown_from: 1000.0, ..Question::default() },
+        &Thresholds::default(),
+    );
+    assert!(
+        mixed.mixed && !agrees(Claim::Period(1), &mixed) && !agrees(Claim::Chaos, &mixed),
+        "{mixed:?}"
+    );
+    let shown = classify(
+        &points,
+        &Question { shown_from: 2000.0, ..Question::default() },
+        &Thresholds::default(),
+    );
     assert!(agrees(Claim::Period(1), &shown), "{shown:?}");
     // A spiral counts as its period, with the reservation written down.
-    let spiral =
-        judge(&section(&Torus { omega: 0.3636, gamma: 1e-4 }, vector![2.3, 0.0, 0.0], 12_000.0, 1, 0.0, [0, 2]));
+    let spiral = judge(&section(
+        &Torus { omega: 0.3636, gamma: 1e-4 },
+        vector![2.3, 0.0, 0.0],
+        12_000.0,
+        1,
+        0.0,
+        [0, 2],
+    ));
     let spiral = Evidence { mixed: false, ..spiral };
     let score = Claim::Period(1).score(&spiral);
     assert!(score.agrees && score.because.contains("approaching"), "{score:?}");
 }
 
 fn caricature(alpha: f64, beta: f64) -> Smoothed<Caricature> {
-    Smoothed { system: Caricature::with_reinjection(alpha, beta), transition: Transition::Tanh, eps: 1e-3 }
+    Smoothed {
+        system: Caricature::with_reinjection(alpha, beta),
+        transition: Transition::Tanh,
+        eps: 1e-3,
+    }
 }
 
 #[test]
@@ -479,32 +603,57 @@ fn closed_orbits_of_the_paper() {
     let plane = ReturnPlane { axis: 1, value: 0.0, upward: true };
     let settings = floquet::FloquetOptions::default();
     let find = |alpha: f64, beta: f64, returns: usize, x: f64, z: f64| {
-        closed_orbit::<3, 12, _>(&caricature(alpha, beta), plane, returns, vector![x, 0.0, z], &settings).unwrap()
+        closed_orbit::<3, 12, _>(
+            &caricature(alpha, beta),
+            plane,
+            returns,
+            vector![x, 0.0, z],
+            &settings,
+        )
+        .unwrap()
     };
     // SCIENCE, sec. 2: the printed reading's one orbit.
     let printed = find(1e-3, 1e-5, 1, 17.0, -0.01);
     assert!(
-        (printed.points[0][0] - 17.0573).abs() < 1e-4 && (printed.points[0][2] + 0.0154).abs() < 1e-4,
+        (printed.points[0][0] - 17.0573).abs() < 1e-4
+            && (printed.points[0][2] + 0.0154).abs() < 1e-4,
         "{printed:?}"
     );
-    assert!((printed.opposite[0][0] + 13.3857).abs() < 1e-4 && (printed.opposite[0][2] + 0.0199).abs() < 1e-4);
+    assert!(
+        (printed.opposite[0][0] + 13.3857).abs() < 1e-4
+            && (printed.opposite[0][2] + 0.0199).abs() < 1e-4
+    );
     assert!((printed.period - 20.25).abs() < 5e-3 && printed.rate > 0.0, "{printed:?}");
     // The two orbits of the reconstructed reading.
     let one = find(1e-1, 1e-5, 1, 0.81, 0.0);
-    assert!((one.points[0][0] - 0.81).abs() < 5e-3 && (one.opposite[0][0] + 0.67).abs() < 5e-3, "{one:?}");
+    assert!(
+        (one.points[0][0] - 0.81).abs() < 5e-3 && (one.opposite[0][0] + 0.67).abs() < 5e-3,
+        "{one:?}"
+    );
     let three = find(1e-1, 1e-5, 3, 1.21, 0.0);
     assert_eq!((three.points.len(), three.opposite.len()), (3, 3));
     for (x, z) in [(1.21, 0.0), (0.44, 0.29), (0.44, -0.29)] {
-        assert!(three.points.iter().any(|p| (p[0] - x).abs() < 5e-3 && (p[2] - z).abs() < 5e-3), "{three:?}");
+        assert!(
+            three.points.iter().any(|p| (p[0] - x).abs() < 5e-3 && (p[2] - z).abs() < 5e-3),
+            "{three:?}"
+        );
     }
     // Both attract, and slowly: this is why the paper throws away the first 10^5.
     for o in [&one, &three] {
         assert!(o.rate > 1e-5 && o.rate < 1e-4, "{o:?}");
     }
     // The numbers that README quotes, to the digits it quotes.
-    let modulus = |o: &floquet::ClosedOrbit| o.multipliers.iter().map(|m| m[0].hypot(m[1])).fold(0.0, f64::max);
-    assert!((printed.period - 20.248).abs() < 5e-4 && (modulus(&printed) - 0.969).abs() < 5e-4, "{printed:?}");
-    assert!((one.rate - 2.6e-5).abs() < 5e-7 && (three.rate - 2.6e-5).abs() < 5e-7, "{one:?} {three:?}");
+    let modulus = |o: &floquet::ClosedOrbit| {
+        o.multipliers.iter().map(|m| m[0].hypot(m[1])).fold(0.0, f64::max)
+    };
+    assert!(
+        (printed.period - 20.248).abs() < 5e-4 && (modulus(&printed) - 0.969).abs() < 5e-4,
+        "{printed:?}"
+    );
+    assert!(
+        (one.rate - 2.6e-5).abs() < 5e-7 && (three.rate - 2.6e-5).abs() < 5e-7,
+        "{one:?} {three:?}"
+    );
     // The dissipation is beta's: ten times beta, ten times the rate.
     for (returns, x, o) in [(1, 0.81, &one), (3, 1.21, &three)] {
         let strong = find(1e-1, 1e-4, returns, x, 0.0);
@@ -514,14 +663,16 @@ fn closed_orbits_of_the_paper() {
 
 #[test]
 fn hysteretic_cycle_contracts_by_its_multiplier() {
-    // Four dimensions: the reconstructed reading with a single division settles on two loops within t = 50.
+    // Four dimensions: the reconstructed reading with a single division settles on two loops within
+    // t = 50.
     let field = Hysteretic {
         system: Caricature::with_reinjection(1e-1, 1e-5),
         eps: 1e-3,
         eps_prime: 1e-2,
         relaxation: Relaxation::Single,
     };
-    // Each turn passes the singularity, which amplifies the solver's error some 10^6 times: at 1e-9 the dots are off by 5e-4.
+    // Each turn passes the singularity, which amplifies the solver's error some 10^6 times: at 1e-9
+    // the dots are off by 5e-4.
     let points = section_to(1e-12, &field, vector![0.2, 0.0, -1.0, 1.0], 600.0, 1, 0.0, [0, 2]);
     let e = judge(&points);
     assert!(matches!(&e.verdict, Verdict::Periodic(c) if c.period == 2), "{e:?}");
@@ -530,18 +681,24 @@ fn hysteretic_cycle_contracts_by_its_multiplier() {
     let plane = ReturnPlane { axis: 1, value: 0.0, upward: true };
     // Away from the layer phi is 1 for x > 0 up to relaxation.
     let guess = vector![u[0], 0.0, u[1], 1.0];
-    let orbit = closed_orbit::<4, 20, _>(&field, plane, 2, guess, &floquet::FloquetOptions::default()).unwrap();
+    let orbit =
+        closed_orbit::<4, 20, _>(&field, plane, 2, guess, &floquet::FloquetOptions::default())
+            .unwrap();
     assert!((orbit.period - cycle.duration).abs() < 1e-5, "{orbit:?} {cycle:?}");
     let p = &orbit.points[0];
     assert!((p[0] - u[0]).abs() < 1e-5 && (p[2] - u[1]).abs() < 1e-5, "{orbit:?} {cycle:?}");
-    // The run comes in by the multiplier a turn: its upward points near this dot, from the third turn on.
+    // The run comes in by the multiplier a turn: its upward points near this dot, from the third
+    // turn on.
     let near: Vec<f64> = points
         .iter()
         .filter(|q| q.upward && (q.u[0] - u[0]).abs() + (q.u[1] - u[1]).abs() < 0.1)
         .map(|q| (q.u[0] - u[0]).hypot(q.u[1] - u[1]))
         .collect();
     let [first, last] = [near[3], near[9]];
-    assert!(((last / first).ln() / 6.0 - orbit.multipliers[0][0].ln()).abs() < 0.01, "{near:?} {orbit:?}");
+    assert!(
+        ((last / first).ln() / 6.0 - orbit.multipliers[0][0].ln()).abs() < 0.01,
+        "{near:?} {orbit:?}"
+    );
 }
 
 #[test]
@@ -554,8 +711,12 @@ fn spiral_of_the_reconstructed_reading_has_the_orbits_rate() {
     let plane = ReturnPlane { axis: 1, value: 0.0, upward: true };
     let settings = floquet::FloquetOptions::default();
     let u = cycle.points[0].u;
-    let orbit = closed_orbit::<3, 12, _>(&field, plane, 1, vector![u[0], 0.0, u[1]], &settings).unwrap();
-    assert!((cycle.approach.unwrap().per_time / orbit.rate - 1.0).abs() < 0.05, "{cycle:?} {orbit:?}");
+    let orbit =
+        closed_orbit::<3, 12, _>(&field, plane, 1, vector![u[0], 0.0, u[1]], &settings).unwrap();
+    assert!(
+        (cycle.approach.unwrap().per_time / orbit.rate - 1.0).abs() < 0.05,
+        "{cycle:?} {orbit:?}"
+    );
     let [re, im] = orbit.multipliers[0];
     let angle = im.abs().atan2(re) / std::f64::consts::TAU;
     assert!((cycle.rotation.unwrap().abs() - angle).abs() < 1e-3, "{cycle:?} {orbit:?}");
@@ -566,10 +727,17 @@ fn exponent_of_the_reconstructed_chaos_converges_in_tolerance() {
     let field = caricature(1e-1, 1e-5);
     let [loose, tight] = [1e-9, 1e-11].map(|tol| {
         let tolerance = Tolerance { rtol: tol, atol: tol };
-        let settings = lyapunov::LyapunovOptions { tolerance, max_step: 1.0, duration: 3000.0, ..Default::default() };
+        let settings = lyapunov::LyapunovOptions {
+            tolerance,
+            max_step: 1.0,
+            duration: 3000.0,
+            ..Default::default()
+        };
         largest::<3, 6, _>(&field, vector![0.2, 0.0, -1.0], &settings).unwrap()
     });
-    let error = (loose.standard_error * loose.standard_error + tight.standard_error * tight.standard_error).sqrt();
+    let error = (loose.standard_error * loose.standard_error
+        + tight.standard_error * tight.standard_error)
+        .sqrt();
     assert!((loose.value - tight.value).abs() < 4.0 * error, "{loose:?} {tight:?}");
     assert!(tight.value > 5.0 * tight.standard_error, "{tight:?}");
 }
@@ -577,7 +745,8 @@ fn exponent_of_the_reconstructed_chaos_converges_in_tolerance() {
 #[test]
 fn exponent_on_a_closed_orbit_is_zero() {
     // Along the orbit nothing grows or shrinks on average; across it everything shrinks.
-    let settings = lyapunov::LyapunovOptions { transient: 500.0, duration: 1000.0, ..Default::default() };
+    let settings =
+        lyapunov::LyapunovOptions { transient: 500.0, duration: 1000.0, ..Default::default() };
     let e = largest::<2, 4, _>(&VanDerPol, vector![2.0, 0.0], &settings).unwrap();
     assert!(e.value.abs() < 2e-3, "{e:?}");
 }

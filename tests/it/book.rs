@@ -1,8 +1,9 @@
 //! The book under docs/: every command in it is run, every link and every chapter exists.
 //!
-//! A block ```` ```sh ```` holds commands, one a line; `sh,exit=N` those that must end with another exit code than 0. A block after a line
-//! `<!-- file: NAME -->` is written to that file first. A chapter's commands are run in their order, in a folder of their own, through a
-//! shell, with the program that was built for the tests.
+//! A block ```` ```sh ```` holds commands, one a line; `sh,exit=N` those that must end with another
+//! exit code than 0. A block after a line `<!-- file: NAME -->` is written to that file first. A
+//! chapter's commands are run in their order, in a folder of their own, through a shell, with the
+//! program that was built for the tests.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -29,16 +30,22 @@ fn actions(text: &str) -> Vec<Action> {
             continue;
         }
         let Some(language) = line.strip_prefix("```") else { continue };
-        let block: Vec<(usize, &str)> = lines.by_ref().take_while(|(_, l)| !l.starts_with("```")).collect();
+        let block: Vec<(usize, &str)> =
+            lines.by_ref().take_while(|(_, l)| !l.starts_with("```")).collect();
         if let Some(file) = file.take() {
-            actions.push(Action::Write { file, text: block.iter().map(|(_, l)| format!("{l}\n")).collect() });
+            actions.push(Action::Write {
+                file,
+                text: block.iter().map(|(_, l)| format!("{l}\n")).collect(),
+            });
             continue;
         }
         let mut words = language.split(',').map(str::trim);
         if words.next() != Some("sh") {
             continue;
         }
-        let exit = words.find_map(|w| w.strip_prefix("exit=")).map_or(0, |n| n.parse().expect("an exit code"));
+        let exit = words
+            .find_map(|w| w.strip_prefix("exit="))
+            .map_or(0, |n| n.parse().expect("an exit code"));
         let mut open = String::new();
         for (number, line) in block {
             open.push_str(line.trim());
@@ -82,8 +89,11 @@ fn every_command_of_the_book_does_what_it_says() {
         // Systems that ship are named as a reader in a clone names them.
         let systems = Path::new(ROOT).join("systems");
         fs::create_dir(folder.path().join("systems")).unwrap();
-        for system in fs::read_dir(systems).unwrap().map(|e| e.unwrap().path()).filter(|p| p.is_file()) {
-            fs::copy(&system, folder.path().join("systems").join(system.file_name().unwrap())).unwrap();
+        for system in
+            fs::read_dir(systems).unwrap().map(|e| e.unwrap().path()).filter(|p| p.is_file())
+        {
+            fs::copy(&system, folder.path().join("systems").join(system.file_name().unwrap()))
+                .unwrap();
         }
         for action in actions(&fs::read_to_string(&chapter).unwrap()) {
             match action {
@@ -93,9 +103,13 @@ fn every_command_of_the_book_does_what_it_says() {
                     fs::write(place, text).unwrap();
                 }
                 Action::Run { command, exit, line } => {
-                    let place = format!("{}:{line}: {command}", chapter.file_name().unwrap().to_string_lossy());
+                    let place = format!(
+                        "{}:{line}: {command}",
+                        chapter.file_name().unwrap().to_string_lossy()
+                    );
                     if let Some(target) = command.strip_prefix("make ") {
-                        // What make does is tested where it is done; here, that it can be done at all.
+                        // What make does is tested where it is done; here, that it can be done at
+                        // all.
                         let target = target.split_whitespace().next().unwrap();
                         assert!(
                             makefile.lines().any(|l| l.starts_with(&format!("{target}:"))),
@@ -103,7 +117,10 @@ fn every_command_of_the_book_does_what_it_says() {
                         );
                         continue;
                     }
-                    if ["cargo ", "pip ", "mdbook ", "python"].iter().any(|p| command.starts_with(p)) {
+                    if ["cargo ", "pip ", "mdbook ", "python"]
+                        .iter()
+                        .any(|p| command.starts_with(p))
+                    {
                         continue;
                     }
                     let known = command.starts_with("twofold ") || command.starts_with("cmp ");
@@ -115,17 +132,25 @@ fn every_command_of_the_book_does_what_it_says() {
                         .output()
                         .unwrap();
                     let said = String::from_utf8_lossy(&output.stderr);
-                    if command.starts_with("twofold check") && std::env::var_os("TWOFOLD_BLESS").is_some() {
+                    if command.starts_with("twofold check")
+                        && std::env::var_os("TWOFOLD_BLESS").is_some()
+                    {
                         // The references are about to be made anew.
                         assert!(matches!(output.status.code(), Some(0 | 1)), "{place}\n{said}");
                         continue;
                     }
                     assert_eq!(output.status.code(), Some(exit), "{place}\n{said}");
                     assert_eq!(exit == 0, !said.contains("error:"), "{place}\n{said}");
-                    let out = command.split(" --out ").nth(1).and_then(|rest| rest.split_whitespace().next());
+                    let out = command
+                        .split(" --out ")
+                        .nth(1)
+                        .and_then(|rest| rest.split_whitespace().next());
                     if let Some(out) = out.filter(|out| exit == 0 && *out != "-") {
                         let there = fs::metadata(folder.path().join(out));
-                        assert!(there.is_ok_and(|m| m.is_dir() || m.len() > 100), "{place}: {out} was not written");
+                        assert!(
+                            there.is_ok_and(|m| m.is_dir() || m.len() > 100),
+                            "{place}: {out} was not written"
+                        );
                     }
                     run += 1;
                 }
@@ -138,16 +163,25 @@ fn every_command_of_the_book_does_what_it_says() {
 /// The anchor of a heading, as GitHub and mdBook make it.
 fn slug(heading: &str) -> String {
     let words = heading.trim_start_matches('#').trim().to_lowercase();
-    words.chars().filter(|c| c.is_alphanumeric() || " -_".contains(*c)).collect::<String>().replace(' ', "-")
+    words
+        .chars()
+        .filter(|c| c.is_alphanumeric() || " -_".contains(*c))
+        .collect::<String>()
+        .replace(' ', "-")
 }
 
 #[test]
 fn every_chapter_is_in_the_summary_and_every_link_leads_somewhere() {
     let docs = Path::new(ROOT).join("docs");
     let links = |text: &str| -> Vec<String> {
-        text.split("](").skip(1).filter_map(|rest| rest.split(')').next()).map(str::to_owned).collect()
+        text.split("](")
+            .skip(1)
+            .filter_map(|rest| rest.split(')').next())
+            .map(str::to_owned)
+            .collect()
     };
-    let summary: BTreeSet<String> = links(&fs::read_to_string(docs.join("SUMMARY.md")).unwrap()).into_iter().collect();
+    let summary: BTreeSet<String> =
+        links(&fs::read_to_string(docs.join("SUMMARY.md")).unwrap()).into_iter().collect();
     for chapter in chapters() {
         let name = chapter.file_name().unwrap().to_string_lossy().into_owned();
         assert!(name == "SUMMARY.md" || summary.contains(&name), "{name} is in no chapter list");
@@ -159,7 +193,10 @@ fn every_chapter_is_in_the_summary_and_every_link_leads_somewhere() {
             if page.ends_with(".md") && !page.contains("://") && !anchor.is_empty() {
                 let text = fs::read_to_string(docs.join(page)).unwrap();
                 let headings = text.lines().filter(|l| l.starts_with('#')).map(slug);
-                assert!(headings.into_iter().any(|h| h == anchor), "{name}: {page} has no heading for #{anchor}");
+                assert!(
+                    headings.into_iter().any(|h| h == anchor),
+                    "{name}: {page} has no heading for #{anchor}"
+                );
             }
         }
     }
@@ -167,7 +204,8 @@ fn every_chapter_is_in_the_summary_and_every_link_leads_somewhere() {
 
 #[test]
 fn blocks_are_read_as_they_are_meant() {
-    let text = "<!-- file: a.toml -->\n```toml\nx = 1\n```\n\n```sh,exit=2\ntwofold run \\\n  --x\n# no\n```\n```text\ntwofold no\n```\n";
+    let text = "<!-- file: a.toml -->\n```toml\nx = 1\n```\n\n```sh,exit=2\ntwofold run \\\n  \
+        --x\n# no\n```\n```text\ntwofold no\n```\n";
     let expected = [
         Action::Write { file: "a.toml".into(), text: "x = 1\n".into() },
         Action::Run { command: "twofold run --x".into(), exit: 2, line: 8 },

@@ -12,7 +12,8 @@ fn the_report_works_in_a_browser() {
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/scripts/browser_test.mjs");
     let output = Command::new("node").arg(script).arg("--require").arg("--bins").arg(bins).output();
     let output = output.unwrap_or_else(|error| panic!("Node cannot be run: {error}"));
-    let text = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned()
+        + &String::from_utf8_lossy(&output.stderr);
     eprintln!("{text}");
     assert!(output.status.success(), "{text}");
 }

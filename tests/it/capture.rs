@@ -1,5 +1,5 @@
-//! The study of figures/capture: docs/capture.md and docs/parameters.md say what its files say. `TWOFOLD_UPDATE=1 cargo test --test it capture::` writes the
-//! texts anew.
+//! The study of figures/capture: docs/capture.md and docs/parameters.md say what its files say.
+//! `TWOFOLD_UPDATE=1 cargo test --test it capture::` writes the texts anew.
 
 use std::fs;
 
@@ -21,11 +21,14 @@ pub fn table(name: &str) -> Table {
 /// Fig. 7(iii) by LSODA, from the census, and by the others.
 fn methods() -> Vec<(Reading, Vec<ByMethod>)> {
     let census = table("census/fig7");
-    let others = [("dopri5", "Dormand-Prince"), ("radau5", "Radau IIA"), ("taylor", "Taylor 10⁻¹⁵")];
+    let others =
+        [("dopri5", "Dormand-Prince"), ("radau5", "Radau IIA"), ("taylor", "Taylor 10⁻¹⁵")];
     let of = |reading: Reading| {
         let alpha = || vec![("params.alpha", Entry::Number(reading.caricature().alpha))];
         let lsoda = ByMethod { name: "LSODA", runs: PANELS[2].runs(&census, alpha()) };
-        let made = |(file, name): (&str, &'static str)| (format!("capture/{file}-{}", reading.word()), name);
+        let made = |(file, name): (&str, &'static str)| {
+            (format!("capture/{file}-{}", reading.word()), name)
+        };
         let by = |(file, name): (String, &'static str)| ByMethod {
             name,
             runs: twofold::paper::census::runs(&table(&file), &alpha()),
@@ -63,7 +66,8 @@ pub fn page_says(page: &str, begin: &str, end: &str, texts: &[String]) {
     let mut after = parts.next().unwrap().to_owned();
     let mut texts = texts.iter();
     for part in parts {
-        let (_, rest) = part.split_once(end).unwrap_or_else(|| panic!("a text in {page} has no end"));
+        let (_, rest) =
+            part.split_once(end).unwrap_or_else(|| panic!("a text in {page} has no end"));
         let text = texts.next().unwrap_or_else(|| panic!("{page} has more places than texts"));
         after.push_str(&format!("{begin}\n\n{}\n\n{end}{rest}", text.trim()));
     }
@@ -71,7 +75,10 @@ pub fn page_says(page: &str, begin: &str, end: &str, texts: &[String]) {
     if std::env::var_os("TWOFOLD_UPDATE").is_some() {
         fs::write(path(page), after).unwrap();
     } else {
-        assert!(before == after, "{page} does not say what the runs say; TWOFOLD_UPDATE=1 writes:\n{after}");
+        assert!(
+            before == after,
+            "{page} does not say what the runs say; TWOFOLD_UPDATE=1 writes:\n{after}"
+        );
     }
 }
 
@@ -79,7 +86,8 @@ pub fn page_says(page: &str, begin: &str, end: &str, texts: &[String]) {
 fn the_page_of_methods_says_what_the_study_says() {
     let rules = &claims().rules;
     let (fig7, fig8) = (table("census/fig7"), table("census/fig8"));
-    let texts = [capture::capture_text(&methods(), rules), capture::effects_text(&fig7, &fig8, rules)];
+    let texts =
+        [capture::capture_text(&methods(), rules), capture::effects_text(&fig7, &fig8, rules)];
     page_says("docs/capture.md", capture::BEGIN, capture::END, &texts);
 }
 
@@ -88,7 +96,8 @@ fn the_page_of_parameters_says_what_the_study_says() {
     let rules = &claims().rules;
     let candidates = candidates();
     assert_eq!(candidates.len(), 8);
-    let [map7, map8, old7, old8] = ["capture/map7", "capture/map8", "audit/fig7", "audit/fig8"].map(table);
+    let [map7, map8, old7, old8] =
+        ["capture/map7", "capture/map8", "audit/fig7", "audit/fig8"].map(table);
     let texts = [
         capture::likelihood_text(&candidates, rules),
         capture::priors_text(&candidates, rules),
@@ -102,14 +111,21 @@ fn the_page_of_parameters_says_what_the_study_says() {
 fn the_findings_have_the_hazard_ratios_of_the_study() {
     let rules = &claims().rules;
     let (_, reconstructed) = &methods()[1];
-    let times = |m: &ByMethod| -> Vec<_> { m.runs.iter().map(|r| capture::time(r, rules.end)).collect() };
-    let [findings, readme] = ["docs/findings.md", "README.md"].map(|page| fs::read_to_string(path(page)).unwrap());
+    let times =
+        |m: &ByMethod| -> Vec<_> { m.runs.iter().map(|r| capture::time(r, rules.end)).collect() };
+    let [findings, readme] =
+        ["docs/findings.md", "README.md"].map(|page| fs::read_to_string(path(page)).unwrap());
     for name in ["Dormand-Prince", "Taylor 10⁻¹⁵"] {
         let method = reconstructed.iter().find(|m| m.name == name).unwrap();
-        let ratio = effects::LogRank::of(&times(method), &times(&reconstructed[0])).hazard_ratio(rules.confidence);
+        let ratio = effects::LogRank::of(&times(method), &times(&reconstructed[0]))
+            .hazard_ratio(rules.confidence);
         let [low, high] = ratio.interval;
         let said = format!("{:.2} [{low:.2}, {high:.2}]", ratio.value);
-        assert!(findings.contains(&said) && readme.contains(&format!("{:.2}", ratio.value)), "{}: {said}", method.name);
+        assert!(
+            findings.contains(&said) && readme.contains(&format!("{:.2}", ratio.value)),
+            "{}: {said}",
+            method.name
+        );
     }
 }
 
@@ -124,7 +140,9 @@ pub fn come_out_the_same(numbers: &[(&str, u64)]) {
 
 /// No two rows of these sweeps have one start.
 pub fn share_no_start(sweeps: &[&str]) {
-    let starts = |name: &&str| -> Vec<u64> { table(name).numbers("shift.x").iter().map(|v| v.to_bits()).collect() };
+    let starts = |name: &&str| -> Vec<u64> {
+        table(name).numbers("shift.x").iter().map(|v| v.to_bits()).collect()
+    };
     let mut all: Vec<u64> = sweeps.iter().flat_map(starts).collect();
     let count = all.len();
     all.sort_unstable();
@@ -136,10 +154,12 @@ pub fn share_no_start(sweeps: &[&str]) {
 #[test]
 fn no_two_methods_share_a_start() {
     for reading in Reading::ALL {
-        let mut names: Vec<String> =
-            ["dopri5", "radau5", "taylor"].map(|m| format!("capture/{m}-{}", reading.word())).into();
+        let mut names: Vec<String> = ["dopri5", "radau5", "taylor"]
+            .map(|m| format!("capture/{m}-{}", reading.word()))
+            .into();
         names.retain(|name| path(&format!("figures/{name}.csv")).exists());
-        let all: Vec<&str> = ["census/fig7"].into_iter().chain(names.iter().map(String::as_str)).collect();
+        let all: Vec<&str> =
+            ["census/fig7"].into_iter().chain(names.iter().map(String::as_str)).collect();
         share_no_start(&all);
     }
 }
@@ -147,10 +167,18 @@ fn no_two_methods_share_a_start() {
 /// Rows that are quick, computed anew: the same to the last bit; and visits.
 #[test]
 fn committed_rows_of_the_study_come_out_the_same() {
-    come_out_the_same(&[("capture/dopri5-printed", 3), ("capture/taylor-printed", 3), ("capture/map7", 4)]);
+    come_out_the_same(&[
+        ("capture/dopri5-printed", 3),
+        ("capture/taylor-printed", 3),
+        ("capture/map7", 4),
+    ]);
     let table = visited();
     for (i, at) in visits::CANDIDATES.into_iter().enumerate() {
-        assert_eq!(f64::from(visits::visits(at, 7).unwrap()), table.numbers("visits")[30 * i + 7], "{at:?}");
+        assert_eq!(
+            f64::from(visits::visits(at, 7).unwrap()),
+            table.numbers("visits")[30 * i + 7],
+            "{at:?}"
+        );
     }
 }
 
@@ -160,7 +188,8 @@ fn the_likelihood_of_the_printed_numbers_is_bounded_without_a_prior() {
     let candidates = candidates();
     let printed = candidates.iter().find(|c| c.at == [1e-3, 1e-5]).unwrap();
     assert_eq!(printed.hits[..7].iter().filter(|k| **k == 0).count(), 4);
-    let most: f64 = printed.hits.iter().zip(printed.runs).map(|(k, n)| wilson(*k, n, 0.95)[1]).product();
+    let most: f64 =
+        printed.hits.iter().zip(printed.runs).map(|(k, n)| wilson(*k, n, 0.95)[1]).product();
     assert!(most < 1e-3, "{most}");
     println!(
         "{}\n{}",

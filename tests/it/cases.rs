@@ -1,4 +1,5 @@
-//! The cases of `tests/cases`: each command is run in its folder, and its answer compared with the known one.
+//! The cases of `tests/cases`: each command is run in its folder, and its answer compared with the
+//! known one.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -24,7 +25,8 @@ struct Table<'a> {
 
 impl<'a> Table<'a> {
     fn new(text: &'a str) -> Result<Self, String> {
-        let mut lines = text.lines().filter(|line| !line.trim().is_empty() && !line.starts_with('#'));
+        let mut lines =
+            text.lines().filter(|line| !line.trim().is_empty() && !line.starts_with('#'));
         let names = lines.next().ok_or("no table")?.split(',').collect();
         let rows: Vec<Vec<&str>> = lines.map(|line| line.split(',').collect()).collect();
         if rows.is_empty() { Err("no rows".into()) } else { Ok(Self { names, rows }) }
@@ -47,7 +49,12 @@ fn texts(value: &Value, key: &str) -> Vec<String> {
 /// The patterns that `text` contains, without regard to case.
 fn found(patterns: &[String], text: &str) -> Vec<String> {
     let contains = |pattern: &&String| {
-        RegexBuilder::new(pattern).case_insensitive(true).multi_line(true).build().unwrap().is_match(text)
+        RegexBuilder::new(pattern)
+            .case_insensitive(true)
+            .multi_line(true)
+            .build()
+            .unwrap()
+            .is_match(text)
     };
     patterns.iter().filter(contains).cloned().collect()
 }
@@ -96,10 +103,16 @@ fn check(expected: &Value, answer: &Answer) -> Result<(), String> {
                 return Err(failed());
             }
             let cells = Table::new(&answer.out)?.column(expected["column"].as_str().unwrap())?;
-            let values =
-                cells.into_iter().filter(|cell| !cell.is_empty()).map(parsed).collect::<Result<Vec<_>, _>>()?;
+            let values = cells
+                .into_iter()
+                .filter(|cell| !cell.is_empty())
+                .map(parsed)
+                .collect::<Result<Vec<_>, _>>()?;
             let least = kind == "column_min";
-            let value = values.into_iter().reduce(if least { f64::min } else { f64::max }).ok_or("no values")?;
+            let value = values
+                .into_iter()
+                .reduce(if least { f64::min } else { f64::max })
+                .ok_or("no values")?;
             let low = expected["at_least"].as_f64().unwrap_or(f64::NEG_INFINITY);
             let high = expected["at_most"].as_f64().unwrap_or(f64::INFINITY);
             (low <= value && value <= high).then_some(()).ok_or(format!("{kind}: {value:e}"))
@@ -113,11 +126,15 @@ fn check(expected: &Value, answer: &Answer) -> Result<(), String> {
                 return Err(format!("the error says: {}", answer.err.trim()));
             }
             let bad = found(&texts(expected, "must_not_contain"), &answer.err);
-            bad.is_empty().then_some(()).ok_or(format!("the error says {bad:?}: {}", answer.err.trim()))
+            bad.is_empty()
+                .then_some(())
+                .ok_or(format!("the error says {bad:?}: {}", answer.err.trim()))
         }
         "contains_any" => {
             let wanted = texts(expected, "texts");
-            (!found(&wanted, &both).is_empty()).then_some(()).ok_or(format!("none of {wanted:?} in {both}"))
+            (!found(&wanted, &both).is_empty())
+                .then_some(())
+                .ok_or(format!("none of {wanted:?} in {both}"))
         }
         "not_contains" => {
             let mut unwanted = texts(expected, "texts");
@@ -172,14 +189,15 @@ fn outcome(case: &Path) -> Result<(), String> {
     check(&expected, &answer)
 }
 
-/// `open.txt` names the cases that are not right yet. It must shrink: a case that it names and that is right fails
-/// the test, too.
+/// `open.txt` names the cases that are not right yet. It must shrink: a case that it names and that
+/// is right fails the test, too.
 #[test]
 fn cases_are_right_but_for_those_known_to_be_open() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases");
     let open = fs::read_to_string(folder.join("open.txt")).unwrap();
     let open: Vec<&str> = open.lines().filter(|line| !line.starts_with('#')).collect();
-    let mut cases: Vec<_> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let mut cases: Vec<_> =
+        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     cases.retain(|case| case.is_dir());
     cases.sort();
     assert!(cases.len() >= 59, "{} cases", cases.len());

@@ -1,4 +1,5 @@
-//! The committed census: its sweeps are those of the figures, its rows come out the same today, and docs/census.md says what it says.
+//! The committed census: its sweeps are those of the figures, its rows come out the same today, and
+//! docs/census.md says what it says.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -21,16 +22,20 @@ pub fn path(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
 }
 
-/// Files of a figure as they stand, so that texts can be compared with data before the library has taken them in.
+/// Files of a figure as they stand, so that texts can be compared with data before the library has
+/// taken them in.
 fn on_disk(folder: &str) -> impl Fn(&str) -> Result<Vec<u8>, JobError> {
-    move |name| fs::read(path(folder).join(name)).map_err(|e| JobError::Other(format!("{name}: {e}")))
+    move |name| {
+        fs::read(path(folder).join(name)).map_err(|e| JobError::Other(format!("{name}: {e}")))
+    }
 }
 
 pub fn rows(name: &str) -> Rows {
     Rows::from_csv(&fs::read(path(name)).unwrap()).unwrap()
 }
 
-/// The rows' run is that of the figure's panels, but for what is varied; starts stay within the rules' shift.
+/// The rows' run is that of the figure's panels, but for what is varied; starts stay within the
+/// rules' shift.
 #[test]
 fn the_sweeps_are_those_of_the_figures() {
     let all = figures::all();
@@ -38,7 +43,8 @@ fn the_sweeps_are_those_of_the_figures() {
         let rows = rows(&format!("figures/census/{id}.csv"));
         let figure = all.iter().find(|f| f.id == id).unwrap();
         let panels: Vec<_> = figure.pictures.iter().flat_map(|p| &p.panels).collect();
-        let axes: Vec<String> = rows.sweep().axes().iter().map(|a: &Axis| a.coordinate.to_string()).collect();
+        let axes: Vec<String> =
+            rows.sweep().axes().iter().map(|a: &Axis| a.coordinate.to_string()).collect();
         assert_eq!(axes, ["params.alpha", column, "shift.x", "shift.y", "shift.z"]);
         // One row for each panel of both readings is a whole draw.
         let mut seen = Vec::new();
@@ -47,7 +53,8 @@ fn the_sweeps_are_those_of_the_figures() {
             let start = run.start.clone();
             let near = panels.iter().position(|panel| {
                 let mut there = panel.run.clone();
-                let shift = there.start.iter().zip(&start).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                let shift =
+                    there.start.iter().zip(&start).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
                 there.start.clone_from(&start);
                 there == run && shift <= claims().rules.shift * (1.0 + 1e-6)
             });
@@ -58,8 +65,8 @@ fn the_sweeps_are_those_of_the_figures() {
     }
 }
 
-/// `make census` and `make capture` ask for the sweeps that are committed: a part without rows of each is a file that says which sweep it is of. All
-/// committed files are among them.
+/// `make census` and `make capture` ask for the sweeps that are committed: a part without rows of
+/// each is a file that says which sweep it is of. All committed files are among them.
 #[test]
 fn make_census_goes_on_with_what_is_committed() {
     asks_for_what_is_committed("census", &["census", "audit", "basin", "control"]);
@@ -68,7 +75,11 @@ fn make_census_goes_on_with_what_is_committed() {
 
 fn asks_for_what_is_committed(target: &str, folders: &[&str]) {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let make = Command::new("make").current_dir(root).args(["-n", target]).output().expect("make is there");
+    let make = Command::new("make")
+        .current_dir(root)
+        .args(["-n", target])
+        .output()
+        .expect("make is there");
     assert!(make.status.success(), "{}", String::from_utf8_lossy(&make.stderr));
     let folder = tempfile::tempdir().unwrap();
     let mut found = Vec::new();
@@ -98,7 +109,10 @@ fn asks_for_what_is_committed(target: &str, folders: &[&str]) {
         assert!(run.status.success(), "{name}: {}", String::from_utf8_lossy(&run.stderr));
         let asked = Rows::from_csv(&fs::read(&part).unwrap()).unwrap();
         assert_eq!(asked.len(), 0);
-        assert!(asked.sweep() == rows(name).sweep(), "make {target} asks for another sweep than {name} holds");
+        assert!(
+            asked.sweep() == rows(name).sweep(),
+            "make {target} asks for another sweep than {name} holds"
+        );
         found.push(name.to_owned());
     }
     found.sort();
@@ -112,7 +126,8 @@ fn asks_for_what_is_committed(target: &str, folders: &[&str]) {
     assert_eq!(found, committed);
 }
 
-/// Rows of the printed reading and of the basins, which are quick, computed anew: the same to the last bit.
+/// Rows of the printed reading and of the basins, which are quick, computed anew: the same to the
+/// last bit.
 #[test]
 fn committed_rows_come_out_the_same() {
     for (name, wanted) in [
@@ -131,7 +146,8 @@ fn committed_rows_come_out_the_same() {
 
 #[test]
 fn the_page_says_what_the_census_says() {
-    let found = Reading::ALL.map(|reading| figures::census::found_in(reading, &on_disk("figures/census")).unwrap());
+    let found = Reading::ALL
+        .map(|reading| figures::census::found_in(reading, &on_disk("figures/census")).unwrap());
     let text = census::text(&found, figures::reference);
     let page = fs::read_to_string(path("docs/census.md")).unwrap();
     let (_, rest) = page.split_once(census::BEGIN).expect("the page has a place for the census");
@@ -145,10 +161,13 @@ fn the_page_says_what_the_census_says() {
 
 #[test]
 fn the_book_says_what_other_limits_would_do() {
-    let found = Reading::ALL.map(|reading| figures::census::found_in(reading, &on_disk("figures/census")).unwrap());
+    let found = Reading::ALL
+        .map(|reading| figures::census::found_in(reading, &on_disk("figures/census")).unwrap());
     let text = census::limits_text(&found);
     let book = fs::read_to_string(path("docs/census-sweeps.md")).unwrap();
-    let (_, rest) = book.split_once(census::LIMITS_BEGIN).expect("docs/census-sweeps.md has a place for the limits");
+    let (_, rest) = book
+        .split_once(census::LIMITS_BEGIN)
+        .expect("docs/census-sweeps.md has a place for the limits");
     let (said, _) = rest.split_once(census::LIMITS_END).expect("its text about the limits ends");
     assert!(
         said.trim() == text.trim(),
@@ -157,7 +176,8 @@ fn the_book_says_what_other_limits_would_do() {
     );
 }
 
-/// More draws go on with the rows of fewer: the file is that of a sweep made at once. Fewer draws are another sweep.
+/// More draws go on with the rows of fewer: the file is that of a sweep made at once. Fewer draws
+/// are another sweep.
 #[test]
 fn a_sweep_is_gone_on_with_for_more_draws() {
     let folder = tempfile::tempdir().unwrap();
@@ -247,6 +267,7 @@ fn a_journal_is_gone_on_with() {
     journal.append(&whole.journal_heading()).unwrap();
     journal.append(&planted(&whole.journal()[1])).unwrap();
     drop(journal);
-    let error = recompute(&[("a.csv", &whole.csv())], folder.path(), 1, &Progress::new(true)).unwrap_err();
+    let error =
+        recompute(&[("a.csv", &whole.csv())], folder.path(), 1, &Progress::new(true)).unwrap_err();
     assert!(error.to_string().contains("row 0 of a.csv"), "{error}");
 }

@@ -1,4 +1,5 @@
-//! The paper's sentences, measured: each quantity that crates/paper/src/claims.toml names for a sentence is read by the test that it names.
+//! The paper's sentences, measured: each quantity that crates/paper/src/claims.toml names for a
+//! sentence is read by the test that it names.
 #![allow(clippy::disallowed_methods)] // compared with tolerances, not with hashes
 
 use std::collections::BTreeSet;
@@ -23,7 +24,8 @@ use twofold::paper::{Figure, Reading, figures};
 use twofold::record::Manifest;
 use twofold::system::filippov::{normal_form_constants, two_fold};
 use twofold::system::{
-    Caricature, Hysteretic, PiecewiseSmooth, Relaxation, Reversed, Smoothed, Transition, VectorField, Wheel,
+    Caricature, Hysteretic, PiecewiseSmooth, Relaxation, Reversed, Smoothed, Transition,
+    VectorField, Wheel,
 };
 
 /// The quantities that a test measures. Every one of them must have been read when it is dropped.
@@ -41,11 +43,15 @@ impl Reads {
         Self { left }
     }
 
-    /// Holds what was measured against the sentence: it lies where the sentence is true if and only if claims.toml says so.
+    /// Holds what was measured against the sentence: it lies where the sentence is true if and only
+    /// if claims.toml says so.
     pub fn read(&mut self, id: &str, quantity: &str, value: f64) {
         let known = self.left.len();
         self.left.retain(|left| *left != (id, quantity));
-        assert!(self.left.len() + 1 == known, "{id}: \"{quantity}\" is another test's, or was read before");
+        assert!(
+            self.left.len() + 1 == known,
+            "{id}: \"{quantity}\" is another test's, or was read before"
+        );
         let sentence = claims().sentence.iter().find(|s| s.id == id).unwrap();
         let Quantity { true_within: [low, high], holds, .. } =
             sentence.reads.iter().find(|r| r.quantity == quantity).unwrap();
@@ -62,14 +68,17 @@ impl Drop for Reads {
     }
 }
 
-/// Every test that a sentence names exists, is run by `make test`, and begins by asking for what it has to read: it cannot pass without.
+/// Every test that a sentence names exists, is run by `make test`, and begins by asking for what it
+/// has to read: it cannot pass without.
 #[test]
 fn every_quantity_is_read_by_the_test_that_claims_toml_names() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it");
     let main = fs::read_to_string(folder.join("main.rs")).unwrap();
-    let named: BTreeSet<&str> = claims().sentence.iter().flat_map(|s| &s.reads).map(|r| r.test.as_str()).collect();
+    let named: BTreeSet<&str> =
+        claims().sentence.iter().flat_map(|s| &s.reads).map(|r| r.test.as_str()).collect();
     for test in &named {
-        let (module, function) = test.split_once("::").unwrap_or_else(|| panic!("{test} is no module::function"));
+        let (module, function) =
+            test.split_once("::").unwrap_or_else(|| panic!("{test} is no module::function"));
         assert!(main.contains(&format!("mod {module};")), "{test}: there is no such module");
         let text = fs::read_to_string(folder.join(format!("{module}.rs"))).unwrap();
         let (before, body) = text
@@ -88,9 +97,14 @@ fn every_quantity_is_read_by_the_test_that_claims_toml_names() {
     let files = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path());
     for file in files.filter(|file| file.extension().is_some_and(|e| e == "rs")) {
         let text = fs::read_to_string(file).unwrap();
-        for (_, rest) in text.match_indices("= Reads::by(\"").map(|(at, found)| text.split_at(at + found.len())) {
+        for (_, rest) in
+            text.match_indices("= Reads::by(\"").map(|(at, found)| text.split_at(at + found.len()))
+        {
             let asked = rest.split('"').next().unwrap();
-            assert!(asked.contains('{') || named.contains(asked), "{asked} is named by no sentence");
+            assert!(
+                asked.contains('{') || named.contains(asked),
+                "{asked} is named by no sentence"
+            );
         }
     }
 }
@@ -117,12 +131,16 @@ impl FilippovObserver<3> for Visits {
     }
 }
 
-/// How often an orbit comes to the two-fold within 300, at most `wanted` times; it leaves at once to x > 0.
+/// How often an orbit comes to the two-fold within 300, at most `wanted` times; it leaves at once
+/// to x > 0.
 fn visits<P: PiecewiseSmooth<3> + Clone>(system: &P, start: SVector<f64, 3>, wanted: usize) -> usize
 where
     for<'a> twofold::integrate::filippov::SlidingFlow<'a, P, 3>: VectorField<4>,
 {
-    let settings = FilippovOptions { tolerance: Tolerance { rtol: 1e-10, atol: 1e-10 }, ..FilippovOptions::default() };
+    let settings = FilippovOptions {
+        tolerance: Tolerance { rtol: 1e-10, atol: 1e-10 },
+        ..FilippovOptions::default()
+    };
     let mut seen = Visits { wanted, seen: 0 };
     let exit = ExitRule::AfterTime { time: 0.3, side: Side::Plus };
     let _ = run(system, start, 300.0, &settings, exit, &mut seen).unwrap();
@@ -152,7 +170,16 @@ fn one_state_has_several_futures() {
     let system = Reading::Reconstructed.caricature();
     let after = |side| {
         let rule = ExitRule::AtOnce { side };
-        run(&system, SVector::zeros(), 1.0, &FilippovOptions::default(), rule, &mut Trajectory::new(1)).unwrap().x
+        run(
+            &system,
+            SVector::zeros(),
+            1.0,
+            &FilippovOptions::default(),
+            rule,
+            &mut Trajectory::new(1),
+        )
+        .unwrap()
+        .x
     };
     reads.read(
         "1.1",
@@ -167,8 +194,13 @@ fn h_is_the_slip_along_the_axle() {
     let (wheel, mut random) = (Wheel::default(), RandomStream::new(2013, 0));
     let mut worst = 0.0_f64;
     for _ in 0..100 {
-        let state = vector![random.uniform_in(0.1, 1.0), random.uniform_in(-3.0, 3.0), random.uniform_in(-3.0, 3.0)];
-        // The wheel stands at (r, d) of the housing, which turns over the disc; its velocity over the disc by a difference quotient.
+        let state = vector![
+            random.uniform_in(0.1, 1.0),
+            random.uniform_in(-3.0, 3.0),
+            random.uniform_in(-3.0, 3.0)
+        ];
+        // The wheel stands at (r, d) of the housing, which turns over the disc; its velocity over
+        // the disc by a difference quotient.
         let place = |t: f64| {
             let (angle, along) = ((state[2] - wheel.omega0) * t, state[0] + state[1] * t);
             let (s, c) = angle.sin_cos();
@@ -196,7 +228,11 @@ fn starts_around_the_origin_reach_it() {
             both += usize::from(found >= 1 && visits(&Reversed(system), start, 1) == 1);
         }
         let of = |quantity| of(reading, quantity);
-        reads.read("2.4", &of("share of starts around the origin that reach it within 300"), share(once, STARTS));
+        reads.read(
+            "2.4",
+            &of("share of starts around the origin that reach it within 300"),
+            share(once, STARTS),
+        );
         reads.read(
             "4.2",
             &of("share of starts around the origin that slide through it and come back within 300"),
@@ -231,7 +267,9 @@ fn a_whole_volume_reaches_the_singularity() {
         );
         reads.read(
             "3.9",
-            &of("share of starts in a ball of 0.01 that reach the singularity within 300 backwards"),
+            &of(
+                "share of starts in a ball of 0.01 that reach the singularity within 300 backwards",
+            ),
             share(backwards, STARTS),
         );
     }
@@ -246,10 +284,13 @@ fn sliding_passes_from_attracting_to_repelling() {
         let start = vector![0.0, random.uniform_in(0.01, 1.0), random.uniform_in(0.01, 1.0)];
         let rule = ExitRule::AfterTime { time: 1e9, side: Side::Plus };
         let mut out = Trajectory::new(1);
-        let _ = run(&normal_form, start, 20.0, &FilippovOptions::default(), rule, &mut out).unwrap();
+        let _ =
+            run(&normal_form, start, 20.0, &FilippovOptions::default(), rule, &mut out).unwrap();
         let modes: Vec<Mode> = out.pieces.iter().map(|p| p.mode).collect();
         let reached = out.events.iter().any(|e| matches!(e.kind, EventKind::TwoFoldReached { .. }));
-        passed += usize::from(reached && modes.starts_with(&[Mode::SlidingAttracting, Mode::SlidingRepelling]));
+        passed += usize::from(
+            reached && modes.starts_with(&[Mode::SlidingAttracting, Mode::SlidingRepelling]),
+        );
     }
     reads.read(
         "3.1",
@@ -277,7 +318,8 @@ fn the_constants_satisfy_the_condition() {
 #[test]
 fn added_terms_are_of_second_order() {
     let mut reads = Reads::by("claims::added_terms_are_of_second_order");
-    let (whole, bare) = (Reading::Reconstructed.caricature(), Caricature::with_reinjection(0.0, 0.0));
+    let (whole, bare) =
+        (Reading::Reconstructed.caricature(), Caricature::with_reinjection(0.0, 0.0));
     let added = |size: f64| {
         let x = vector![0.3, -0.5, 0.8] * size;
         (whole.plus(&x) - bare.plus(&x)).norm() + (whole.minus(&x) - bare.minus(&x)).norm()
@@ -289,11 +331,13 @@ fn added_terms_are_of_second_order() {
 fn the_smoothed_field_has_bounded_slopes() {
     let mut reads = Reads::by("claims::the_smoothed_field_has_bounded_slopes");
     let (eps, mut random) = (1e-3, RandomStream::new(2013, 4));
-    let smoothed = Smoothed { system: Reading::Reconstructed.caricature(), transition: Transition::Tanh, eps };
+    let smoothed =
+        Smoothed { system: Reading::Reconstructed.caricature(), transition: Transition::Tanh, eps };
     let mut steepest = 0.0_f64;
     for k in 0..2000 {
         let x = in_ball(&mut random, 1.0).component_mul(&vector![3.0 * eps, 1.0, 1.0]);
-        // Distances from 1e-2 eps to 1e-8 eps: a jump would show as a slope that grows like their inverse.
+        // Distances from 1e-2 eps to 1e-8 eps: a jump would show as a slope that grows like their
+        // inverse.
         let near = x + in_ball(&mut random, 1.0) * eps * 10_f64.powi(-2 - k % 7);
         let slope = (smoothed.eval(&x) - smoothed.eval(&near)).norm() / (x - near).norm();
         steepest = steepest.max(slope);
@@ -310,14 +354,25 @@ fn transition_functions_against_eq_9() {
     let mut reads = Reads::by("claims::transition_functions_against_eq_9");
     // The largest distance from 1 beyond 30 eps, for two eps a factor of a hundred apart.
     let distance = |phi: Transition, eps: f64| {
-        (0..200).map(|k| 30.0 * eps + 0.01 * f64::from(k)).map(|x| (phi.eval(x, eps) - 1.0).abs()).fold(0.0, f64::max)
+        (0..200)
+            .map(|k| 30.0 * eps + 0.01 * f64::from(k))
+            .map(|x| (phi.eval(x, eps) - 1.0).abs())
+            .fold(0.0, f64::max)
     };
     let power = |phi| (distance(phi, 1e-4) / distance(phi, 1e-6)).log10() / 2.0;
     let perturbed = Transition::PerturbedTanh { sigma: 0.13 };
     // tanh is 1 to rounding there: it falls faster than any power.
     let tanh = if distance(Transition::Tanh, 1e-4) < 1e-15 { 1e9 } else { power(Transition::Tanh) };
-    reads.read("4.5", "power of eps of tanh's distance from eq. (9) beyond 30 eps, or infinite", tanh);
-    reads.read("4.5", "power of eps of the perturbed function's distance from eq. (9)", power(perturbed));
+    reads.read(
+        "4.5",
+        "power of eps of tanh's distance from eq. (9) beyond 30 eps, or infinite",
+        tanh,
+    );
+    reads.read(
+        "4.5",
+        "power of eps of the perturbed function's distance from eq. (9)",
+        power(perturbed),
+    );
     let eps = 1e-8;
     let sides = (perturbed.eval(0.1, eps) - 1.0).abs().max(perturbed.eval(-0.1, eps).abs());
     reads.read("8.5", "distance of phi from 1 and 0 on the two sides at eps = 1e-8", sides);
@@ -338,7 +393,11 @@ fn phi_is_drawn_to_its_ends() {
             worst = worst.max((eps_prime * rate + phi - end).abs());
         }
     }
-    reads.read("4.7", "distance between where phi is drawn and 0 or 1 beyond eps prime, read literally", worst);
+    reads.read(
+        "4.7",
+        "distance between where phi is drawn and 0 or 1 beyond eps prime, read literally",
+        worst,
+    );
 }
 
 fn figure(id: &str) -> Figure {
@@ -358,7 +417,11 @@ fn intervals_against_the_limit_of_steps() {
         let run = RunSpec { t_end: 200.0, ..panel(id, Reading::Printed, label) };
         simulate(&run, &()).unwrap().most_steps_in_segment as f64
     };
-    reads.read("5.1", "most steps in an interval of fig. 7(iii) until t = 200", most("fig7", "iii"));
+    reads.read(
+        "5.1",
+        "most steps in an interval of fig. 7(iii) until t = 200",
+        most("fig7", "iii"),
+    );
     reads.read("5.1", "most steps in an interval of fig. 9(i) until t = 200", most("fig9", "i"));
 }
 
@@ -367,7 +430,9 @@ fn visits_by_the_end_of_figure_6() {
     let mut reads = Reads::by("claims::visits_by_the_end_of_figure_6");
     for reading in Reading::ALL {
         let run = panel("fig6", reading, "i");
-        let Data::Path(samples) = simulate(&run, &()).unwrap().data else { panic!("fig. 6 is made of paths") };
+        let Data::Path(samples) = simulate(&run, &()).unwrap().data else {
+            panic!("fig. 6 is made of paths")
+        };
         let (mut away, mut visits) = (true, 0);
         for sample in &samples {
             let distance = SVector::from(sample.x).norm();
@@ -391,23 +456,36 @@ fn panels_of_figure_6_share_few_places() {
         let mut largest = 0.0_f64;
         for (k, a) in runs.iter().enumerate() {
             for b in &runs[k + 1..] {
-                let shared: Shared =
-                    executor.ask(&PathComparison(a.clone(), b.clone())).unwrap().fact("shared").unwrap();
+                let shared: Shared = executor
+                    .ask(&PathComparison(a.clone(), b.clone()))
+                    .unwrap()
+                    .fact("shared")
+                    .unwrap();
                 largest = largest.max(shared.overlap);
             }
         }
         let shared = executor.ask(&PathComparison(runs[2].clone(), runs[3].clone())).unwrap();
         let shared: Shared = shared.fact("shared").unwrap();
-        reads.read("6.1", &of(reading, "largest share of places that two panels have in common"), largest);
-        reads.read("6.3", &of(reading, "share of places that 6(iii) and 6(iv) have in common"), shared.overlap);
+        reads.read(
+            "6.1",
+            &of(reading, "largest share of places that two panels have in common"),
+            largest,
+        );
+        reads.read(
+            "6.3",
+            &of(reading, "share of places that 6(iii) and 6(iv) have in common"),
+            shared.overlap,
+        );
     }
 }
 
-/// The verdicts of the references, which the golden tests (fig. 6) and `make check` (fig. 9) compute again.
+/// The verdicts of the references, which the golden tests (fig. 6) and `make check` (fig. 9)
+/// compute again.
 #[test]
 fn committed_verdicts_say_so() {
     let mut reads = Reads::by("claims::committed_verdicts_say_so");
-    for (id, figure, labels) in [("6.2", "fig6", &["i"][..]), ("9.1", "fig9", &["i"]), ("9.2", "fig9", &["ii", "iii"])]
+    for (id, figure, labels) in
+        [("6.2", "fig6", &["i"][..]), ("9.1", "fig9", &["i"]), ("9.2", "fig9", &["ii", "iii"])]
     {
         let manifest = Manifest::parse(figures::reference(figure).unwrap(), figure).unwrap();
         for reading in Reading::ALL {
@@ -426,7 +504,8 @@ fn the_census_counts_outcomes() {
     for reading in Reading::ALL {
         let of = |quantity| of(reading, quantity);
         let runs = PANELS.map(|panel| figures::census::runs(panel.name, reading).unwrap());
-        let support: Vec<u64> = PANELS.iter().zip(&runs).map(|(p, runs)| supporting(p.said, runs, &rules)).collect();
+        let support: Vec<u64> =
+            PANELS.iter().zip(&runs).map(|(p, runs)| supporting(p.said, runs, &rules)).collect();
         for (id, hits) in ["7.1", "7.2", "7.3", "8.1", "8.2", "8.3"].into_iter().zip(&support) {
             reads.read(id, &of("runs of the panel with this outcome"), *hits as f64);
         }
@@ -436,14 +515,19 @@ fn the_census_counts_outcomes() {
             reads.read("5.2", quantity, seen as f64);
         }
         let decided = |counts: [u64; 6]| {
-            MotionKind::ALL.into_iter().zip(counts).filter(|(kind, n)| *kind != MotionKind::Undecided && *n > 0).count()
+            MotionKind::ALL
+                .into_iter()
+                .zip(counts)
+                .filter(|(kind, n)| *kind != MotionKind::Undecided && *n > 0)
+                .count()
         };
         let kinds = |runs: &[twofold::paper::census::CensusRun]| decided(tally(runs, rules.end));
         for (id, panels) in [("7.4", &runs[..3]), ("8.4", &runs[3..])] {
             let share = |runs: &[twofold::paper::census::CensusRun]| {
                 tally(runs, rules.end).map(|n| n as f64 / runs.len() as f64)
             };
-            let alike: f64 = (0..6).map(|k| panels.iter().map(|runs| share(runs)[k]).product::<f64>()).sum();
+            let alike: f64 =
+                (0..6).map(|k| panels.iter().map(|runs| share(runs)[k]).product::<f64>()).sum();
             let quantity = "probability that three runs, one of each panel, do not all end alike";
             reads.read(id, &of(quantity), 1.0 - alike);
         }
@@ -471,20 +555,27 @@ fn sharper_methods_part_too() {
         SVector::from(simulate(&RunSpec { t_end: 60.0, method, ..run }, &()).unwrap().x)
     };
     let distance = (end(Method::Dopri5) - end(Method::Lsoda)).norm();
-    reads.read("7.5", "distance at t = 60 between orbits by two methods at tolerance 1e-13, reconstructed", distance);
+    reads.read(
+        "7.5",
+        "distance at t = 60 between orbits by two methods at tolerance 1e-13, reconstructed",
+        distance,
+    );
 }
 
 #[test]
 fn both_orbits_are_proved() {
     let mut reads = Reads::by("claims::both_orbits_are_proved");
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("proofs/certificates/coexistence.json");
-    let certificate: serde_json::Value = serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
-    // `make proofs-quick` verifies the certificate; what it says of the derivatives of the return maps is judged here.
+    let certificate: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
+    // `make proofs-quick` verifies the certificate; what it says of the derivatives of the return
+    // maps is judged here.
     let attracts = |orbit: &serde_json::Value| {
         let [[a, b], [c, d]]: [[[f64; 2]; 2]; 2] =
             serde_json::from_value(orbit["derivative_at_point"].clone()).unwrap();
         let corner = |k: usize| {
-            let [a, b, c, d] = [(a, 0), (b, 1), (c, 2), (d, 3)].map(|(pair, bit)| pair[k >> bit & 1]);
+            let [a, b, c, d] =
+                [(a, 0), (b, 1), (c, 2), (d, 3)].map(|(pair, bit)| pair[k >> bit & 1]);
             let (trace, determinant) = (a + d, a * d - b * c);
             // Both multipliers lie in the unit circle (Jury's conditions).
             determinant < 1.0 && trace.abs() < 1.0 + determinant
@@ -493,7 +584,11 @@ fn both_orbits_are_proved() {
     };
     let orbits = certificate["data"].as_object().unwrap();
     let attracting = orbits.values().filter(|orbit| attracts(orbit)).count();
-    reads.read("6.4", "attracting closed orbits proved in the reconstructed reading", attracting as f64);
+    reads.read(
+        "6.4",
+        "attracting closed orbits proved in the reconstructed reading",
+        attracting as f64,
+    );
 }
 
 /// The late half of every panel of fig. 7 in a reading.
@@ -504,7 +599,9 @@ fn late_halves(reading: Reading) -> Vec<Vec<Crossing>> {
         .panels
         .iter()
         .map(|panel| match simulate(&panel.run, &()).unwrap().data {
-            Data::Section(crossings) => crossings.into_iter().filter(|c| c.t > 0.5 * panel.run.t_end).collect(),
+            Data::Section(crossings) => {
+                crossings.into_iter().filter(|c| c.t > 0.5 * panel.run.t_end).collect()
+            }
             _ => panic!("fig. 7 is made of sections"),
         })
         .collect()
@@ -512,14 +609,17 @@ fn late_halves(reading: Reading) -> Vec<Vec<Crossing>> {
 
 #[test]
 fn printed_reading_ends_on_one_periodic_orbit() {
-    // y = 0 at (x, z) = (17.0573, -0.0154) up and (-13.3857, -0.0199) down, period 20.25, to three digits of the orbit's size.
+    // y = 0 at (x, z) = (17.0573, -0.0154) up and (-13.3857, -0.0199) down, period 20.25, to three
+    // digits of the orbit's size.
     for late in late_halves(Reading::Printed) {
         for c in &late {
-            let (x, z) = if c.direction == Direction::Up { (17.0573, -0.0154) } else { (-13.3857, -0.0199) };
+            let (x, z) =
+                if c.direction == Direction::Up { (17.0573, -0.0154) } else { (-13.3857, -0.0199) };
             assert!((c.x[0] - x).abs() < 1e-2, "{c:?}");
             assert!((c.x[2] - z).abs() < 5e-3, "{c:?}");
         }
-        let ups: Vec<f64> = late.iter().filter(|c| c.direction == Direction::Up).map(|c| c.t).collect();
+        let ups: Vec<f64> =
+            late.iter().filter(|c| c.direction == Direction::Up).map(|c| c.t).collect();
         let period = (ups[ups.len() - 1] - ups[0]) / (ups.len() - 1) as f64;
         assert!((period - 20.25).abs() < 5e-3, "{period}");
     }

@@ -9,7 +9,12 @@ use assert_cmd::Command;
 use twofold::render::{decode_png, read_provenance};
 
 fn twofold_in(folder: &Path, arguments: &[&str]) -> (i32, Vec<u8>, String) {
-    let out = Command::cargo_bin("twofold").unwrap().current_dir(folder).args(arguments).output().unwrap();
+    let out = Command::cargo_bin("twofold")
+        .unwrap()
+        .current_dir(folder)
+        .args(arguments)
+        .output()
+        .unwrap();
     (out.status.code().unwrap(), out.stdout, String::from_utf8(out.stderr).unwrap())
 }
 
@@ -45,7 +50,8 @@ fn every_kind_of_picture_of_every_switch() {
             ("section", &["--section", "y=0"]),
         ] {
             let file = format!("{s}-{kind}.png");
-            let all = [&["plot", "--quiet", "--kind", kind, "--out", &file][..], switch, more].concat();
+            let all =
+                [&["plot", "--quiet", "--kind", kind, "--out", &file][..], switch, more].concat();
             good(at, &all);
             let bytes = fs::read(at.join(&file)).unwrap();
             // A blank picture has one colour.
@@ -83,7 +89,8 @@ fn formats_by_name_and_recorded_runs() {
         good(at, &[&["plot", "--quiet", "--out", file][..], &run].concat());
         assert!(fs::read(at.join(file)).unwrap().starts_with(magic.as_bytes()), "{file}");
     }
-    let direct = good(at, &[&["plot", "--quiet", "--out", "-", "--format", "svg"][..], &run].concat());
+    let direct =
+        good(at, &[&["plot", "--quiet", "--out", "-", "--format", "svg"][..], &run].concat());
     assert_eq!(direct, fs::read(at.join("a.svg")).unwrap());
     for format in ["csv", "json"] {
         let file = format!("run.{format}");
@@ -119,7 +126,12 @@ fn pictures_that_cannot_be_are_refused_with_reasons() {
         &["shows 3 states, and the system has 2"],
     );
     plot(&["--out", "a.png", "--from", "other.csv"], 2, &["--t-end has no effect", "--from"]);
-    refused(at, &["plot", "--from", "other.csv", "--out", "a.png"], 2, &["other.csv", "twofold run"]);
+    refused(
+        at,
+        &["plot", "--from", "other.csv", "--out", "a.png"],
+        2,
+        &["other.csv", "twofold run"],
+    );
     refused(at, &["plot", "--out", "other.csv/a.png"], 2, &["other.csv", "is a file"]);
     assert_eq!(fs::read_dir(at).unwrap().count(), 1, "something was written");
 }
@@ -137,13 +149,27 @@ fn numbers_go_into_files_that_are_named_for_them() {
         assert!(fs::read(at.join(named)).unwrap() == fs::read(at.join(asked)).unwrap(), "{format}");
     }
     let written = fs::read_dir(at).unwrap().count();
-    let scan = ["scan", "--quiet", "--system", "stick-slip", "--section", "x=0.5", "--over", "params.belt=0.3,0.4"];
+    let scan = [
+        "scan",
+        "--quiet",
+        "--system",
+        "stick-slip",
+        "--section",
+        "x=0.5",
+        "--over",
+        "params.belt=0.3,0.4",
+    ];
     let sweep = ["sweep", "--quiet", "--t-end", "30", "--runs", "2"];
-    let orbit = ["orbit", "--quiet", "--system", "stick-slip", "--switch", "filippov", "--section", "v=0"];
+    let orbit =
+        ["orbit", "--quiet", "--system", "stick-slip", "--switch", "filippov", "--section", "v=0"];
     let exponent = ["lyapunov", "--quiet", "--system", "chua", "--t-end", "20"];
     for (call, out, why) in [
         (&run[..], "a.png", "`twofold plot`"),
-        (&[&run[..], &["--format", "json"]].concat(), "a.csv", "the name says csv, but json is asked for"),
+        (
+            &[&run[..], &["--format", "json"]].concat(),
+            "a.csv",
+            "the name says csv, but json is asked for",
+        ),
         (&scan, "a.svg", "`twofold scan --plot`"),
         (&scan, "a.json", "what is written is csv"),
         (&sweep, "a.pdf", "csv or json"),
@@ -156,16 +182,20 @@ fn numbers_go_into_files_that_are_named_for_them() {
     assert_eq!(fs::read_dir(at).unwrap().count(), written, "something was written");
 }
 
-/// A second call draws nothing, a third what was changed since; with other questions, or without a store, everything is made.
+/// A second call draws nothing, a third what was changed since; with other questions, or without a
+/// store, everything is made.
 #[test]
 fn what_this_program_has_made_is_reused_until_it_changes() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let figure = |more: &[&str]| {
-        let (code, out, err) =
-            twofold_in(at, &[&["figure", "fig1", "fig3", "--out", "made", "--json"][..], more].concat());
+        let (code, out, err) = twofold_in(
+            at,
+            &[&["figure", "fig1", "fig3", "--out", "made", "--json"][..], more].concat(),
+        );
         assert_eq!(code, 0, "{err}");
-        let mut lines: Vec<String> = err.lines().filter(|l| l.ends_with(".png")).map(str::to_owned).collect();
+        let mut lines: Vec<String> =
+            err.lines().filter(|l| l.ends_with(".png")).map(str::to_owned).collect();
         lines.sort();
         (out, lines.join(", "))
     };
@@ -173,15 +203,24 @@ fn what_this_program_has_made_is_reused_until_it_changes() {
     let (records, said) = figure(&kept);
     assert_eq!(said, "wrote made/fig1/fig1.png, wrote made/fig3/fig3.png");
     let how = fs::read(at.join("made/making.json")).unwrap();
-    assert_eq!(figure(&kept), (records.clone(), "unchanged: made/fig1/fig1.png, unchanged: made/fig3/fig3.png".into()));
+    assert_eq!(
+        figure(&kept),
+        (records.clone(), "unchanged: made/fig1/fig1.png, unchanged: made/fig3/fig3.png".into())
+    );
     assert_eq!(fs::read(at.join("made/making.json")).unwrap(), how, "nothing was made");
 
     let svg = at.join("made/fig3/fig3.svg");
     let whole = fs::read(&svg).unwrap();
     fs::write(&svg, [&whole[..], b" "].concat()).unwrap();
-    assert_eq!(figure(&kept), (records.clone(), "unchanged: made/fig1/fig1.png, wrote made/fig3/fig3.png".into()));
+    assert_eq!(
+        figure(&kept),
+        (records.clone(), "unchanged: made/fig1/fig1.png, wrote made/fig3/fig3.png".into())
+    );
     assert_eq!(fs::read(&svg).unwrap(), whole);
-    assert_eq!(figure(&["--fresh"]), (records, "wrote made/fig1/fig1.png, wrote made/fig3/fig3.png".into()));
+    assert_eq!(
+        figure(&["--fresh"]),
+        (records, "wrote made/fig1/fig1.png, wrote made/fig3/fig3.png".into())
+    );
 }
 
 #[test]
@@ -189,7 +228,12 @@ fn parameters_that_make_no_sense_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     for (name, value) in [("m", "0"), ("j", "-1"), ("v_c", "0")] {
         let set = format!("{name}={value}");
-        refused(folder.path(), &["run", "--system", "wheel", "--set", &set], 2, &["--set", "above 0", name]);
+        refused(
+            folder.path(),
+            &["run", "--system", "wheel", "--set", &set],
+            2,
+            &["--set", "above 0", name],
+        );
     }
 }
 
@@ -215,13 +259,17 @@ fn a_new_file_is_never_lost() {
     refused(at, &["new", "a.toml"], 2, &["there already", "--force"]);
     assert_eq!(fs::read_to_string(at.join("a.toml")).unwrap(), "mine");
     good(at, &["new", "a.toml", "--force", "--from", "wheel"]);
-    assert_eq!(fs::read_to_string(at.join("a.toml")).unwrap(), twofold::system::library::text("wheel").unwrap());
+    assert_eq!(
+        fs::read_to_string(at.join("a.toml")).unwrap(),
+        twofold::system::library::text("wheel").unwrap()
+    );
     refused(at, &["new", "b.txt"], 2, &[".toml"]);
     refused(at, &["new", "b.toml", "--from", "whel"], 2, &["did you mean wheel?"]);
     refused(at, &["new", "-", "--force"], 2, &["--force has no effect"]);
     let template = good(at, &["new", "-"]);
     let text = String::from_utf8(template).unwrap();
-    let definition = twofold::system::Definition::from_toml(&text, "template").unwrap_or_else(|e| panic!("{e}"));
+    let definition =
+        twofold::system::Definition::from_toml(&text, "template").unwrap_or_else(|e| panic!("{e}"));
     assert!(definition.start().is_some());
 }
 
@@ -237,50 +285,90 @@ fn orbits_and_exponents_say_what_is_wrong() {
     orbit(&["--section", "y=0", "--along", "alpha"], 2, &["no \"=\"", "alpha=0.1..0.2:40"]);
     orbit(&["--section", "y=0", "--along", "alhpa=1..2"], 2, &["alhpa", "did you mean `alpha`?"]);
     orbit(&["--section", "y=0", "--settle", "-1"], 2, &["--settle is -1"]);
-    // A motion that comes to rest has an answer; one that goes on and does not pass the plane has none.
+    // A motion that comes to rest has an answer; one that goes on and does not pass the plane has
+    // none.
     let rest = good(at, &["orbit", "--quiet", "--system", "gene-switch", "--section", "q=5"]);
     assert!(String::from_utf8(rest).unwrap().starts_with("equilibrium"));
     orbit(&["--system", "stick-slip", "--section", "x=50"], 3, &["does not pass the plane"]);
     // The caricature's orbits come to the two-fold: no return map through it.
-    let two_fold = ["--switch", "filippov", "--section", "x=-0.05", "--settle", "0", "--start", "-0.05,0.3,0.3"];
+    let two_fold = [
+        "--switch",
+        "filippov",
+        "--section",
+        "x=-0.05",
+        "--settle",
+        "0",
+        "--start",
+        "-0.05,0.3,0.3",
+    ];
     let (code, _, err) = twofold_in(at, &[&["orbit", "--quiet"][..], &two_fold].concat());
     assert!(code == 3 && (err.contains("many futures") || err.contains("did not return")), "{err}");
-    let exponent =
-        |more: &[&str], expected: &[&str]| refused(at, &[&["lyapunov", "--quiet"][..], more].concat(), 2, expected);
+    let exponent = |more: &[&str], expected: &[&str]| {
+        refused(at, &[&["lyapunov", "--quiet"][..], more].concat(), 2, expected)
+    };
     exponent(&["--switch", "filippov", "--exit", "all"], &["--exit \"all\"", "one motion"]);
     exponent(&["--section", "y=0"], &["--section has no effect"]);
     let caricature = ["lyapunov", "--quiet", "--switch", "filippov"];
     refused(at, &caricature, 3, &["slides on x = 0 into a two-fold", "--t-end"]);
     exponent(&["--t-end", "10", "--transient", "10"], &["--transient is 10"]);
-    let out = good(at, &["lyapunov", "--quiet", "--system", "relay-third-order", "--t-end", "300", "--format", "json"]);
+    let out = good(
+        at,
+        &[
+            "lyapunov",
+            "--quiet",
+            "--system",
+            "relay-third-order",
+            "--t-end",
+            "300",
+            "--format",
+            "json",
+        ],
+    );
     let json: serde_json::Value = serde_json::from_slice(&out).unwrap();
     // On a closed orbit the largest exponent is that along it, zero.
     let exponent = json["facts"]["exponent"]["value"].as_f64().unwrap();
     assert!(exponent.abs() < 1e-2, "{exponent}");
 }
 
-/// One system in both forms: foci that unwind above y = 0 and wind up below (both exponents are the mean of their rates, -0.1), and a block on a belt, whose
-/// sticking takes one direction away.
+/// One system in both forms: foci that unwind above y = 0 and wind up below (both exponents are the
+/// mean of their rates, -0.1), and a block on a belt, whose sticking takes one direction away.
 #[test]
 fn exponents_of_filippov_motion_are_those_of_the_same_system_with_signs() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let exponents = |name: &str, text: &str, more: &[&str]| -> Vec<[Option<f64>; 2]> {
         fs::write(at.join(name), text).unwrap();
-        let run = ["lyapunov", "--quiet", "--system", name, "--t-end", "700", "--transient", "100", "--format", "json"];
-        let json: serde_json::Value = serde_json::from_slice(&good(at, &[&run[..], more].concat())).unwrap();
+        let run = [
+            "lyapunov",
+            "--quiet",
+            "--system",
+            name,
+            "--t-end",
+            "700",
+            "--transient",
+            "100",
+            "--format",
+            "json",
+        ];
+        let json: serde_json::Value =
+            serde_json::from_slice(&good(at, &[&run[..], more].concat())).unwrap();
         let list = json["facts"]["exponents"].as_array().unwrap();
         list.iter().map(|e| ["value", "half_width"].map(|key| e[key].as_f64())).collect()
     };
     let head = "states = ['x', 'y']\nstart = [1, 0.5]\n";
     let foci = "h = 'y'\nplus = ['0.1*x - y', 'x + 0.1*y']\nminus = ['-0.3*x - y', 'x - 0.3*y']\n";
     let foci_signs = "f = ['-y + x*(0.2*sign(y) - 0.1)', 'x + y*(0.2*sign(y) - 0.1)']\n";
-    let belt = "h = 'y - c'\nplus = ['y', '-x - 0.4']\nminus = ['y', '-x + 0.4']\n[parameters]\nc = 1\n";
+    let belt =
+        "h = 'y - c'\nplus = ['y', '-x - 0.4']\nminus = ['y', '-x + 0.4']\n[parameters]\nc = 1\n";
     let belt_signs = "f = ['y', '-x - 0.4*sign(y - c)']\n[parameters]\nc = 0.5\n";
     for (surfaces, signs, set, expected) in
         [(foci, foci_signs, &[][..], Some(-0.1)), (belt, belt_signs, &["--set", "c=0.5"][..], None)]
     {
-        let surfaces = exponents("h.toml", &format!("{head}{surfaces}"), &[&["--switch", "filippov"], set].concat());
+        let surfaces = exponents(
+            "h.toml",
+            &format!("{head}{surfaces}"),
+            &[&["--switch", "filippov"], set].concat(),
+        );
         let signs = exponents("f.toml", &format!("{head}{signs}"), &[]);
         assert_eq!((surfaces.len(), signs.len()), (2, 2));
         for (i, ([one, half], [other, _])) in surfaces.iter().zip(&signs).enumerate() {
@@ -319,7 +407,8 @@ fn streamed_rows_are_those_of_the_whole_and_thin_out() {
         good(at, &[&run[..], &["--out", "run.csv"]].concat());
         assert_eq!(fs::read(at.join("run.csv")).unwrap(), streamed, "{more:?}");
     }
-    let thin = good(at, &["run", "--quiet", "--t-end", "20000", "--every", "1000", "--method", "dopri5"]);
+    let thin =
+        good(at, &["run", "--quiet", "--t-end", "20000", "--every", "1000", "--method", "dopri5"]);
     let (_, table) = twofold::job::encode::from_csv(&thin).unwrap();
     assert_eq!(table.numbers("t"), (0..=20).map(|k| f64::from(k) * 1000.0).collect::<Vec<_>>());
     refused(at, &["run", "--every", "1", "--chord", "0.1"], 2, &["--chord has no effect"]);
@@ -331,7 +420,8 @@ fn streamed_rows_are_those_of_the_whole_and_thin_out() {
 #[test]
 fn the_gallery_is_whole() {
     let script = include_str!("../../scripts/gallery.sh");
-    let drawn: Vec<&str> = script.lines().filter_map(|l| l.trim().strip_prefix("plot ")?.split(' ').next()).collect();
+    let drawn: Vec<&str> =
+        script.lines().filter_map(|l| l.trim().strip_prefix("plot ")?.split(' ').next()).collect();
     for name in twofold::system::library::names().chain(twofold::system::library::general_names()) {
         assert!(drawn.contains(&name), "{name}");
     }
@@ -341,7 +431,8 @@ fn the_gallery_is_whole() {
 fn scans_show_what_changes_and_where_starts_end() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    // One passage a period at 20 V, two different ones at 28 V, after the doubling at 24.5 V. The way there is chaotic for some 170 periods.
+    // One passage a period at 20 V, two different ones at 28 V, after the doubling at 24.5 V. The
+    // way there is chaotic for some 170 periods.
     let scan = [
         "scan",
         "--quiet",
@@ -356,25 +447,45 @@ fn scans_show_what_changes_and_where_starts_end() {
         "--atol",
         "1e-9",
     ];
-    let out = good(at, &[&scan[..], &["--over", "params.supply=20,28", "--plot", "d.svg"]].concat());
+    let out =
+        good(at, &[&scan[..], &["--over", "params.supply=20,28", "--plot", "d.svg"]].concat());
     let (_, table) = twofold::job::encode::from_csv(&out).unwrap();
     let values = |supply: f64| -> Vec<f64> {
         let rows = table.numbers("params.supply").iter().zip(table.numbers("v"));
         rows.filter(|(s, _)| **s == supply).map(|(_, v)| *v).collect()
     };
-    let spread = |v: &[f64], step: usize| v.windows(step + 1).map(|w| (w[step] - w[0]).abs()).fold(0.0, f64::max);
+    let spread = |v: &[f64], step: usize| {
+        v.windows(step + 1).map(|w| (w[step] - w[0]).abs()).fold(0.0, f64::max)
+    };
     let (one, two) = (values(20.0), values(28.0));
     assert!(one.len() > 150 && spread(&one, 1) < 1e-5, "{} {}", one.len(), spread(&one, 1));
-    assert!(spread(&two, 1) > 1e-2 && spread(&two, 2) < 1e-4, "{} {}", spread(&two, 1), spread(&two, 2));
-    assert!(fs::read_to_string(at.join("d.svg")).unwrap().contains("Voltage-controlled buck converter"));
+    assert!(
+        spread(&two, 1) > 1e-2 && spread(&two, 2) < 1e-4,
+        "{} {}",
+        spread(&two, 1),
+        spread(&two, 2)
+    );
+    assert!(
+        fs::read_to_string(at.join("d.svg")).unwrap().contains("Voltage-controlled buck converter")
+    );
 
     fs::write(
         at.join("wells.toml"),
-        "states = ['x', 'y']\nstart = [1, 1]\nh = 'x - 9'\nplus = ['x - x^3', '-y']\nminus = ['x - x^3', '-y']",
+        "states = ['x', 'y']\nstart = [1, 1]\nh = 'x - 9'\nplus = ['x - x^3', '-y']\nminus = ['x - \
+            x^3', '-y']",
     )
     .unwrap();
     let map = ["scan", "--quiet", "--system", "wells.toml", "--section", "y=5", "--t-end", "40"];
-    let over = ["--over", "start.x=-1.5..1.5:6", "--over", "start.y=-1..1:3", "--plot", "m.png", "--threads", "1"];
+    let over = [
+        "--over",
+        "start.x=-1.5..1.5:6",
+        "--over",
+        "start.y=-1..1:3",
+        "--plot",
+        "m.png",
+        "--threads",
+        "1",
+    ];
     let out = good(at, &[&map[..], &over].concat());
     let (_, table) = twofold::job::encode::from_csv(&out).unwrap();
     for (x, number) in table.numbers("start.x").iter().zip(table.integers("number")) {
@@ -385,7 +496,8 @@ fn scans_show_what_changes_and_where_starts_end() {
     let again = good(at, &[&map[..], &over[..6], &["--threads", "3"]].concat());
     assert_eq!(again, out);
 
-    let wrong = |more: &[&str], expected: &[&str]| refused(at, &[&map[..], more].concat(), 2, expected);
+    let wrong =
+        |more: &[&str], expected: &[&str]| refused(at, &[&map[..], more].concat(), 2, expected);
     wrong(&["--over", "start.x=-1..1:2", "--alike", "0.1"], &["--alike has no effect"]);
     wrong(&["--over", "start.x=-1..1:2", "--show", "y"], &["--show has no effect"]);
     wrong(&["--over", "start.x=-1..1:2", "--plot", "a.txt"], &[".png, .svg or .pdf"]);

@@ -24,7 +24,11 @@ impl VectorField<1> for Explosion {
 }
 
 fn smoothed() -> Smoothed<Caricature> {
-    Smoothed { system: Caricature::with_reinjection(1e-1, 1e-5), transition: Transition::Tanh, eps: 1e-3 }
+    Smoothed {
+        system: Caricature::with_reinjection(1e-1, 1e-5),
+        transition: Transition::Tanh,
+        eps: 1e-3,
+    }
 }
 
 fn hysteretic() -> Hysteretic<Caricature> {
@@ -38,7 +42,8 @@ fn hysteretic() -> Hysteretic<Caricature> {
 
 const TOLERANCE: Tolerance = Tolerance { rtol: 1e-8, atol: 1e-8 };
 
-/// Steps from (t0, x0) to t_end: (t1, x1 bits) of each, with the promises of a step checked on the way.
+/// Steps from (t0, x0) to t_end: (t1, x1 bits) of each, with the promises of a step checked on the
+/// way.
 fn walk<const N: usize, F: VectorField<N>, M: Stepper<N>>(
     m: &mut M,
     f: &F,
@@ -66,7 +71,11 @@ fn walk<const N: usize, F: VectorField<N>, M: Stepper<N>>(
         for theta in [0.0, 0.3, 0.77, 1.0] {
             let whole = step.at(theta);
             for i in 0..N {
-                assert_eq!(step.coordinate(theta, i).to_bits(), whole[i].to_bits(), "coordinate {i} at {theta}");
+                assert_eq!(
+                    step.coordinate(theta, i).to_bits(),
+                    whole[i].to_bits(),
+                    "coordinate {i} at {theta}"
+                );
             }
         }
         (t, x) = (step.t1, step.x1);
@@ -86,8 +95,22 @@ macro_rules! conforms {
             #[test]
             fn steps_keep_their_promises() {
                 walk(&mut $method::new(TOLERANCE), &Oscillator, 0.0, vector![1.0, 0.0], 25.0, 0.7);
-                walk(&mut $method::new(TOLERANCE), &smoothed(), 0.0, vector![0.2, 0.0, -1.0], 20.0, 2.0);
-                walk(&mut $method::new(TOLERANCE), &hysteretic(), 0.0, vector![0.2, 0.0, -1.0, 1.0], 5.0, 0.5);
+                walk(
+                    &mut $method::new(TOLERANCE),
+                    &smoothed(),
+                    0.0,
+                    vector![0.2, 0.0, -1.0],
+                    20.0,
+                    2.0,
+                );
+                walk(
+                    &mut $method::new(TOLERANCE),
+                    &hysteretic(),
+                    0.0,
+                    vector![0.2, 0.0, -1.0, 1.0],
+                    5.0,
+                    0.5,
+                );
             }
 
             #[test]
@@ -125,7 +148,11 @@ macro_rules! conforms {
                 let before = Stepper::<3>::statistics(&used).steps;
                 let again = walk(&mut used, &f, 0.0, x0, 12.0, 1.0);
                 assert_eq!(fresh, again);
-                assert_eq!(Stepper::<3>::statistics(&used).steps, before + again.len() as u64, "statistics go on");
+                assert_eq!(
+                    Stepper::<3>::statistics(&used).steps,
+                    before + again.len() as u64,
+                    "statistics go on"
+                );
             }
 
             #[test]
@@ -154,9 +181,11 @@ macro_rules! conforms {
                 #![proptest_config(ProptestConfig::with_cases(24))]
                 #[test]
                 fn any_oscillation_keeps_its_radius(
-                    a in -50.0..50.0_f64, b in -50.0..50.0_f64, t_end in 0.01..20.0_f64, cap in 0.05..5.0_f64,
+                    a in -50.0..50.0_f64, b in -50.0..50.0_f64, t_end in 0.01..20.0_f64,
+                        cap in 0.05..5.0_f64,
                 ) {
-                    let end = walk(&mut $method::new(TOLERANCE), &Oscillator, 0.0, vector![a, b], t_end, cap);
+                    let end = walk(&mut $method::new(TOLERANCE), &Oscillator, 0.0, vector![a, b],
+                        t_end, cap);
                     let x = end.last().unwrap().1.map(f64::from_bits);
                     let (r0, r) = (a.hypot(b), x[0].hypot(x[1]));
                     prop_assert!((r - r0).abs() <= 1e-5 * (1.0 + r0), "{r0} {r}");

@@ -1,5 +1,6 @@
-//! The control for what the paper puts down to the singularity: the runs of fig. 7 in the reconstructed reading once more, with the two-fold
-//! moved away from the orbits (figures/control/shifted.toml), and with a switch so wide, eps = 0.1, that nothing is singular.
+//! The control for what the paper puts down to the singularity: the runs of fig. 7 in the
+//! reconstructed reading once more, with the two-fold moved away from the orbits
+//! (figures/control/shifted.toml), and with a switch so wide, eps = 0.1, that nothing is singular.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -33,7 +34,10 @@ fn runs(name: &str) -> Vec<CensusRun> {
 }
 
 fn with_singularity() -> Vec<CensusRun> {
-    PANELS[..3].iter().flat_map(|p| figures::census::runs(p.name, Reading::Reconstructed).unwrap()).collect()
+    PANELS[..3]
+        .iter()
+        .flat_map(|p| figures::census::runs(p.name, Reading::Reconstructed).unwrap())
+        .collect()
 }
 
 const SHIFTED: &str = "figures/control/shifted.csv";
@@ -47,7 +51,11 @@ fn shifted() -> System {
 /// The kinds of outcome among runs, undecided ones aside.
 fn kinds(runs: &[CensusRun]) -> usize {
     let counts = tally(runs, claims().rules.end);
-    MotionKind::ALL.into_iter().zip(counts).filter(|(kind, n)| *kind != MotionKind::Undecided && *n > 0).count()
+    MotionKind::ALL
+        .into_iter()
+        .zip(counts)
+        .filter(|(kind, n)| *kind != MotionKind::Undecided && *n > 0)
+        .count()
 }
 
 #[test]
@@ -56,13 +64,18 @@ fn what_remains_without_the_singularity() {
     let (with, without, wide) = (with_singularity(), runs(SHIFTED), runs(WIDE));
     assert_eq!((without.len(), wide.len()), (90, 90));
     reads.read("5.8", "kinds of outcome with the singularity", kinds(&with) as f64);
-    reads.read("5.8", "kinds of outcome with the two-fold moved off the orbits", kinds(&without) as f64);
+    reads.read(
+        "5.8",
+        "kinds of outcome with the two-fold moved off the orbits",
+        kinds(&without) as f64,
+    );
     reads.read("5.8", "kinds of outcome with eps = 0.1", kinds(&wide) as f64);
     // The findings say these numbers.
     let page = fs::read_to_string(path("docs/findings.md")).unwrap();
     let page = page.split_whitespace().collect::<Vec<_>>().join(" ");
     let latest = |runs: &[CensusRun]| runs.iter().map(|r| r.captured_at).fold(0.0, f64::max).ceil();
-    let ends = |runs: &[CensusRun], outcome: &str| runs.iter().filter(|r| r.outcome == outcome).count();
+    let ends =
+        |runs: &[CensusRun], outcome: &str| runs.iter().filter(|r| r.outcome == outcome).count();
     let returns = |runs: &[CensusRun], period: i64| runs.iter().all(|r| r.period == period);
     assert!(ends(&without, "period-1") == 90 && returns(&without, 1) && returns(&wide, 2));
     let radii = rows(WIDE).table().numbers("radius").to_vec();
@@ -84,12 +97,16 @@ fn what_remains_without_the_singularity() {
     }
 }
 
-/// The sweeps are those of fig. 7, but for the one thing that is changed, and their rows come out the same today.
+/// The sweeps are those of fig. 7, but for the one thing that is changed, and their rows come out
+/// the same today.
 #[test]
 fn the_controls_are_the_runs_of_fig_7_with_one_change() {
     let census = rows("figures/census/fig7.csv");
-    let paper =
-        figures::named("fig7").pictures.into_iter().find(|p| p.reading == Some(Reading::Reconstructed)).unwrap();
+    let paper = figures::named("fig7")
+        .pictures
+        .into_iter()
+        .find(|p| p.reading == Some(Reading::Reconstructed))
+        .unwrap();
     for (name, system, switch) in [
         (SHIFTED, shifted(), SwitchSpec::tanh(1e-3)),
         (WIDE, Reading::Reconstructed.caricature().into(), SwitchSpec::tanh(0.1)),
@@ -107,7 +124,11 @@ fn the_controls_are_the_runs_of_fig_7_with_one_change() {
                 schedule: Schedule { restart_every: panel.run.schedule.restart_every, kick: None },
                 ..panel.run.clone()
             };
-            assert!(run == expected, "{name}: row {row} is another run than fig. 7({})", panel.label);
+            assert!(
+                run == expected,
+                "{name}: row {row} is another run than fig. 7({})",
+                panel.label
+            );
         }
         assert_eq!(rows.sweep().row(1, &()).unwrap().line(), rows.get(1).unwrap().line(), "{name}");
     }
@@ -125,7 +146,10 @@ fn no_orbit_comes_near_the_moved_two_fold() {
         observe: Observation::Path { chord: 1e-3 },
         ..figures::named("fig7").pictures.remove(1).panels.remove(2).run
     };
-    let Data::Path(samples) = simulate(&run, &()).unwrap().data else { panic!("a path was asked for") };
-    let closest = samples.iter().map(|s| (SVector::from(s.x) - fold).norm()).fold(f64::INFINITY, f64::min);
+    let Data::Path(samples) = simulate(&run, &()).unwrap().data else {
+        panic!("a path was asked for")
+    };
+    let closest =
+        samples.iter().map(|s| (SVector::from(s.x) - fold).norm()).fold(f64::INFINITY, f64::min);
     assert!(closest > 0.35, "{closest}");
 }

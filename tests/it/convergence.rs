@@ -19,7 +19,9 @@ const S: Matrix3<f64> = matrix![1.0, 0.4, -0.2; -0.3, 1.0, 0.5; 0.1, -0.6, 1.0];
 impl Linear {
     fn with_rates(rates: [f64; 3]) -> Self {
         let inverse = S.try_inverse().unwrap();
-        Self { matrix: S * Matrix3::from_diagonal(&vector![-rates[0], -rates[1], -rates[2]]) * inverse }
+        Self {
+            matrix: S * Matrix3::from_diagonal(&vector![-rates[0], -rates[1], -rates[2]]) * inverse,
+        }
     }
 }
 
@@ -52,10 +54,12 @@ fn solve<M: Stepper<3>>(
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// One slow mode, one in between, one up to 1e9 times faster: correct, and at a cost that stiffness hardly shows in.
+    /// One slow mode, one in between, one up to 1e9 times faster: correct, and at a cost that
+    /// stiffness hardly shows in.
     #[test]
     fn stiffness_costs_little(
-        slow in 0.05..1.0_f64, middle in 0.0..4.0_f64, fast in 0.0..9.0_f64, tolerance in 4.0..9.0_f64,
+        slow in 0.05..1.0_f64, middle in 0.0..4.0_f64, fast in 0.0..9.0_f64,
+            tolerance in 4.0..9.0_f64,
         weights in prop::array::uniform3(-1.0..1.0_f64),
     ) {
         let rates = [slow, slow * 10_f64.powf(middle), slow * 10_f64.powf(fast)];
@@ -74,7 +78,8 @@ proptest! {
     }
 }
 
-/// Purely imaginary spectrum, where BDF of order 3 to 5 is not stable and nothing may be gained by pretending.
+/// Purely imaginary spectrum, where BDF of order 3 to 5 is not stable and nothing may be gained by
+/// pretending.
 #[test]
 fn oscillations_stay_with_adams() {
     struct Oscillator;
@@ -96,7 +101,8 @@ fn oscillations_stay_with_adams() {
     assert!((x - vector![500_f64.cos(), -500_f64.sin()]).amax() < 1e-5);
 }
 
-/// x' = -sqrt(x) leaves its domain at t = 2: a trial point outside is a failed trial, and the end is a named failure.
+/// x' = -sqrt(x) leaves its domain at t = 2: a trial point outside is a failed trial, and the end
+/// is a named failure.
 #[test]
 fn leaving_the_domain_is_named() {
     struct Draining;
@@ -107,12 +113,15 @@ fn leaving_the_domain_is_named() {
     }
     fn failure<M: Stepper<1>>(mut stepper: M) -> Failure {
         stepper.restart(&Draining, 0.0, vector![1.0], 4.0, f64::INFINITY).unwrap();
-        (0..100_000).find_map(|_| stepper.step(&Draining).err()).expect("there is no solution beyond t = 2")
+        (0..100_000)
+            .find_map(|_| stepper.step(&Draining).err())
+            .expect("there is no solution beyond t = 2")
     }
     let tolerance = Tolerance { rtol: 1e-8, atol: 1e-8 };
     for failure in [failure(Lsoda::new(tolerance)), failure(Radau5::new(tolerance))] {
-        let (Failure::StepUnderflow { t, .. } | Failure::NotFinite { t, .. } | Failure::NotConverged { t, .. }) =
-            &failure
+        let (Failure::StepUnderflow { t, .. }
+        | Failure::NotFinite { t, .. }
+        | Failure::NotConverged { t, .. }) = &failure
         else {
             panic!("{failure}")
         };
@@ -120,9 +129,10 @@ fn leaving_the_domain_is_named() {
     }
 }
 
-/// Why no method makes the literal hysteretic system cheap. On the attracting part of the surface phi never comes to rest:
-/// it swings between 0 and 1, and x through layers of width eps'^2 = 1e-4 with it. The swings are the solution (every
-/// method and tolerance finds the same number of them), not a fast mode that an implicit method could step over.
+/// Why no method makes the literal hysteretic system cheap. On the attracting part of the surface
+/// phi never comes to rest: it swings between 0 and 1, and x through layers of width eps'^2 = 1e-4
+/// with it. The swings are the solution (every method and tolerance finds the same number of them),
+/// not a fast mode that an implicit method could step over.
 #[test]
 fn hysteretic_chatter_is_the_solution() {
     fn swings<M: Stepper<4>>(mut stepper: M) -> (usize, u64) {
@@ -132,7 +142,8 @@ fn hysteretic_chatter_is_the_solution() {
             eps_prime: 1e-2,
             relaxation: Relaxation::Literal,
         };
-        // Up to shortly before the first visit of the singularity, after which no two methods agree.
+        // Up to shortly before the first visit of the singularity, after which no two methods
+        // agree.
         stepper.restart(&field, 0.0, vector![0.2, 0.0, -1.0, 1.0], 10.0, 0.25).unwrap();
         let (mut t, mut swings) = (0.0, 0);
         while t < 10.0 {
@@ -155,7 +166,8 @@ fn hysteretic_chatter_is_the_solution() {
     assert!(found.iter().all(|f| f.0 == found[0].0), "{found:?}");
 }
 
-/// Frozen bits: debug and release, any machine. A changed library, compiler or line of arithmetic shows here first.
+/// Frozen bits: debug and release, any machine. A changed library, compiler or line of arithmetic
+/// shows here first.
 #[test]
 fn known_bits() {
     struct Lorenz;
@@ -178,8 +190,14 @@ fn known_bits() {
         }
     }
     let tolerance = Tolerance { rtol: 1e-10, atol: 1e-10 };
-    assert_eq!(bits(Lsoda::new(tolerance)), [13840577990766353957, 13838984908577566007, 4627643076306687792]);
-    assert_eq!(bits(Radau5::new(tolerance)), [13840577990728012982, 13838984908002722052, 4627643076391553882]);
+    assert_eq!(
+        bits(Lsoda::new(tolerance)),
+        [13840577990766353957, 13838984908577566007, 4627643076306687792]
+    );
+    assert_eq!(
+        bits(Radau5::new(tolerance)),
+        [13840577990728012982, 13838984908002722052, 4627643076391553882]
+    );
 }
 
 /// Tolerances of zero cannot be met; they must not run for ever or return nonsense.
@@ -191,6 +209,9 @@ fn zero_tolerance_is_a_named_failure() {
         let lsoda = solve(Lsoda::new(zero), &field, start, 1.0);
         assert!(matches!(lsoda, Err(Failure::StepUnderflow { .. })), "{lsoda:?}");
         let radau = solve(Radau5::new(zero), &field, start, 1.0);
-        assert!(matches!(radau, Err(Failure::StepUnderflow { .. } | Failure::NotConverged { .. })), "{radau:?}");
+        assert!(
+            matches!(radau, Err(Failure::StepUnderflow { .. } | Failure::NotConverged { .. })),
+            "{radau:?}"
+        );
     }
 }

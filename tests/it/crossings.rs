@@ -1,4 +1,5 @@
-//! Cross-validation against crossings computed in 113-bit arithmetic outside this project (crates/verify/data/crossings-*.csv).
+//! Cross-validation against crossings computed in 113-bit arithmetic outside this project
+//! (crates/verify/data/crossings-*.csv).
 
 use twofold::analyse::Direction;
 use twofold::integrate::{Schedule, StepCap, Tolerance};
@@ -61,7 +62,13 @@ fn agrees(alpha: f64, text: &str, rows: usize) {
     for (g, w) in got.iter().zip(&want[..rows]) {
         let worst = (g.x[0] - w.x).abs().max((g.x[2] - w.z).abs()).max(g.x[1].abs());
         println!("t {} error {worst:e}", w.t);
-        assert!((g.t - w.t).abs() < 1e-6 && worst < 1e-6, "{g:?}, expected t {} x {} z {}", w.t, w.x, w.z);
+        assert!(
+            (g.t - w.t).abs() < 1e-6 && worst < 1e-6,
+            "{g:?}, expected t {} x {} z {}",
+            w.t,
+            w.x,
+            w.z
+        );
         assert_eq!(g.direction, w.direction);
     }
 }
@@ -78,13 +85,22 @@ fn dopri5_follows_the_reconstructed_reading_to_the_first_visit() {
 
 #[test]
 fn every_method_follows_the_orbit_to_the_first_visit() {
-    // At 1e-10 each method keeps the rows before the visit to 1e-6; what it does after it is its own affair.
+    // At 1e-10 each method keeps the rows before the visit to 1e-6; what it does after it is its
+    // own affair.
     let want = reference(include_str!("../../crates/verify/data/crossings-reconstructed.csv"));
-    for method in [Method::Lsoda, Method::Radau5, Method::Taylor, Method::TaylorExtended, Method::Layered] {
+    for method in
+        [Method::Lsoda, Method::Radau5, Method::Taylor, Method::TaylorExtended, Method::Layered]
+    {
         let got = run(1e-1, method, 1e-10, want[3].t);
         for (g, w) in got.iter().zip(&want[..3]) {
             let worst = (g.x[0] - w.x).abs().max((g.x[2] - w.z).abs());
-            assert!((g.t - w.t).abs() < 1e-6 && worst < 1e-6, "{}: {g:?}, expected x {} z {}", method.name(), w.x, w.z);
+            assert!(
+                (g.t - w.t).abs() < 1e-6 && worst < 1e-6,
+                "{}: {g:?}, expected x {} z {}",
+                method.name(),
+                w.x,
+                w.z
+            );
         }
     }
 }

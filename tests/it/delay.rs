@@ -1,4 +1,5 @@
-//! Switches with a past, delayed ones and relays, against formulas and against programs that share nothing with this one but the equations.
+//! Switches with a past, delayed ones and relays, against formulas and against programs that share
+//! nothing with this one but the equations.
 
 #[allow(dead_code)] // the examples' own main functions
 #[path = "../../examples/delay_growth.rs"]
@@ -52,7 +53,9 @@ fn crossings(spec: &RunSpec) -> Vec<Crossing> {
 }
 
 fn numbers(text: &str) -> impl Iterator<Item = Vec<&str>> {
-    text.lines().filter(|l| l.starts_with(|c: char| c.is_ascii_digit())).map(|l| l.split(',').collect())
+    text.lines()
+        .filter(|l| l.starts_with(|c: char| c.is_ascii_digit()))
+        .map(|l| l.split(',').collect())
 }
 
 /// The distance of the first `rows` crossings from a reference's, by time, x and z, the largest.
@@ -76,26 +79,31 @@ const PRINTED: &str = include_str!("../data/delay-sharp-printed.csv");
 #[test]
 fn crossings_before_the_two_fold_are_those_of_113_bits() {
     for (alpha, text, rows, t_end) in [(1e-1, RECONSTRUCTED, 2, 5.0), (1e-3, PRINTED, 4, 30.0)] {
-        for (method, tolerance, allowed) in
-            [(Method::Dopri5, 1e-9, 1e-7), (Method::Dopri5, 1e-12, 1e-10), (Method::Taylor, 1e-16, 1e-12)]
-        {
-            let found = crossings(&spec(alpha, SwitchSpec::delayed(1e-3), method, tolerance, t_end));
+        for (method, tolerance, allowed) in [
+            (Method::Dopri5, 1e-9, 1e-7),
+            (Method::Dopri5, 1e-12, 1e-10),
+            (Method::Taylor, 1e-16, 1e-12),
+        ] {
+            let found =
+                crossings(&spec(alpha, SwitchSpec::delayed(1e-3), method, tolerance, t_end));
             let worst = apart(&found, text, rows);
             assert!(worst < allowed, "{method:?} {tolerance}: {worst:e}");
         }
     }
 }
 
-/// Through the two-fold and out again, in double-double arithmetic: all rows to 13.4, after 2,900 switches, to the rounding of the section's f64.
+/// Through the two-fold and out again, in double-double arithmetic: all rows to 13.4, after 2,900
+/// switches, to the rounding of the section's f64.
 #[test]
 fn double_double_follows_113_bits_through_the_two_fold() {
-    let found = crossings(&spec(1e-1, SwitchSpec::delayed(1e-3), Method::TaylorExtended, 1e-30, 13.4));
+    let found =
+        crossings(&spec(1e-1, SwitchSpec::delayed(1e-3), Method::TaylorExtended, 1e-30, 13.4));
     let worst = apart(&found, RECONSTRUCTED, 9);
     assert!(found.len() == 9 && worst < 1e-14, "{worst:e}");
 }
 
-/// SciPy's DOP853 as a method of steps (scripts/delay_reference.py). The orbit magnifies an error by some 10^3 until t = 12, as the reference's own
-/// uncertainty shows.
+/// SciPy's DOP853 as a method of steps (scripts/delay_reference.py). The orbit magnifies an error
+/// by some 10^3 until t = 12, as the reference's own uncertainty shows.
 #[test]
 fn the_smooth_rule_agrees_with_scipy() {
     let rows: Vec<Vec<f64>> = numbers(include_str!("../data/delay-smooth.csv"))
@@ -106,15 +114,23 @@ fn the_smooth_rule_agrees_with_scipy() {
         let (delay, eps) = (case[0][0], Some(case[0][1]));
         let (transition, history) = (Some(Transition::Tanh), History::Constant);
         let switch = SwitchSpec::Delayed { delay, eps, transition, history };
-        for (method, tolerance, allowed) in
-            [(Method::Dopri5, 1e-8, 1e-5), (Method::Dopri5, 1e-11, 1e-8), (Method::Radau5, 1e-9, 1e-6)]
-        {
+        for (method, tolerance, allowed) in [
+            (Method::Dopri5, 1e-8, 1e-5),
+            (Method::Dopri5, 1e-11, 1e-8),
+            (Method::Radau5, 1e-9, 1e-6),
+        ] {
             let observe = Observation::Times { every: 1.0 };
             let run = RunSpec { observe, ..spec(1e-1, switch, method, tolerance, 12.0) };
-            let Data::Path(found) = simulate(&run, &()).unwrap().data else { unreachable!("times were asked for") };
+            let Data::Path(found) = simulate(&run, &()).unwrap().data else {
+                unreachable!("times were asked for")
+            };
             for (sample, row) in found[1..].iter().zip(case) {
                 let worst = (0..3).map(|i| (sample.x[i] - row[3 + i]).abs()).fold(0.0, f64::max);
-                assert!(worst < allowed + row[6], "{delay} {method:?} {tolerance} at {}: {worst:e}", sample.t);
+                assert!(
+                    worst < allowed + row[6],
+                    "{delay} {method:?} {tolerance} at {}: {worst:e}",
+                    sample.t
+                );
             }
         }
     }
@@ -127,11 +143,16 @@ fn an_answer_is_its_questions() {
     let answer = Executor::quiet().ask(&Run(run.clone())).unwrap();
     assert_eq!(answer.fact::<String>("history").unwrap(), "constant");
     let json = serde_json::to_value(&run).unwrap();
-    assert_eq!(json["switch"], serde_json::json!({ "delayed": { "delay": 1e-2, "history": "constant" } }));
+    assert_eq!(
+        json["switch"],
+        serde_json::json!({ "delayed": { "delay": 1e-2, "history": "constant" } })
+    );
     let again: RunSpec = serde_json::from_value(json).unwrap();
     assert_eq!(*Executor::quiet().ask(&Run(again)).unwrap(), *answer);
     // A question without a delay has no word of one.
-    let smoothed = serde_json::to_string(&spec(1e-1, SwitchSpec::tanh(1e-3), Method::Dopri5, 1e-9, 12.0)).unwrap();
+    let smoothed =
+        serde_json::to_string(&spec(1e-1, SwitchSpec::tanh(1e-3), Method::Dopri5, 1e-9, 12.0))
+            .unwrap();
     assert!(!smoothed.contains("delay") && !smoothed.contains("history"));
 }
 
@@ -150,33 +171,50 @@ fn kicks_and_restarts_are_as_with_other_switches() {
     ] {
         let plain = spec(1e-1, switch, Method::Dopri5, 1e-11, 6.0);
         let schedule = Schedule { restart_every: Some(0.37), kick: None };
-        let (a, b) = (simulate(&plain, &()).unwrap(), simulate(&RunSpec { schedule, ..plain.clone() }, &()).unwrap());
+        let (a, b) = (
+            simulate(&plain, &()).unwrap(),
+            simulate(&RunSpec { schedule, ..plain.clone() }, &()).unwrap(),
+        );
         assert!((0..3).all(|i| (a.x[i] - b.x[i]).abs() < 1e-8), "{:?} {:?}", a.x, b.x);
         let kick = Kick { every: 0.3, size: 1e-2, law: KickLaw::Sphere, seed: 1, stream: 0 };
-        let kicked = RunSpec { schedule: Schedule { restart_every: None, kick: Some(kick) }, ..plain.clone() };
+        let kicked = RunSpec {
+            schedule: Schedule { restart_every: None, kick: Some(kick) },
+            ..plain.clone()
+        };
         let c = simulate(&kicked, &()).unwrap();
-        assert!((0..3).any(|i| (a.x[i] - c.x[i]).abs() > 1e-3) && c.x.iter().all(|x| x.abs() < 5.0), "{:?}", c.x);
+        assert!(
+            (0..3).any(|i| (a.x[i] - c.x[i]).abs() > 1e-3) && c.x.iter().all(|x| x.abs() < 5.0),
+            "{:?}",
+            c.x
+        );
     }
 }
 
-/// The thermostat of systems/general/relay-hysteresis.toml, as a relay: the period that its file states.
+/// The thermostat of systems/general/relay-hysteresis.toml, as a relay: the period that its file
+/// states.
 #[test]
 fn a_thermostat_has_its_period() {
     let text = "states = ['T']\nh = 'T - 20'\nplus = ['0.1*(10 - T)']\nminus = ['0.1*(30 - T)']";
     let system = System::new(Definition::from_toml(text, "").unwrap());
     let period = 2.0 * ln(12.0 / 8.0) / 0.1;
-    for (method, tolerance) in [(Method::Dopri5, 1e-12), (Method::Taylor, 1e-15), (Method::TaylorExtended, 1e-30)] {
+    for (method, tolerance) in
+        [(Method::Dopri5, 1e-12), (Method::Taylor, 1e-15), (Method::TaylorExtended, 1e-30)]
+    {
         let observe = Observation::Section { coordinate: 0, value: 20.0 };
         let run = spec(1e-1, SwitchSpec::relay(2.0), method, tolerance, 50.0);
         let run = RunSpec { system: system.clone(), start: vec![18.0], observe, ..run };
         let answer = Executor::quiet().ask(&Run(run)).unwrap();
         let table = answer.table("section").unwrap();
         let t = table.numbers("t");
-        assert!(t.len() > 9 && t.windows(3).all(|t| (t[2] - t[0] - period).abs() < 1e-9), "{method:?}: {t:?} {period}");
+        assert!(
+            t.len() > 9 && t.windows(3).all(|t| (t[2] - t[0] - period).abs() < 1e-9),
+            "{method:?}: {t:?} {period}"
+        );
     }
 }
 
-/// The same bytes as plain data; the answer says what was chosen inside the band, and what that came to.
+/// The same bytes as plain data; the answer says what was chosen inside the band, and what that
+/// came to.
 #[test]
 fn a_relays_answer_names_its_beginning() {
     let begins = |switch: SwitchSpec| {
@@ -195,7 +233,9 @@ fn a_relays_answer_names_its_beginning() {
 /// A band that narrows: the mean of the chatter tends to Filippov's motion, linearly.
 #[test]
 fn a_relays_mean_tends_to_filippovs_motion() {
-    let at = |switch, tolerance| simulate(&spec(1e-1, switch, Method::Dopri5, tolerance, 9.0), &()).unwrap().x;
+    let at = |switch, tolerance| {
+        simulate(&spec(1e-1, switch, Method::Dopri5, tolerance, 9.0), &()).unwrap().x
+    };
     let exit = twofold::integrate::filippov::ExitRule::Undecided;
     let limit = at(SwitchSpec::Filippov { exit, funnel: None }, 1e-11);
     let apart = [1e-2, 2.5e-3, 6.25e-4].map(|band| {
@@ -206,10 +246,13 @@ fn a_relays_mean_tends_to_filippovs_motion() {
     assert!(apart[2] < 2e-3 && apart[2] < 0.5 * apart[0], "{apart:?}");
 }
 
-/// While it slides at t = 9, without a choice before: the mean of the chatter is Filippov's motion, up to the delay's first power.
+/// While it slides at t = 9, without a choice before: the mean of the chatter is Filippov's motion,
+/// up to the delay's first power.
 #[test]
 fn the_chatters_mean_tends_to_filippovs_motion() {
-    let at = |switch, tolerance| simulate(&spec(1e-1, switch, Method::Dopri5, tolerance, 9.0), &()).unwrap().x;
+    let at = |switch, tolerance| {
+        simulate(&spec(1e-1, switch, Method::Dopri5, tolerance, 9.0), &()).unwrap().x
+    };
     let exit = twofold::integrate::filippov::ExitRule::Undecided;
     let limit = at(SwitchSpec::Filippov { exit, funnel: None }, 1e-11);
     let apart = [4e-3, 2e-3, 1e-3, 5e-4].map(|delay| {
@@ -217,29 +260,49 @@ fn the_chatters_mean_tends_to_filippovs_motion() {
         assert!(x[0].abs() < delay, "the surface is not far: {x:?}");
         x[1] - limit[1]
     });
-    assert!(apart[3] < 5e-3 && apart.windows(2).all(|e| (e[0] / e[1] - 2.0).abs() < 0.2), "{apart:?}");
+    assert!(
+        apart[3] < 5e-3 && apart.windows(2).all(|e| (e[0] / e[1] - 2.0).abs() < 0.2),
+        "{apart:?}"
+    );
 }
 
-/// Growth in a passage: across delay^-1, along and carried in delay^0, up to what the phases of a few starts scatter over one decade. The example has
-/// three decades.
+/// Growth in a passage: across delay^-1, along and carried in delay^0, up to what the phases of a
+/// few starts scatter over one decade. The example has three decades.
 #[test]
 fn growth_in_a_passage_is_of_order_one_in_inner_units() {
     let found: Vec<_> = [1e-2, 3e-3, 1e-3]
-        .map(|d| (d, delay_growth::growth(LateRule::Sharp { delay: d }, &delay_growth::STARTS[..3]).unwrap()))
+        .map(|d| {
+            (
+                d,
+                delay_growth::growth(LateRule::Sharp { delay: d }, &delay_growth::STARTS[..3])
+                    .unwrap(),
+            )
+        })
         .into();
     let [across, along, carried_in] = delay_growth::exponents(&found).map(|(slope, _)| slope);
-    assert!((across + 1.0).abs() < 0.3 && along.abs() < 0.1 && carried_in.abs() < 0.3, "{across} {along} {carried_in}");
+    assert!(
+        (across + 1.0).abs() < 0.3 && along.abs() < 0.1 && carried_in.abs() < 0.3,
+        "{across} {along} {carried_in}"
+    );
     for (delay, growth) in &found {
         for g in growth {
-            let inner =
-                [g.across * delay, g.along, g.carried_in, (g.exit[1] * g.exit[1] + g.exit[2] * g.exit[2]).sqrt()];
+            let inner = [
+                g.across * delay,
+                g.along,
+                g.carried_in,
+                (g.exit[1] * g.exit[1] + g.exit[2] * g.exit[2]).sqrt(),
+            ];
             let bounds = [(0.1, 0.5), (2.0, 3.5), (10.0, 40.0), (3.0, 30.0)];
-            assert!(inner.iter().zip(bounds).all(|(v, (low, high))| (low..high).contains(v)), "{delay}: {g:?}");
+            assert!(
+                inner.iter().zip(bounds).all(|(v, (low, high))| (low..high).contains(v)),
+                "{delay}: {g:?}"
+            );
         }
     }
 }
 
-/// The committed powers, each near the one that the chatter's phase explains: across, along and carried in.
+/// The committed powers, each near the one that the chatter's phase explains: across, along and
+/// carried in.
 #[test]
 fn committed_growth_has_the_powers_of_the_chatters_phase() {
     let growth = figures::delay::growth().unwrap();
@@ -253,12 +316,16 @@ fn committed_growth_has_the_powers_of_the_chatters_phase() {
     // The smooth rule: smoothing's powers, and order one in inner units.
     let law = Predicted::of(-1.2, -1.4);
     let smoothing = [law.across(), law.along(), law.carried()];
-    are(figures::delay::smooth_powers(&growth, figures::delay::SMALL, figures::delay::SMALL_EPS), smoothing, 0.15);
+    are(
+        figures::delay::smooth_powers(&growth, figures::delay::SMALL, figures::delay::SMALL_EPS),
+        smoothing,
+        0.15,
+    );
     are(figures::delay::smooth_powers(&growth, figures::delay::LARGE, 1e-2), [-0.5, 0.0, 0.0], 0.1);
 }
 
-/// Over a uniform phase the exits' distribution does not depend on the delay, or a small band, while the phase of each exit does. One exit of a
-/// distribution is 0.0043.
+/// Over a uniform phase the exits' distribution does not depend on the delay, or a small band,
+/// while the phase of each exit does. One exit of a distribution is 0.0043.
 #[test]
 fn committed_exits_have_a_limit_distribution() {
     let exits = figures::delay::exits().unwrap();
@@ -301,7 +368,8 @@ fn the_effect_is_in_some_ways_similar_to_hysteresis() {
     let mut reads = Reads::by("delay::the_effect_is_in_some_ways_similar_to_hysteresis");
     let scores = figures::delay::all_scores().unwrap();
     let is_similar = |way: usize| {
-        let chosen = scores.iter().filter(|s| s.0 == way && s.2 == Rule::Delayed && s.3 == Rule::Literal);
+        let chosen =
+            scores.iter().filter(|s| s.0 == way && s.2 == Rule::Delayed && s.3 == Rule::Literal);
         chosen.filter(|s| s.4.similar == Similar::Yes).count() == Reading::ALL.len()
     };
     for (_, reading, delayed, hysteresis, score) in &scores {
@@ -349,7 +417,10 @@ fn a_relay_is_refused_by_name_where_it_cannot_be_followed() {
     let relay = ["--switch", "relay", "--band", "0.01", "--t-end", "3", "--quiet"];
     for (command, more) in [
         ("lyapunov", vec!["--out", "-"]),
-        ("run", vec!["--kick-every", "0.5", "--kick-size", "0.02", "--restart", "0.7", "--out", "-"]),
+        (
+            "run",
+            vec!["--kick-every", "0.5", "--kick-size", "0.02", "--restart", "0.7", "--out", "-"],
+        ),
         ("plot", vec!["--out", &out("relay.png")]),
         ("sweep", vec!["--over", "band=1e-2,2e-2", "--out", &out("relay.csv")]),
     ] {
@@ -378,7 +449,9 @@ fn committed_exponents_come_out_the_same() {
 /// What is wrong is said before anything is computed, with exit code 2.
 #[test]
 fn wrong_questions_are_refused() {
-    let told = |arguments: &str| told(&["run", "--switch", "delayed", "--t-end", "1", "--out", "-"], arguments);
+    let told = |arguments: &str| {
+        told(&["run", "--switch", "delayed", "--t-end", "1", "--out", "-"], arguments)
+    };
     for (arguments, word) in [
         ("", "--delay"),
         ("--delay 0", "above zero"),
@@ -405,8 +478,12 @@ fn wrong_questions_are_refused() {
     }
     assert_eq!(told("--delay 0.1").0, Some(0));
     // Where an axis varies eps, --eps says that the switch is the smooth one.
-    let sweep =
-        |eps: &str| self::told(&["sweep", "--switch", "delayed", "--delay", "0.1", "--t-end", "1", "--quiet"], eps);
+    let sweep = |eps: &str| {
+        self::told(
+            &["sweep", "--switch", "delayed", "--delay", "0.1", "--t-end", "1", "--quiet"],
+            eps,
+        )
+    };
     assert_eq!(sweep("--eps 0.1 --over eps=0.1,0.2").0, Some(0));
     let (code, said) = sweep("--over eps=0.1,0.2");
     assert!(code == Some(2) && said.contains("give the run one"), "{said}");

@@ -1,4 +1,5 @@
-//! What carries the project to others: workflows are pinned and may do little, versions agree, the package holds what it embeds.
+//! What carries the project to others: workflows are pinned and may do little, versions agree, the
+//! package holds what it embeds.
 //!
 //! A package made of this repository has no workflows; there nothing is tested here.
 
@@ -41,9 +42,17 @@ fn actions_are_pinned_to_commits_and_each_to_one() {
     let mut pins: BTreeMap<String, String> = BTreeMap::new();
     for (path, text) in workflows() {
         for line in text.lines().map(str::trim) {
-            let Some(used) = line.strip_prefix("- uses:").or(line.strip_prefix("uses:")) else { continue };
-            let wrong = || format!("{}: {line}: give an action as OWNER/NAME@COMMIT # vRELEASE", path.display());
-            let (action, pin) = used.trim().split_once('@').unwrap_or_else(|| panic!("{}", wrong()));
+            let Some(used) = line.strip_prefix("- uses:").or(line.strip_prefix("uses:")) else {
+                continue;
+            };
+            let wrong = || {
+                format!(
+                    "{}: {line}: give an action as OWNER/NAME@COMMIT # vRELEASE",
+                    path.display()
+                )
+            };
+            let (action, pin) =
+                used.trim().split_once('@').unwrap_or_else(|| panic!("{}", wrong()));
             let (commit, release) = pin.split_once(" # v").unwrap_or_else(|| panic!("{}", wrong()));
             let hexadecimal = |c: char| c.is_ascii_digit() || ('a'..='f').contains(&c);
             assert!(commit.len() == 40 && commit.chars().all(hexadecimal), "{}", wrong());
@@ -57,14 +66,31 @@ fn actions_are_pinned_to_commits_and_each_to_one() {
 
 #[test]
 fn workflows_may_do_little() {
-    for (path, text) in workflows().iter().filter(|(p, _)| p.parent().is_some_and(|p| p.ends_with("workflows"))) {
+    for (path, text) in
+        workflows().iter().filter(|(p, _)| p.parent().is_some_and(|p| p.ends_with("workflows")))
+    {
         let path = path.display();
-        assert!(text.lines().any(|l| l == "permissions: {}"), "{path}: begin with `permissions: {{}}`");
+        assert!(
+            text.lines().any(|l| l == "permissions: {}"),
+            "{path}: begin with `permissions: {{}}`"
+        );
         let jobs = text.matches("    runs-on:").count();
-        assert_eq!(text.matches("\n    permissions:").count(), jobs, "{path}: every job says what it may do");
-        assert_eq!(text.matches("    timeout-minutes:").count(), jobs, "{path}: every job has an end");
+        assert_eq!(
+            text.matches("\n    permissions:").count(),
+            jobs,
+            "{path}: every job says what it may do"
+        );
+        assert_eq!(
+            text.matches("    timeout-minutes:").count(),
+            jobs,
+            "{path}: every job has an end"
+        );
         let checkouts = text.matches("actions/checkout@").count();
-        assert_eq!(text.matches("persist-credentials: false").count(), checkouts, "{path}: no job keeps a token");
+        assert_eq!(
+            text.matches("persist-credentials: false").count(),
+            checkouts,
+            "{path}: no job keeps a token"
+        );
         for line in text.lines().filter(|l| l.contains(": write")) {
             assert!(line.contains(" # "), "{path}: {line}: say what for");
         }
@@ -85,10 +111,14 @@ fn versions_agree() {
         assert!(line.contains(&exact), "{line}: {exact}");
     }
     for name in members() {
-        assert!(text(format!("{name}/Cargo.toml")).contains("\nversion.workspace = true\n"), "{name}");
+        assert!(
+            text(format!("{name}/Cargo.toml")).contains("\nversion.workspace = true\n"),
+            "{name}"
+        );
     }
     let toolchain = text("rust-toolchain.toml");
-    let channel = toolchain.lines().find_map(|l| l.strip_prefix("channel = \"")?.strip_suffix('"')).unwrap();
+    let channel =
+        toolchain.lines().find_map(|l| l.strip_prefix("channel = \"")?.strip_suffix('"')).unwrap();
     assert!(text("Containerfile").contains(&format!("ARG RUST={channel}\n")));
     assert!(text(".github/workflows/ci.yml").contains(&format!("rust-version: {channel}\n")));
 }
@@ -105,14 +135,16 @@ fn files_are_checked_out_as_they_are_committed() {
     assert_eq!(
         rules,
         ["* -text"],
-        "a rule more may undo the first: see what it does to `git ls-files --eol` under core.autocrlf=true"
+        "a rule more may undo the first: see what it does to `git ls-files --eol` under \
+            core.autocrlf=true"
     );
 }
 
 /// The folders of the workspace's members.
 fn members() -> Vec<String> {
     let manifest = text("Cargo.toml");
-    let members = manifest.lines().find_map(|l| l.strip_prefix("members = [")?.strip_suffix(']')).unwrap();
+    let members =
+        manifest.lines().find_map(|l| l.strip_prefix("members = [")?.strip_suffix(']')).unwrap();
     let mut found = Vec::new();
     for member in members.split(", ").map(|m| m.trim_matches('"')) {
         match member.strip_suffix("/*") {
@@ -128,7 +160,8 @@ fn members() -> Vec<String> {
     found
 }
 
-/// Cargo reads every member of a workspace, also of those that it does not build: an image is built from sources that are whole.
+/// Cargo reads every member of a workspace, also of those that it does not build: an image is built
+/// from sources that are whole.
 #[test]
 fn the_image_is_built_from_a_whole_workspace() {
     if workflows().is_empty() {
@@ -137,7 +170,10 @@ fn the_image_is_built_from_a_whole_workspace() {
     let ignored = text(".containerignore");
     for member in members() {
         let top = member.split('/').next().unwrap();
-        assert!(ignored.lines().all(|l| l != member && l != top), ".containerignore leaves out {member}");
+        assert!(
+            ignored.lines().all(|l| l != member && l != top),
+            ".containerignore leaves out {member}"
+        );
         assert!(root().join(&member).join("Cargo.toml").is_file(), "{member}");
     }
 }
@@ -179,14 +215,24 @@ fn the_package_holds_what_it_embeds() {
                     }
                 }
                 let plain = plain.to_str().unwrap().replace('\\', "/");
-                assert!(packed.contains(&plain), "{package}: {source} embeds {plain}, which the package has not");
+                assert!(
+                    packed.contains(&plain),
+                    "{package}: {source} embeds {plain}, which the package has not"
+                );
                 embedded += 1;
             }
         }
     }
     assert!(embedded > 30, "only {embedded} embedded files were found");
     let packed = packed("twofold-dynamics");
-    for name in ["README.md", "LICENSE-MIT", "LICENSE-APACHE", "Cargo.lock", "build.rs", "rust-toolchain.toml"] {
+    for name in [
+        "README.md",
+        "LICENSE-MIT",
+        "LICENSE-APACHE",
+        "Cargo.lock",
+        "build.rs",
+        "rust-toolchain.toml",
+    ] {
         assert!(packed.iter().any(|f| f == name), "{name}");
     }
 }

@@ -1,4 +1,5 @@
-//! The end of an equation's domain is named: which expression has no value, when, and in which state.
+//! The end of an equation's domain is named: which expression has no value, when, and in which
+//! state.
 
 use assert_cmd::Command;
 
@@ -26,7 +27,9 @@ fn run(slides: bool, [y, z]: [&str; 2], switch: &str, t_end: f64) -> (i32, Strin
     );
     std::fs::write(&file, text).unwrap();
     let mut command = Command::cargo_bin("twofold").unwrap();
-    command.args(["run", "--quiet", "--every", "0.1", "--t-end", &t_end.to_string()]).args(switch.split(' '));
+    command
+        .args(["run", "--quiet", "--every", "0.1", "--t-end", &t_end.to_string()])
+        .args(switch.split(' '));
     let output = command.arg("--system").arg(&file).output().unwrap();
     let rows = String::from_utf8(output.stdout).unwrap();
     let last = rows.lines().rfind(|line| !line.starts_with('#')).unwrap();
@@ -53,16 +56,23 @@ fn the_end_of_a_domain_is_named_by_every_switch() {
             for slides in [true, false] {
                 let (code, said, _) = run(slides, fields, switch, 3.0);
                 let named = said.contains("the end of the field's domain") && said.contains(what);
-                assert!(code == 3 && named && said.contains("state ["), "{fields:?}, {switch}: {said}");
+                assert!(
+                    code == 3 && named && said.contains("state ["),
+                    "{fields:?}, {switch}: {said}"
+                );
                 let time = said.split("t = ").nth(1).unwrap().split(',').next().unwrap();
                 // The default tolerances move y by 1e-6 or less, and the time by no more.
-                assert!((time.parse::<f64>().unwrap() - t).abs() < 2e-6, "{fields:?}, {switch}: {said}");
+                assert!(
+                    (time.parse::<f64>().unwrap() - t).abs() < 2e-6,
+                    "{fields:?}, {switch}: {said}"
+                );
             }
         }
     }
 }
 
-/// Where a divisor is zero and the equation is bounded, the motion goes on: z' = sin(y)/y has z(2) = 1 + 2 Si(1).
+/// Where a divisor is zero and the equation is bounded, the motion goes on: z' = sin(y)/y has z(2)
+/// = 1 + 2 Si(1).
 #[test]
 fn a_zero_of_a_divisor_need_not_be_the_end() {
     const SI: f64 = 0.946_083_070_367_183;
@@ -79,7 +89,10 @@ fn a_zero_of_a_divisor_need_not_be_the_end() {
                     .1
             };
             let z = 1.0 + si(0.99) + si(1.01);
-            assert!((si(1.0) - SI).abs() < 1e-14 && (last[3] - z).abs() < 1e-6, "{switch}: {last:?}, {z}");
+            assert!(
+                (si(1.0) - SI).abs() < 1e-14 && (last[3] - z).abs() < 1e-6,
+                "{switch}: {last:?}, {z}"
+            );
         }
     }
 }

@@ -16,7 +16,8 @@ impl VectorField<2> for Bell {
 
 /// (largest error at the ends of steps, largest error inside steps) on [0, 2] with steps of 1/n.
 fn errors(n: u32) -> (f64, f64) {
-    // A tolerance that accepts everything leaves the cap to set the step, after a few tiny first ones.
+    // A tolerance that accepts everything leaves the cap to set the step, after a few tiny first
+    // ones.
     let mut m = Dopri5::new(Tolerance { rtol: 1e3, atol: 1e3 });
     let mut worst = (0.0_f64, 0.0_f64);
     let mut t = 0.0;

@@ -22,7 +22,8 @@ use twofold::job::Executor;
 #[test]
 fn own_system_slides_on_its_surface() {
     let events = own_system::follow().unwrap();
-    // It lands on prey = 1 and slides there: too many predators to let the prey grow, too few prey to be hunted.
+    // It lands on prey = 1 and slides there: too many predators to let the prey grow, too few prey
+    // to be hunted.
     assert!(matches!(events[0].kind, EventKind::Landing { .. }), "{events:?}");
     assert!(events.iter().all(|e| (e.state[0] - 1.0).abs() < 1e-9), "{events:?}");
 }
@@ -30,7 +31,8 @@ fn own_system_slides_on_its_surface() {
 #[test]
 fn own_method_agrees_with_dormand_prince() {
     let passages = own_method::compare().unwrap();
-    // A pendulum released at 1 radian swings with period 4 K(sin(1/2)) = 6.6996: nine passages in 30.
+    // A pendulum released at 1 radian swings with period 4 K(sin(1/2)) = 6.6996: nine passages in
+    // 30.
     assert_eq!(passages.len(), 9);
     assert!((passages[2][0] - passages[0][0] - 6.699_6).abs() < 1e-3, "{passages:?}");
     assert!(passages.iter().all(|[ours, theirs]| (ours - theirs).abs() < 1e-6), "{passages:?}");
@@ -39,7 +41,8 @@ fn own_method_agrees_with_dormand_prince() {
 #[test]
 fn own_figure_is_written_whole() {
     let folder = tempfile::tempdir().unwrap();
-    let records = twofold::cli::make(&[own_figure::figure()], folder.path(), &Executor::quiet()).unwrap();
+    let records =
+        twofold::cli::make(&[own_figure::figure()], folder.path(), &Executor::quiet()).unwrap();
     assert_eq!(records.len(), 1);
     for file in ["own.png", "own.svg", "own.pdf", "own.json", "own-a.csv", "own-b.csv"] {
         assert!(folder.path().join("own").join(file).metadata().unwrap().len() > 500, "{file}");
@@ -48,9 +51,12 @@ fn own_figure_is_written_whole() {
 
 #[test]
 fn few_orbits_come_back_from_far_away_in_the_reconstructed_reading() {
-    let back =
-        |box_size| returns::back(&twofold::system::Caricature::with_reinjection(1e-1, 1e-5), box_size, 12).unwrap();
-    // The shares of 400 are 0.995 and 0.17: twelve starts have these by chance only once in 10^5 and 10^4.
+    let back = |box_size| {
+        returns::back(&twofold::system::Caricature::with_reinjection(1e-1, 1e-5), box_size, 12)
+            .unwrap()
+    };
+    // The shares of 400 are 0.995 and 0.17: twelve starts have these by chance only once in 10^5
+    // and 10^4.
     assert!(back(0.3) >= 10, "{}", back(0.3));
     assert!(back(3.0) <= 7, "{}", back(3.0));
 }

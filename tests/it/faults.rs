@@ -1,5 +1,6 @@
-//! Bad input, bad places, bad moments: one clear message that says what to change, the exit code that the help names, nothing half
-//! written, existing files intact, no litter. No test aims at a real device: code that is wrong on purpose (make mutants) would replace it.
+//! Bad input, bad places, bad moments: one clear message that says what to change, the exit code
+//! that the help names, nothing half written, existing files intact, no litter. No test aims at a
+//! real device: code that is wrong on purpose (make mutants) would replace it.
 
 use std::fs;
 use std::io::Write as _;
@@ -10,7 +11,8 @@ use std::time::{Duration, Instant};
 use assert_cmd::Command;
 use serde_json::Value;
 
-/// Long enough for anything that is refused at once, on any machine; far too short for what is refused.
+/// Long enough for anything that is refused at once, on any machine; far too short for what is
+/// refused.
 const AT_ONCE: Duration = Duration::from_secs(60);
 
 /// A program under way. A test that fails does not leave it running.
@@ -68,9 +70,11 @@ fn twofold(arguments: &[&str]) -> Output {
     Command::cargo_bin("twofold").unwrap().args(arguments).timeout(AT_ONCE).output().unwrap()
 }
 
-/// Fails with `code`; the message is one line on standard error, has no panic in it, and contains each of `words`.
+/// Fails with `code`; the message is one line on standard error, has no panic in it, and contains
+/// each of `words`.
 fn refuses(output: &Output, code: i32, words: &[&str]) {
-    let text = String::from_utf8_lossy(&output.stderr).into_owned() + &String::from_utf8_lossy(&output.stdout);
+    let text = String::from_utf8_lossy(&output.stderr).into_owned()
+        + &String::from_utf8_lossy(&output.stdout);
     assert_eq!(output.status.code(), Some(code), "{text}");
     assert!(!text.contains("panicked"), "{text}");
     for word in words {
@@ -105,20 +109,38 @@ fn wrong_numbers_are_named() {
         (vec!["--section", "q=0"], vec!["--section", "x, y, z", "y=0"]),
         (vec!["--section", "y"], vec!["--section", "y=0"]),
         (vec!["--section", "y=zero"], vec!["--section", "number"]),
-        (vec!["--system", "wheel", "--alpha", "1"], vec!["--alpha", "belongs to the caricature", "--set"]),
+        (
+            vec!["--system", "wheel", "--alpha", "1"],
+            vec!["--alpha", "belongs to the caricature", "--set"],
+        ),
         (vec!["--switch", "hysteretic", "--sigma", "0.1"], vec!["--sigma"]),
         (vec!["--exit", "nonsense", "--eps-prime", "5"], vec!["no effect", "--switch"]),
-        (vec!["--switch", "filippov", "--exit", "all", "--eps", "1e-3"], vec!["--eps", "no effect"]),
+        (
+            vec!["--switch", "filippov", "--exit", "all", "--eps", "1e-3"],
+            vec!["--eps", "no effect"],
+        ),
         (vec!["--system", "wheel", "--reading", "printed"], vec!["--reading", "no effect"]),
         (vec!["--seed", "5"], vec!["--seed", "random"]),
         (vec!["--section", "y=0", "--chord", "0.1"], vec!["--chord", "crossings"]),
         (vec!["--print-spec", "--format", "json"], vec!["--print-spec", "--format"]),
         (vec!["--method", "taylor-extended", "--rtol", "1e-40"], vec!["--rtol", "32 digits"]),
         (vec!["--switch", "filippov", "--exit", "at-once:up"], vec!["--exit", "at-once:plus"]),
-        (vec!["--switch", "filippov", "--exit", "after-time:-1:plus"], vec!["--exit is after-time:-1.0:plus"]),
-        (vec!["--switch", "filippov", "--exit", "all", "--funnel-times", "0"], vec!["--funnel-times"]),
-        (vec!["--switch", "filippov", "--exit", "all", "--section", "y=0"], vec!["--exit", "--section"]),
-        (vec!["--switch", "filippov", "--exit", "at-once:plus", "--method", "lsoda"], vec!["--method", "dopri5"]),
+        (
+            vec!["--switch", "filippov", "--exit", "after-time:-1:plus"],
+            vec!["--exit is after-time:-1.0:plus"],
+        ),
+        (
+            vec!["--switch", "filippov", "--exit", "all", "--funnel-times", "0"],
+            vec!["--funnel-times"],
+        ),
+        (
+            vec!["--switch", "filippov", "--exit", "all", "--section", "y=0"],
+            vec!["--exit", "--section"],
+        ),
+        (
+            vec!["--switch", "filippov", "--exit", "at-once:plus", "--method", "lsoda"],
+            vec!["--method", "dopri5"],
+        ),
         (
             vec!["--switch", "filippov", "--exit", "at-once:plus", "--restart", "20"],
             vec!["--restart", "--switch", "restarts"],
@@ -144,7 +166,8 @@ fn a_place_that_cannot_be_written_leaves_what_is_there() {
     let output = twofold(&["run", "--quiet", "--t-end", "1", "--out", below.to_str().unwrap()]);
     refuses(&output, 2, &["notes.txt", "--out"]);
     assert_eq!(fs::read_to_string(&blocker).unwrap(), "keep me");
-    let output = twofold(&["run", "--quiet", "--t-end", "1", "--out", folder.path().to_str().unwrap()]);
+    let output =
+        twofold(&["run", "--quiet", "--t-end", "1", "--out", folder.path().to_str().unwrap()]);
     refuses(&output, 2, &["cannot write"]);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "litter");
 }
@@ -173,7 +196,8 @@ fn a_finished_file_replaces_its_predecessor_whole() {
     assert_eq!(files(folder.path()), ["run.csv", "run.csv.part"]);
 }
 
-/// What each exit code stands for, on the real programs. 130 and 143: `signals_leave_at_once_and_keep_what_is_finished`.
+/// What each exit code stands for, on the real programs. 130 and 143:
+/// `signals_leave_at_once_and_keep_what_is_finished`.
 #[test]
 fn exit_codes_are_those_of_the_help() {
     let folder = tempfile::tempdir().unwrap();
@@ -191,18 +215,27 @@ fn exit_codes_are_those_of_the_help() {
     assert_eq!(figure("fig1", &["--quiet", "--out", here]).status.code(), Some(0));
     assert_eq!(figure("fig1", &["--quiet", "--out", here, "--only", "i"]).status.code(), Some(2));
     assert_eq!(twofold(&["figure", "fig7", "--print-spec", "--out", here]).status.code(), Some(2));
-    for text in [twofold(&["--help"]).stdout, twofold(&["run", "--help"]).stdout, figure("fig7", &["--help"]).stdout] {
+    for text in [
+        twofold(&["--help"]).stdout,
+        twofold(&["run", "--help"]).stdout,
+        figure("fig7", &["--help"]).stdout,
+    ] {
         let text = String::from_utf8(text).unwrap();
         assert!(text.contains("Example") || text.contains("Exit codes"), "{text}");
     }
-    let help = String::from_utf8(twofold(&["--help"]).stdout).unwrap().split_whitespace().collect::<Vec<_>>().join(" ");
+    let help = String::from_utf8(twofold(&["--help"]).stdout)
+        .unwrap()
+        .split_whitespace()
+        .collect::<Vec<_>>()
+        .join(" ");
     assert!(help.contains(twofold::cli::Exit::HELP), "{help}");
     let readme = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/README.md")).unwrap();
     let readme = readme.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(readme.contains(twofold::cli::Exit::HELP), "README names other exit codes");
 }
 
-/// `--out /dev/stdout >> log` writes after what the log holds, `--out -` to whatever standard output is.
+/// `--out /dev/stdout >> log` writes after what the log holds, `--out -` to whatever standard
+/// output is.
 #[cfg(target_os = "linux")]
 #[test]
 fn standard_output_is_written_to_and_never_replaced() {
@@ -239,7 +272,8 @@ fn a_named_pipe_is_written_to() {
     let folder = tempfile::tempdir().unwrap();
     let pipe = folder.path().join("pipe");
     assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
-    let mut reader = std::process::Command::new("cat").arg(&pipe).stdout(Stdio::piped()).spawn().unwrap();
+    let mut reader =
+        std::process::Command::new("cat").arg(&pipe).stdout(Stdio::piped()).spawn().unwrap();
     let output = twofold(&["run", "--quiet", "--t-end", "1", "--out", pipe.to_str().unwrap()]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let mut read = Vec::new();
@@ -254,8 +288,12 @@ fn a_spec_can_come_from_standard_input() {
     let flags = ["run", "--quiet", "--t-end", "3", "--reading", "reconstructed"];
     let spec = twofold(&[&flags[..], &["--print-spec"]].concat()).stdout;
     let mut command = Command::cargo_bin("twofold").unwrap();
-    let output = command.args(["run", "--quiet", "--spec", "-"]).write_stdin(spec).output().unwrap();
-    assert_eq!(String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&twofold(&flags).stdout));
+    let output =
+        command.args(["run", "--quiet", "--spec", "-"]).write_stdin(spec).output().unwrap();
+    assert_eq!(
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&twofold(&flags).stdout)
+    );
     let mut command = Command::cargo_bin("twofold").unwrap();
     refuses(
         &command.args(["run", "--spec", "-"]).write_stdin("{").output().unwrap(),
@@ -275,7 +313,8 @@ fn a_bad_place_is_found_before_computing() {
     assert!(begun.elapsed() < AT_ONCE);
 }
 
-/// A file grown beyond the limit of its size stands for a full disk: an error with a message, the old file whole, no litter.
+/// A file grown beyond the limit of its size stands for a full disk: an error with a message, the
+/// old file whole, no litter.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_disk_is_an_error() {
@@ -283,11 +322,18 @@ fn a_full_disk_is_an_error() {
     let path = folder.path().join("run.csv");
     fs::write(&path, "old").unwrap();
     let program = assert_cmd::cargo::cargo_bin("twofold");
-    // Where the tests run, the signal that goes with it may be ignored already (Python's children): then it proves nothing.
+    // Where the tests run, the signal that goes with it may be ignored already (Python's children):
+    // then it proves nothing.
     for disposition in ["", "env --default-signal=XFSZ "] {
-        let script = format!("ulimit -f 16; exec {disposition}\"$0\" run --quiet --t-end 100 --out \"$1\"");
-        let output =
-            Command::new("sh").args(["-c", &script]).arg(&program).arg(&path).timeout(AT_ONCE).output().unwrap();
+        let script =
+            format!("ulimit -f 16; exec {disposition}\"$0\" run --quiet --t-end 100 --out \"$1\"");
+        let output = Command::new("sh")
+            .args(["-c", &script])
+            .arg(&program)
+            .arg(&path)
+            .timeout(AT_ONCE)
+            .output()
+            .unwrap();
         refuses(&output, 2, &["cannot write", "run.csv", "free some space"]);
         assert_eq!(fs::read_to_string(&path).unwrap(), "old");
         assert_eq!(files(folder.path()), ["run.csv"]);
@@ -303,7 +349,9 @@ fn an_unread_standard_error_costs_nothing() {
     assert_eq!(output.status.code(), Some(0));
     let made = files(&folder.path().join("fig3"));
     assert!(
-        ["fig3.json", "fig3.pdf", "fig3.png", "fig3.svg"].iter().all(|f| made.contains(&f.to_string())),
+        ["fig3.json", "fig3.pdf", "fig3.png", "fig3.svg"]
+            .iter()
+            .all(|f| made.contains(&f.to_string())),
         "{made:?}"
     );
     // Errors cannot be said, but are.
@@ -315,7 +363,13 @@ fn an_unread_standard_error_costs_nothing() {
 #[cfg(unix)]
 fn signal(running: &mut Running, name: &str) {
     let id = running.child().id().to_string();
-    assert!(std::process::Command::new("kill").args([format!("-{name}"), id]).status().unwrap().success());
+    assert!(
+        std::process::Command::new("kill")
+            .args([format!("-{name}"), id])
+            .status()
+            .unwrap()
+            .success()
+    );
 }
 
 /// Waits until `ready`, or fails after a minute.
@@ -334,16 +388,19 @@ fn let_it_work(running: &mut Running) {
     if !Path::new(&stat).exists() {
         return std::thread::sleep(Duration::from_millis(1500));
     }
-    // Fields 14 and 15, counted from the name's end, which is the second: hundredths of a second of the processor.
+    // Fields 14 and 15, counted from the name's end, which is the second: hundredths of a second of
+    // the processor.
     let used = || -> u64 {
         let text = fs::read_to_string(&stat).unwrap_or_default();
-        let fields = text.rsplit(')').next().unwrap_or_default().split_whitespace().skip(11).take(2);
+        let fields =
+            text.rsplit(')').next().unwrap_or_default().split_whitespace().skip(11).take(2);
         fields.map(|field| field.parse::<u64>().unwrap_or(0)).sum()
     };
     wait_until("a second of work", || used() >= 100);
 }
 
-/// Ctrl-C and SIGTERM: within a second (and what a loaded machine adds), one line, what is finished stays, nothing else does.
+/// Ctrl-C and SIGTERM: within a second (and what a loaded machine adds), one line, what is finished
+/// stays, nothing else does.
 #[cfg(unix)]
 #[test]
 fn signals_leave_at_once_and_keep_what_is_finished() {
@@ -371,11 +428,21 @@ fn signals_leave_at_once_and_keep_what_is_finished() {
         assert!(part.ends_with("\n# stop: interrupted\n") && part.lines().count() > 50, "{part}");
         assert_eq!(files(folder.path()), ["orbit.csv", "orbit.csv.part"]);
         // The same on standard output.
-        let output = ends(Running::start(&[&long[..], &["y=1e9"]].concat()), &["interrupted at", "standard output"]);
+        let output = ends(
+            Running::start(&[&long[..], &["y=1e9"]].concat()),
+            &["interrupted at", "standard output"],
+        );
         assert!(String::from_utf8(output.stdout).unwrap().contains("interrupted"));
         // A figure: what is finished is there, and nothing else.
         let figures = folder.path().join("figures");
-        let made = Running::start(&["figure", "fig7", "--fresh", "--quiet", "--out", figures.to_str().unwrap()]);
+        let made = Running::start(&[
+            "figure",
+            "fig7",
+            "--fresh",
+            "--quiet",
+            "--out",
+            figures.to_str().unwrap(),
+        ]);
         ends(made, &[if name == "INT" { "interrupted" } else { "terminated" }]);
         assert!(files(&figures.join("fig7")).is_empty());
     }
@@ -388,9 +455,25 @@ fn an_interrupted_sweep_keeps_its_rows() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("sweep.csv");
     let to = out.to_str().unwrap();
-    let mut sweep = Running::start(&["sweep", "--runs", "1000000", "--t-end", "300", "--threads", "1", "--out", to]);
-    let mut lines = std::io::BufRead::lines(std::io::BufReader::new(sweep.child().stderr.take().unwrap()));
-    let finished = lines.by_ref().map(Result::unwrap).filter(|l| l.contains("of 1000000 rows")).take(3).count();
+    let mut sweep = Running::start(&[
+        "sweep",
+        "--runs",
+        "1000000",
+        "--t-end",
+        "300",
+        "--threads",
+        "1",
+        "--out",
+        to,
+    ]);
+    let mut lines =
+        std::io::BufRead::lines(std::io::BufReader::new(sweep.child().stderr.take().unwrap()));
+    let finished = lines
+        .by_ref()
+        .map(Result::unwrap)
+        .filter(|l| l.contains("of 1000000 rows"))
+        .take(3)
+        .count();
     assert_eq!(finished, 3);
     signal(&mut sweep, "INT");
     let rest: Vec<String> = lines.map(Result::unwrap).collect();
@@ -422,8 +505,9 @@ fn a_killed_sweep_goes_on_to_the_same_bytes() {
         "--threads",
         "1",
     ];
-    let sweep =
-        |more: &[&str]| [&["sweep"], &axes[..], more].concat().iter().map(|s| s.to_string()).collect::<Vec<_>>();
+    let sweep = |more: &[&str]| {
+        [&["sweep"], &axes[..], more].concat().iter().map(|s| s.to_string()).collect::<Vec<_>>()
+    };
     let run = |more: &[&str]| {
         let arguments = sweep(more);
         let done = twofold(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
@@ -447,16 +531,34 @@ fn a_killed_sweep_goes_on_to_the_same_bytes() {
     run(&["--out", &b, "--shard", "2/3"]);
     run(&["--out", &c, "--shard", "3/3"]);
     let merged = file("merged.csv");
-    assert_eq!(twofold(&["sweep", "merge", &c, &a, &b, "--out", &merged, "--quiet"]).status.code(), Some(0));
+    assert_eq!(
+        twofold(&["sweep", "merge", &c, &a, &b, "--out", &merged, "--quiet"]).status.code(),
+        Some(0)
+    );
     assert!(fs::read(&whole).unwrap() == fs::read(&merged).unwrap());
     // Another sweep's file is refused.
-    refuses(&twofold(&["sweep", "--t-end", "9", "--resume", "--out", &whole]), 2, &["different sweeps"]);
+    refuses(
+        &twofold(&["sweep", "--t-end", "9", "--resume", "--out", &whole]),
+        2,
+        &["different sweeps"],
+    );
 }
 
 /// A short fig. 7 on one thread, into `folder`.
 fn short_fig7(folder: &Path, t_end: &str) -> Running {
     let to = folder.to_str().unwrap();
-    Running::start(&["figure", "fig7", "--fresh", "--quiet", "--threads", "1", "--t-end", t_end, "--out", to])
+    Running::start(&[
+        "figure",
+        "fig7",
+        "--fresh",
+        "--quiet",
+        "--threads",
+        "1",
+        "--t-end",
+        t_end,
+        "--out",
+        to,
+    ])
 }
 
 /// Figures are not lost without a word when something removes their folder meanwhile.
@@ -467,16 +569,20 @@ fn a_folder_removed_meanwhile_is_noticed() {
         let (out, away) = (folder.path().join("fig7"), folder.path().join("away"));
         let mut made = short_fig7(folder.path(), "1000");
         let records = |folder: &Path| {
-            ["printed", "reconstructed"].map(|r| folder.join(format!("fig7-{r}-shortened.json")).exists())
+            ["printed", "reconstructed"]
+                .map(|r| folder.join(format!("fig7-{r}-shortened.json")).exists())
         };
         wait_until("the first picture", || records(&out) != [false; 2] || made.ended());
-        // At one stroke, so that what is away tells what was there: with one picture still to come, its end is yet to be written.
+        // At one stroke, so that what is away tells what was there: with one picture still to come,
+        // its end is yet to be written.
         fs::rename(&out, &away).unwrap();
         (made.output(), records(&away))
     });
-    // On a loaded machine both may be done before this test has its turn: then there may be nothing to notice.
+    // On a loaded machine both may be done before this test has its turn: then there may be nothing
+    // to notice.
     let in_time = |(_, records): &(Output, [bool; 2])| *records != [true; 2];
-    let (made, _) = made.take(5).find(in_time).expect("five times all was done before the folder was away");
+    let (made, _) =
+        made.take(5).find(in_time).expect("five times all was done before the folder was away");
     refuses(&made, 2, &["fig7", "run this again"]);
 }
 
@@ -508,25 +614,29 @@ fn too_much_is_refused_before_it_is_tried() {
         refuses(&twofold(&["check", "--against", path]), 2, &["spec.json", "not a manifest"]);
     }
     // The same as a system's file, a certificate, a table; and 10^18 cells.
-    for (name, text) in
-        [
-            ("deep.toml", format!("name = \"deep\"\nx = {}", "[".repeat(100_000))),
-            ("deep-table.toml", format!("name = \"deep\"\n{}", "a.".repeat(100_000))),
-            (
-                "deep-expression.toml",
-                fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/systems/relay-linear.toml"))
-                    .unwrap()
-                    .replacen("= \"", &format!("= \"{}", "(".repeat(100_000)), 1),
-            ),
-        ]
-    {
+    for (name, text) in [
+        ("deep.toml", format!("name = \"deep\"\nx = {}", "[".repeat(100_000))),
+        ("deep-table.toml", format!("name = \"deep\"\n{}", "a.".repeat(100_000))),
+        (
+            "deep-expression.toml",
+            fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/systems/relay-linear.toml"))
+                .unwrap()
+                .replacen("= \"", &format!("= \"{}", "(".repeat(100_000)), 1),
+        ),
+    ] {
         let file = folder.path().join(name);
         fs::write(&file, text).unwrap();
         refuses(&twofold(&["run", "--system", file.to_str().unwrap(), "--t-end", "1"]), 2, &[name]);
     }
     for (name, text) in [
         ("deep.json", "[".repeat(100_000)),
-        ("wide.json", format!("{{\"theorem\":\"printed-cycle\",\"statement\":\"{}\"}}", "x".repeat(10_000_000))),
+        (
+            "wide.json",
+            format!(
+                "{{\"theorem\":\"printed-cycle\",\"statement\":\"{}\"}}",
+                "x".repeat(10_000_000)
+            ),
+        ),
     ] {
         let file = folder.path().join(name);
         fs::write(&file, text).unwrap();
@@ -540,7 +650,8 @@ fn too_much_is_refused_before_it_is_tried() {
     assert!(begun.elapsed() < 3 * AT_ONCE);
 }
 
-/// A picture that grows a thousandfold when it is unpacked, and one whose text does: neither is unpacked further than its header allows.
+/// A picture that grows a thousandfold when it is unpacked, and one whose text does: neither is
+/// unpacked further than its header allows.
 #[test]
 fn decompression_bombs_stay_packed() {
     let folder = tempfile::tempdir().unwrap();
@@ -564,8 +675,13 @@ fn decompression_bombs_stay_packed() {
     let file = folder.path().join("fig1.png");
     fs::write(&file, bomb).unwrap();
     let begun = Instant::now();
-    refuses(&twofold(&["inspect", file.to_str().unwrap()]), 1, &["Made by twofold, and changed since"]);
-    let against = twofold(&["check", "fig1", "--quiet", "--against", folder.path().to_str().unwrap()]);
+    refuses(
+        &twofold(&["inspect", file.to_str().unwrap()]),
+        1,
+        &["Made by twofold, and changed since"],
+    );
+    let against =
+        twofold(&["check", "fig1", "--quiet", "--against", folder.path().to_str().unwrap()]);
     refuses(&against, 1, &["fig1.png: DIFFERS"]);
     assert!(begun.elapsed() < 2 * AT_ONCE);
 }
@@ -573,20 +689,31 @@ fn decompression_bombs_stay_packed() {
 /// The checksum of PNG's chunks (ISO 3309).
 fn crc(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(!0_u32, |crc, b| {
-        (0..8).fold(crc ^ u32::from(*b), |crc, _| if crc & 1 == 1 { crc >> 1 ^ 0xedb8_8320 } else { crc >> 1 })
+        (0..8).fold(crc ^ u32::from(*b), |crc, _| {
+            if crc & 1 == 1 { crc >> 1 ^ 0xedb8_8320 } else { crc >> 1 }
+        })
     })
 }
 
-/// 46 bytes that claim a picture of 100000 by 100000 pixels; a link to nothing; a name that steers terminals: each costs one line.
+/// 46 bytes that claim a picture of 100000 by 100000 pixels; a link to nothing; a name that steers
+/// terminals: each costs one line.
 #[test]
 fn hostile_pictures_cost_one_line_each() {
     let hex = "89504e470d0a1a0a0000000d49484452000186a0000186a00806000000a8520bc800000001494441547876e684e6";
-    let bytes: Vec<u8> = (0..hex.len()).step_by(2).map(|i| u8::from_str_radix(&hex[i..i + 2], 16).unwrap()).collect();
+    let bytes: Vec<u8> = (0..hex.len())
+        .step_by(2)
+        .map(|i| u8::from_str_radix(&hex[i..i + 2], 16).unwrap())
+        .collect();
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     fs::write(at("fig1.png"), &bytes).unwrap();
     let nowhere = at("nowhere");
-    let inspected = twofold(&["inspect", at("fig1.png").to_str().unwrap(), "--expected", nowhere.to_str().unwrap()]);
+    let inspected = twofold(&[
+        "inspect",
+        at("fig1.png").to_str().unwrap(),
+        "--expected",
+        nowhere.to_str().unwrap(),
+    ]);
     refuses(&inspected, 1, &["Not made by twofold"]);
     let here = folder.path().to_str().unwrap();
     #[cfg(unix)]
@@ -594,13 +721,21 @@ fn hostile_pictures_cost_one_line_each() {
     #[cfg(unix)]
     fs::write(at("a\u{1b}[2Jb.png"), b"").unwrap();
     let output = twofold(&["check", "fig1", "--quiet", "--against", here]);
-    refuses(&output, 1, &["fig1.png: DIFFERS: ours and theirs cannot be compared", "100000 by 100000", "1 of 1"]);
+    refuses(
+        &output,
+        1,
+        &["fig1.png: DIFFERS: ours and theirs cannot be compared", "100000 by 100000", "1 of 1"],
+    );
     #[cfg(unix)]
     refuses(&output, 1, &["gone.png: a broken link, skipped", "a\u{fffd}[2Jb.png"]);
     assert!(!output.stdout.contains(&0x1b));
     let json = twofold(&["check", "fig1", "--quiet", "--json", "--against", here]);
     let said: Value = serde_json::from_slice(&json.stdout).unwrap();
-    assert_eq!((said["checked"].as_u64(), said["hold_on_no_rung"].as_u64()), (Some(1), Some(1)), "{said}");
+    assert_eq!(
+        (said["checked"].as_u64(), said["hold_on_no_rung"].as_u64()),
+        (Some(1), Some(1)),
+        "{said}"
+    );
     assert!(!json.stdout.contains(&0x1b));
 }
 
@@ -610,16 +745,24 @@ fn names_in_manifests_are_names() {
     let folder = tempfile::tempdir().unwrap();
     let manifest = folder.path().join("expected.json");
     let path = manifest.to_str().unwrap();
-    assert!(figure("fig1", &["--quiet", "--out", folder.path().to_str().unwrap()]).status.success());
-    let record: Value = serde_json::from_slice(&fs::read(folder.path().join("fig1/fig1.json")).unwrap()).unwrap();
+    assert!(
+        figure("fig1", &["--quiet", "--out", folder.path().to_str().unwrap()]).status.success()
+    );
+    let record: Value =
+        serde_json::from_slice(&fs::read(folder.path().join("fig1/fig1.json")).unwrap()).unwrap();
     let whole = serde_json::json!({
-        "version": twofold::record::manifest::VERSION, "figure": "fig1", "made_by": "0", "pictures": [record["hashes"]],
+        "version": twofold::record::manifest::VERSION, "figure": "fig1", "made_by": "0",
+            "pictures": [record["hashes"]],
     });
     let committed = serde_json::to_string_pretty(&whole).unwrap();
     fs::write(&manifest, &committed).unwrap();
     refuses(&twofold(&["check", "--quiet", "--against", path]), 0, &["all the same"]);
     for bad in ["../../fig1", "fig1\\u001b[2J", "/etc/passwd", ""] {
-        fs::write(&manifest, committed.replace("\"name\": \"fig1\"", &format!("\"name\": \"{bad}\""))).unwrap();
+        fs::write(
+            &manifest,
+            committed.replace("\"name\": \"fig1\"", &format!("\"name\": \"{bad}\"")),
+        )
+        .unwrap();
         let output = twofold(&["check", "--quiet", "--against", path]);
         refuses(&output, 2, &["expected.json", "a name has letters"]);
         assert!(!output.stderr.contains(&0x1b));
@@ -627,7 +770,11 @@ fn names_in_manifests_are_names() {
     // Not only names: a hash is 64 digits, and an unknown field's name is printed harmlessly.
     let hash = committed.split("\"png\": \"").nth(1).unwrap().split('"').next().unwrap();
     fs::write(&manifest, committed.replace(hash, "0123")).unwrap();
-    refuses(&twofold(&["check", "--quiet", "--against", path]), 2, &["expected.json", "not a SHA-256"]);
+    refuses(
+        &twofold(&["check", "--quiet", "--against", path]),
+        2,
+        &["expected.json", "not a SHA-256"],
+    );
     fs::write(&manifest, committed.replace("\"png\"", "\"\\u001b[2Jpng\"")).unwrap();
     let output = twofold(&["check", "--quiet", "--against", path]);
     refuses(&output, 2, &["expected.json", "[2Jpng"]);
@@ -647,13 +794,24 @@ fn what_was_found_can_be_read_by_programs() {
     let check = twofold(&["check", "fig1", "--quiet", "--json", "--expected", here]);
     assert_eq!(check.status.code(), Some(1));
     let check: Value = serde_json::from_slice(&check.stdout).unwrap();
-    assert_eq!((&check["all_the_same"], &check["findings"][0]["state"]), (&false.into(), &"missing-reference".into()));
+    assert_eq!(
+        (&check["all_the_same"], &check["findings"][0]["state"]),
+        (&false.into(), &"missing-reference".into())
+    );
     let sweep = json(&["sweep", "--runs", "2", "--t-end", "50", "--quiet", "--json"]);
-    assert_eq!((&sweep["finished"], sweep["rows"].as_array().unwrap().len()), (&2.into(), 2), "{sweep}");
+    assert_eq!(
+        (&sweep["finished"], sweep["rows"].as_array().unwrap().len()),
+        (&2.into(), 2),
+        "{sweep}"
+    );
     assert_eq!(sweep["spec"]["t_end"], 50.0);
     assert!(figure("fig1", &["--quiet", "--out", here]).status.success());
     let report = json(&["report", "--figures", here, "--expected", here, "--json"]);
-    assert_eq!((&report["summary"]["pictures"], &report["problems"]), (&1.into(), &Value::Array(vec![])), "{report}");
+    assert_eq!(
+        (&report["summary"]["pictures"], &report["problems"]),
+        (&1.into(), &Value::Array(vec![])),
+        "{report}"
+    );
 }
 
 /// Help and version are output as any other: a full device is exit code 2.
@@ -670,20 +828,31 @@ fn help_that_cannot_be_written_is_an_error() {
             .output();
         let output = output.unwrap();
         let said = String::from_utf8(output.stderr).unwrap();
-        assert!(output.status.code() == Some(2) && said.starts_with("error: "), "{argument}: {said}");
+        assert!(
+            output.status.code() == Some(2) && said.starts_with("error: "),
+            "{argument}: {said}"
+        );
     }
 }
 
 #[test]
 fn help_fits_a_terminal_and_has_its_companions() {
     let text = |arguments: &[&str]| {
-        let output = Command::cargo_bin("twofold").unwrap().args(arguments).env("COLUMNS", "80").output().unwrap();
+        let output = Command::cargo_bin("twofold")
+            .unwrap()
+            .args(arguments)
+            .env("COLUMNS", "80")
+            .output()
+            .unwrap();
         assert!(output.status.success());
         String::from_utf8(output.stdout).unwrap()
     };
     for arguments in [vec!["run", "--help"], vec!["figure", "--help"], vec!["-h"]] {
         // Examples are for copying and keep their lines.
-        for line in text(&arguments).lines().filter(|l| !l.trim_start().starts_with("twofold") && !l.contains(" | ")) {
+        for line in text(&arguments)
+            .lines()
+            .filter(|l| !l.trim_start().starts_with("twofold") && !l.contains(" | "))
+        {
             assert!(line.chars().count() <= 100, "{line}");
         }
     }
@@ -698,7 +867,10 @@ fn help_fits_a_terminal_and_has_its_companions() {
     let folder = tempfile::tempdir().unwrap();
     text(&["man", folder.path().to_str().unwrap()]);
     let pages = files(folder.path());
-    assert!(pages.contains(&"twofold.1".into()) && pages.contains(&"twofold-run.1".into()), "{pages:?}");
+    assert!(
+        pages.contains(&"twofold.1".into()) && pages.contains(&"twofold-run.1".into()),
+        "{pages:?}"
+    );
     let page = fs::read_to_string(folder.path().join("twofold-run.1")).unwrap();
     assert!(page.contains("funnel") && page.contains("Exit") | page.contains("EXTRA"), "{page}");
 }
@@ -707,7 +879,17 @@ fn help_fits_a_terminal_and_has_its_companions() {
 fn specs_round_trip_and_wrong_ones_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let spec = folder.path().join("spec.json");
-    let flags = ["--reading", "reconstructed", "--t-end", "20", "--kick-every", "0.3", "--section", "y=0", "--quiet"];
+    let flags = [
+        "--reading",
+        "reconstructed",
+        "--t-end",
+        "20",
+        "--kick-every",
+        "0.3",
+        "--section",
+        "y=0",
+        "--quiet",
+    ];
     let direct = twofold(&[&["run"], &flags[..]].concat());
     assert!(direct.status.success());
     let printed = twofold(&[&["run", "--print-spec"], &flags[..]].concat());
@@ -723,7 +905,11 @@ fn specs_round_trip_and_wrong_ones_are_refused() {
     let wrong = String::from_utf8(printed.stdout).unwrap().replace("\"t_end\"", "\"t_ende\"");
     fs::write(&spec, wrong).unwrap();
     refuses(&twofold(&["run", "--quiet", "--spec", path]), 2, &["t_ende"]);
-    refuses(&twofold(&["run", "--quiet", "--spec", "/nowhere/spec.json"]), 2, &["/nowhere/spec.json"]);
+    refuses(
+        &twofold(&["run", "--quiet", "--spec", "/nowhere/spec.json"]),
+        2,
+        &["/nowhere/spec.json"],
+    );
 }
 
 #[test]
@@ -732,11 +918,16 @@ fn manifests_are_checked_before_anything_is_computed() {
     let manifest = folder.path().join("expected.json");
     let path = manifest.to_str().unwrap();
     fs::write(&manifest, "PNG").unwrap();
-    refuses(&twofold(&["check", "--quiet", "--against", path]), 2, &["expected.json", "not a manifest"]);
+    refuses(
+        &twofold(&["check", "--quiet", "--against", path]),
+        2,
+        &["expected.json", "not a manifest"],
+    );
     fs::write(&manifest, "{\"version\": 99}").unwrap();
     refuses(&twofold(&["check", "--quiet", "--against", path]), 2, &["version 99"]);
     let version = twofold::record::manifest::VERSION;
-    let text = format!("{{\"version\":{version},\"figure\":\"fig77\",\"made_by\":\"0\",\"pictures\":[]}}");
+    let text =
+        format!("{{\"version\":{version},\"figure\":\"fig77\",\"made_by\":\"0\",\"pictures\":[]}}");
     fs::write(&manifest, text).unwrap();
     refuses(&twofold(&["check", "--quiet", "--against", path]), 2, &["fig77"]);
     refuses(&twofold(&["check", "--quiet", "fig77"]), 2, &["fig77", "fig7"]);
@@ -745,7 +936,8 @@ fn manifests_are_checked_before_anything_is_computed() {
 #[test]
 fn a_missing_reference_is_a_failed_check() {
     let folder = tempfile::tempdir().unwrap();
-    let output = twofold(&["check", "--quiet", "fig7", "--expected", folder.path().to_str().unwrap()]);
+    let output =
+        twofold(&["check", "--quiet", "fig7", "--expected", folder.path().to_str().unwrap()]);
     refuses(&output, 1, &["fig7: MISSING REFERENCE", "expected.json"]);
 }
 
@@ -766,7 +958,11 @@ fn figure_binaries_refuse_the_same_way() {
     let out = folder.path().to_str().unwrap();
     refuses(&figure("fig7", &["--quiet", "--out", out, "--only", "iv"]), 2, &["iv", "i, ii, iii"]);
     refuses(&figure("fig7", &["--quiet", "--out", out, "--t-end", "0"]), 2, &["--t-end"]);
-    refuses(&figure("fig7", &["--quiet", "--out", out, "--reading", "other"]), 2, &["printed", "reconstructed", "all"]);
+    refuses(
+        &figure("fig7", &["--quiet", "--out", out, "--reading", "other"]),
+        2,
+        &["printed", "reconstructed", "all"],
+    );
     // Flags without effect: on figures made in one piece, without readings, without chance.
     for (name, flags) in [
         ("fig1", ["--only", "i"]),
@@ -777,7 +973,11 @@ fn figure_binaries_refuse_the_same_way() {
         ("fig7", ["--seed", "5"]),
         ("lottery", ["--seed", "5"]),
     ] {
-        refuses(&figure(name, &[&["--quiet", "--out", out], &flags[..]].concat()), 2, &[flags[0], "no effect", name]);
+        refuses(
+            &figure(name, &[&["--quiet", "--out", out], &flags[..]].concat()),
+            2,
+            &[flags[0], "no effect", name],
+        );
     }
     let still = ["--quiet", "--out", out, "--only", "i", "--seed", "5"];
     refuses(&figure("fig9", &still), 2, &["--seed", "random"]);
@@ -785,7 +985,10 @@ fn figure_binaries_refuse_the_same_way() {
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0, "nothing is written on bad usage");
     let blocker = folder.path().join("file");
     fs::write(&blocker, "").unwrap();
-    let output = figure("fig6", &["--quiet", "--out", blocker.to_str().unwrap(), "--t-end", "1", "--only", "i"]);
+    let output = figure(
+        "fig6",
+        &["--quiet", "--out", blocker.to_str().unwrap(), "--t-end", "1", "--only", "i"],
+    );
     refuses(&output, 2, &["file", "--out"]);
 }
 
@@ -793,15 +996,29 @@ fn figure_binaries_refuse_the_same_way() {
 fn a_shortened_picture_has_another_name_and_says_so() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().to_str().unwrap();
-    let output =
-        figure("fig7", &["--quiet", "--json", "--out", out, "--t-end", "50", "--reading", "printed", "--only", "(ii)"]);
+    let output = figure(
+        "fig7",
+        &[
+            "--quiet",
+            "--json",
+            "--out",
+            out,
+            "--t-end",
+            "50",
+            "--reading",
+            "printed",
+            "--only",
+            "(ii)",
+        ],
+    );
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let records: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     let record = &records[0];
     assert_eq!(record["hashes"]["name"], "fig7-printed-only-ii-shortened");
     assert!(record["alterations"][1].as_str().unwrap().contains("t = 50 instead of 200000"));
     let names: Vec<String> = files(&folder.path().join("fig7"));
-    let expected = ["-ii.csv", ".json", ".pdf", ".png", ".svg"].map(|s| format!("fig7-printed-only-ii-shortened{s}"));
+    let expected = ["-ii.csv", ".json", ".pdf", ".png", ".svg"]
+        .map(|s| format!("fig7-printed-only-ii-shortened{s}"));
     assert_eq!(names, expected);
 }
 
@@ -816,8 +1033,8 @@ fn is_whole(path: &Path) -> bool {
     }
 }
 
-/// Killed without warning: whole files only. What a kill between two instructions leaves, the next run sweeps away. (`make torture`
-/// kills at many random moments.)
+/// Killed without warning: whole files only. What a kill between two instructions leaves, the next
+/// run sweeps away. (`make torture` kills at many random moments.)
 #[test]
 fn a_killed_run_leaves_only_whole_files() {
     let folder = tempfile::tempdir().unwrap();
@@ -826,10 +1043,12 @@ fn a_killed_run_leaves_only_whole_files() {
     wait_until("the first file", || files(&out).iter().any(|n| !n.starts_with('.')));
     made.child().kill().unwrap();
     made.output();
-    let left: Vec<PathBuf> = files(&out).iter().filter(|n| !n.starts_with('.')).map(|n| out.join(n)).collect();
+    let left: Vec<PathBuf> =
+        files(&out).iter().filter(|n| !n.starts_with('.')).map(|n| out.join(n)).collect();
     assert!(!left.is_empty());
     assert!(left.iter().all(|f| is_whole(f)), "{left:?}");
-    // As if it had been killed in the middle of a write; and a file of that kind that a living process writes.
+    // As if it had been killed in the middle of a write; and a file of that kind that a living
+    // process writes.
     fs::write(out.join(".twofold-aaaaaa.tmp"), "half").unwrap();
     let mut living = fs::File::create(out.join(".twofold-bbbbbb.tmp")).unwrap();
     living.write_all(b"half").unwrap();

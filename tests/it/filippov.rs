@@ -7,8 +7,8 @@ use std::ops::ControlFlow;
 use crate::claims::Reads;
 use twofold::integrate::filippov::two_fold::SlidingAtTwoFold;
 use twofold::integrate::filippov::{
-    EventKind, ExitRule, FilippovError, FilippovOptions, FunnelGrid, Mode, Side, SlidingLaw, Trajectory, connect,
-    funnel, history, run, run_watched,
+    EventKind, ExitRule, FilippovError, FilippovOptions, FunnelGrid, Mode, Side, SlidingLaw,
+    Trajectory, connect, funnel, history, run, run_watched,
 };
 use twofold::integrate::{Monitor, StopReason, Tolerance};
 use twofold::system::{Bound, Caricature, PiecewiseSmooth, System, Wheel};
@@ -27,13 +27,21 @@ fn invisible(v: f64, w: f64) -> Bound<3> {
 const STAY: ExitRule = ExitRule::AfterTime { time: 1e9, side: Side::Plus };
 
 fn random(seed: u64, mean: f64) -> ExitRule {
-    ExitRule::Random { law: SlidingLaw::Exponential { mean }, plus_probability: 0.5, seed, stream: 0 }
+    ExitRule::Random {
+        law: SlidingLaw::Exponential { mean },
+        plus_probability: 0.5,
+        seed,
+        stream: 0,
+    }
 }
 
 /// The largest |h| on sliding pieces and at events.
 fn drift<P: PiecewiseSmooth<N>, const N: usize>(system: &P, run: &Trajectory<N>) -> f64 {
-    let sliding = run.pieces.iter().filter(|p| p.mode.slides()).flat_map(|p| p.points.iter().map(|(_, x)| x));
-    sliding.chain(run.events.iter().map(|e| &e.state)).fold(0.0, |m, x| m.max(system.switching(x).abs()))
+    let sliding =
+        run.pieces.iter().filter(|p| p.mode.slides()).flat_map(|p| p.points.iter().map(|(_, x)| x));
+    sliding
+        .chain(run.events.iter().map(|e| &e.state))
+        .fold(0.0, |m, x| m.max(system.switching(x).abs()))
 }
 
 /// The largest |h| on the wrong side in free flight.
@@ -62,9 +70,22 @@ fn sliding_time_to_the_two_fold_of_the_normal_form() {
         let det = 1.2 * 1.4 - 1.0;
         let exact = -((-1.2 * y - z) + (-y - 1.4 * z)) / det;
         let mut out = Trajectory::new(4);
-        let end = run(&n, vector![0.0, y, z], 100.0, &FilippovOptions::default(), ExitRule::All, &mut out).unwrap();
+        let end = run(
+            &n,
+            vector![0.0, y, z],
+            100.0,
+            &FilippovOptions::default(),
+            ExitRule::All,
+            &mut out,
+        )
+        .unwrap();
         assert_eq!(end.stop, StopReason::SetValued);
-        assert!((end.t - exact).abs() < 1e-11 * exact, "{y} {z}: {} {exact} {:e}", end.t, end.t - exact);
+        assert!(
+            (end.t - exact).abs() < 1e-11 * exact,
+            "{y} {z}: {} {exact} {:e}",
+            end.t,
+            end.t - exact
+        );
         assert!(end.x.amax() < 1e-14);
         assert!(drift(&n, &out) <= 1e-12);
         longest = longest.max(end.t);
@@ -74,11 +95,13 @@ fn sliding_time_to_the_two_fold_of_the_normal_form() {
 
 #[test]
 fn crossing_return_map_of_the_normal_form() {
-    // f+ from (0, y, z), y < 0: x = -y t - t²/2, back at t = 2|y| at (0, |y|, z + 2 v |y|); f- likewise with w.
+    // f+ from (0, y, z), y < 0: x = -y t - t²/2, back at t = 2|y| at (0, |y|, z + 2 v |y|); f-
+    // likewise with w.
     let (v, w) = (-1.2, -1.4);
     let n = invisible(v, w);
     let mut out = Trajectory::new(1);
-    let end = run(&n, vector![0.0, -1.0, 0.4], 20.0, &FilippovOptions::default(), STAY, &mut out).unwrap();
+    let end = run(&n, vector![0.0, -1.0, 0.4], 20.0, &FilippovOptions::default(), STAY, &mut out)
+        .unwrap();
     assert!(end.events > 3);
     let (mut t, mut y, mut z) = (0.0, -1.0_f64, 0.4_f64);
     for event in &out.events[1..] {
@@ -88,13 +111,19 @@ fn crossing_return_map_of_the_normal_form() {
             (t, y, z) = (t + 2.0 * -z, y + 2.0 * w * -z, -z);
         }
         assert!((event.t - t).abs() < 1e-10 * t, "{event:?} {t}");
-        assert!((event.state - vector![0.0, y, z]).amax() < 1e-9 * (1.0 + y.abs() + z.abs()), "{event:?} {y} {z}");
+        assert!(
+            (event.state - vector![0.0, y, z]).amax() < 1e-9 * (1.0 + y.abs() + z.abs()),
+            "{event:?} {y} {z}"
+        );
     }
 }
 
 fn visible_pair(plus: bool, minus: bool) -> Bound<3> {
     let sign = |visible| if visible { -1.0 } else { 1.0 };
-    builtin("two-fold", &[("plus_fold", sign(plus)), ("minus_fold", sign(minus)), ("v", 0.0), ("w", 0.0)])
+    builtin(
+        "two-fold",
+        &[("plus_fold", sign(plus)), ("minus_fold", sign(minus)), ("v", 0.0), ("w", 0.0)],
+    )
 }
 
 fn close<const N: usize>(a: SVector<f64, N>, b: SVector<f64, N>, tolerance: f64) {
@@ -106,19 +135,32 @@ fn caricature_passes_the_two_fold_several_times() {
     for (alpha, t_end) in [(1e-3, 300.0), (1e-1, 100.0)] {
         let c = Caricature::with_reinjection(alpha, 1e-5);
         let mut out = Trajectory::new(4);
-        let end =
-            run(&c, vector![0.2, 0.0, -1.0], t_end, &FilippovOptions::default(), random(2013, 0.5), &mut out).unwrap();
-        let passages = out.events.iter().filter(|e| matches!(e.kind, EventKind::TwoFoldReached { .. })).count();
+        let end = run(
+            &c,
+            vector![0.2, 0.0, -1.0],
+            t_end,
+            &FilippovOptions::default(),
+            random(2013, 0.5),
+            &mut out,
+        )
+        .unwrap();
+        let passages = out
+            .events
+            .iter()
+            .filter(|e| matches!(e.kind, EventKind::TwoFoldReached { .. }))
+            .count();
         assert!(passages >= 3, "{passages}");
         assert!(drift(&c, &out) <= 1e-12, "{:e}", drift(&c, &out));
         assert!(wrong_side(&c, &out) <= 1e-12, "{:e}", wrong_side(&c, &out));
         assert_eq!(end.stop, StopReason::EndTime);
-        // Pieces join without gaps, and the mode that an event announces is the mode of the piece that follows.
+        // Pieces join without gaps, and the mode that an event announces is the mode of the piece
+        // that follows.
         for pair in out.pieces.windows(2) {
             assert_eq!(pair[0].points.last(), pair[1].points.first());
         }
         for event in &out.events {
-            let next = out.pieces.iter().find(|p| p.points[0].0 == event.t && Some(p.mode) == event.to);
+            let next =
+                out.pieces.iter().find(|p| p.points[0].0 == event.t && Some(p.mode) == event.to);
             assert!(event.to.is_none() || next.is_some(), "{event:?}");
         }
     }
@@ -133,10 +175,12 @@ fn the_misprinted_sign_never_returns() {
         ..Caricature::with_reinjection(1e-3, 1e-5)
     };
     let mut out = Trajectory::new(1);
-    let end = run(&c, vector![0.2, 0.0, -1.0], 4000.0, &FilippovOptions::default(), STAY, &mut out).unwrap();
+    let end = run(&c, vector![0.2, 0.0, -1.0], 4000.0, &FilippovOptions::default(), STAY, &mut out)
+        .unwrap();
     assert_eq!(end.mode, Some(Mode::SlidingAttracting));
-    // It ends on the point where f+ and f- are opposed, lambda f+ + (1 - lambda) f- = 0 with lambda = z/(z - y): that is
-    // (0, 8.084, -9.014); SCIENCE.md says "near (0, 8.9, -9.4)", which does not satisfy this equation.
+    // It ends on the point where f+ and f- are opposed, lambda f+ + (1 - lambda) f- = 0 with lambda
+    // = z/(z - y): that is (0, 8.084, -9.014); SCIENCE.md says "near (0, 8.9, -9.4)", which does
+    // not satisfy this equation.
     let (y, z) = (end.x[1], end.x[2]);
     let (lambda, r2) = (z / (z - y), y * y + z * z);
     assert!((lambda - 1.4 * (1.0 - lambda) + (1e-3 - 1e-5 * y) * r2).abs() < 1e-9);
@@ -148,10 +192,18 @@ fn the_misprinted_sign_never_returns() {
 fn the_wheel_returns_to_its_singularity() {
     let w = Wheel::default();
     let mut out = Trajectory::new(4);
-    let end =
-        run(&w, vector![0.69267, 0.0, 0.0], 60.0, &FilippovOptions::default(), random(1, 0.05), &mut out).unwrap();
+    let end = run(
+        &w,
+        vector![0.69267, 0.0, 0.0],
+        60.0,
+        &FilippovOptions::default(),
+        random(1, 0.05),
+        &mut out,
+    )
+    .unwrap();
     let at = vector![0.6926698897, -0.5736729677, -0.8666344383];
-    let visits: Vec<_> = out.events.iter().filter(|e| matches!(e.kind, EventKind::TwoFoldReached { .. })).collect();
+    let visits: Vec<_> =
+        out.events.iter().filter(|e| matches!(e.kind, EventKind::TwoFoldReached { .. })).collect();
     assert!(visits.len() >= 3, "{}", visits.len());
     for visit in visits {
         close(visit.state, at, 1e-10);
@@ -169,7 +221,11 @@ fn the_wheels_sliding_rates_are_those_of_its_normal_form() {
     let root = (0.25 * (v + w) * (v + w) - v * w + 1.0).sqrt();
     let ratio = (0.5 * (v + w) - root) / (0.5 * (v + w) + root);
     let [weak, strong] = local.directions.unwrap();
-    assert!((strong.rate / weak.rate - ratio).abs() < 1e-4 * ratio, "{} {ratio}", strong.rate / weak.rate);
+    assert!(
+        (strong.rate / weak.rate - ratio).abs() < 1e-4 * ratio,
+        "{} {ratio}",
+        strong.rate / weak.rate
+    );
     assert!(weak.slides() && !strong.slides());
 }
 
@@ -184,28 +240,38 @@ fn time_along_the_invariant_curve_is_the_integrators() {
         let start = curve.at(part * curve.radius);
         let exact = -curve.time(part * curve.radius);
         let mut out = Trajectory::new(1);
-        let end = run(&c, start, 100.0, &FilippovOptions::default(), ExitRule::All, &mut out).unwrap();
+        let end =
+            run(&c, start, 100.0, &FilippovOptions::default(), ExitRule::All, &mut out).unwrap();
         assert!((end.t - exact).abs() < 1e-10 * exact, "{} {exact}", end.t);
     }
-    // Into the repelling region: the exit after a given time is the point of the curve at that time.
+    // Into the repelling region: the exit after a given time is the point of the curve at that
+    // time.
     let time = 0.5 * curve.time(-curve.radius);
     let mut out = Trajectory::new(1);
     let rule = ExitRule::AfterTime { time, side: Side::Minus };
-    let _ = run(&c, vector![0.0, 0.0, 0.0], 3.0, &FilippovOptions::default(), rule, &mut out).unwrap();
+    let _ =
+        run(&c, vector![0.0, 0.0, 0.0], 3.0, &FilippovOptions::default(), rule, &mut out).unwrap();
     let exit = out.events.iter().find(|e| matches!(e.kind, EventKind::Exit { .. })).unwrap();
     assert!((exit.t - time).abs() < 1e-14);
-    close(exit.state, curve.at(-0.5 * curve.radius.min(curve.sigma(time, curve.radius).abs() * 2.0)), 1e-12);
+    close(
+        exit.state,
+        curve.at(-0.5 * curve.radius.min(curve.sigma(time, curve.radius).abs() * 2.0)),
+        1e-12,
+    );
 }
 
 #[test]
 fn last_leg_error_is_within_its_estimate() {
-    // The same arrival with the leg begun 10^4 times farther out: the difference is of the size stated.
+    // The same arrival with the leg begun 10^4 times farther out: the difference is of the size
+    // stated.
     let c = Caricature::with_reinjection(1e-1, 1e-5);
     let arrival = |leg: f64| {
         let settings = FilippovOptions { leg, ..FilippovOptions::default() };
         let mut out = Trajectory::new(1);
         let _ = run(&c, vector![0.0, 1.0, 0.2], 100.0, &settings, ExitRule::All, &mut out).unwrap();
-        let error = |e: &EventKind| if let EventKind::TwoFoldReached { error, .. } = *e { Some(error) } else { None };
+        let error = |e: &EventKind| {
+            if let EventKind::TwoFoldReached { error, .. } = *e { Some(error) } else { None }
+        };
         out.events.iter().find_map(|e| error(&e.kind).map(|error| (e.t, error))).unwrap()
     };
     let (exact, tiny) = arrival(1e-8);
@@ -219,14 +285,17 @@ fn last_leg_error_is_within_its_estimate() {
 
 #[test]
 fn visible_visible_sliding_leaves_along_the_fold() {
-    // v = w = 0, p = y, q = -z: p' = q, q' = p, t' = q - p. From (p, q) = (-1, 2): p = 0 when e^-s = 3^-1/2, q = 3^1/2,
-    // after t = 3 (1 - 3^-1/2); then x = t²/2 along f+.
+    // v = w = 0, p = y, q = -z: p' = q, q' = p, t' = q - p. From (p, q) = (-1, 2): p = 0 when e^-s
+    // = 3^-1/2, q = 3^1/2, after t = 3 (1 - 3^-1/2); then x = t²/2 along f+.
     let n = visible_pair(true, true);
     let root3 = 3.0_f64.sqrt();
     let exact = 3.0 * (1.0 - 1.0 / root3);
     let mut out = Trajectory::new(4);
-    let end = run(&n, vector![0.0, -1.0, -2.0], exact + 1.0, &FilippovOptions::default(), STAY, &mut out).unwrap();
-    let left = out.events.iter().find(|e| e.kind == EventKind::LeftByTangency { to: Side::Plus }).unwrap();
+    let end =
+        run(&n, vector![0.0, -1.0, -2.0], exact + 1.0, &FilippovOptions::default(), STAY, &mut out)
+            .unwrap();
+    let left =
+        out.events.iter().find(|e| e.kind == EventKind::LeftByTangency { to: Side::Plus }).unwrap();
     assert!((left.t - exact).abs() < 1e-11, "{} {exact}", left.t);
     close(left.state, vector![0.0, 0.0, -root3], 1e-10);
     close(end.x, vector![0.5, 1.0, -root3], 1e-10);
@@ -239,10 +308,17 @@ fn visible_visible_two_fold_flies_off_at_once() {
     let n = visible_pair(true, true);
     for side in [Side::Plus, Side::Minus] {
         let mut out = Trajectory::new(1);
-        let end =
-            run(&n, vector![0.0, -1.0, -1.0], 3.0, &FilippovOptions::default(), ExitRule::AtOnce { side }, &mut out)
-                .unwrap();
-        let reached = out.events.iter().find(|e| matches!(e.kind, EventKind::TwoFoldReached { .. })).unwrap();
+        let end = run(
+            &n,
+            vector![0.0, -1.0, -1.0],
+            3.0,
+            &FilippovOptions::default(),
+            ExitRule::AtOnce { side },
+            &mut out,
+        )
+        .unwrap();
+        let reached =
+            out.events.iter().find(|e| matches!(e.kind, EventKind::TwoFoldReached { .. })).unwrap();
         assert!((reached.t - 2.0).abs() < 1e-12, "{}", reached.t);
         let expected = match side {
             Side::Plus => vector![0.5, 1.0, 0.0],
@@ -254,7 +330,8 @@ fn visible_visible_two_fold_flies_off_at_once() {
 
 #[test]
 fn visible_invisible_sliding_turns_towards_the_visible_fold() {
-    // v = w = 0, plus visible: p = y, q = z, p' = q, q' = -p (a rotation). From (-1, 1): p = 0 at t = 2^1/2, q = 2^1/2.
+    // v = w = 0, plus visible: p = y, q = z, p' = q, q' = -p (a rotation). From (-1, 1): p = 0 at t
+    // = 2^1/2, q = 2^1/2.
     let root2 = 2.0_f64.sqrt();
     let mut out = Trajectory::new(1);
     let end = run(
@@ -266,10 +343,12 @@ fn visible_invisible_sliding_turns_towards_the_visible_fold() {
         &mut out,
     )
     .unwrap();
-    let left = out.events.iter().find(|e| e.kind == EventKind::LeftByTangency { to: Side::Plus }).unwrap();
+    let left =
+        out.events.iter().find(|e| e.kind == EventKind::LeftByTangency { to: Side::Plus }).unwrap();
     assert!((left.t - root2).abs() < 1e-11);
     close(end.x, vector![0.5, 1.0, root2], 1e-10);
-    // Minus visible: p = -y, q = -z, p' = -q, q' = p. From (p, q) = (-1, 1) it is q that comes to zero.
+    // Minus visible: p = -y, q = -z, p' = -q, q' = p. From (p, q) = (-1, 1) it is q that comes to
+    // zero.
     let mut out = Trajectory::new(1);
     let end = run(
         &visible_pair(false, true),
@@ -280,19 +359,26 @@ fn visible_invisible_sliding_turns_towards_the_visible_fold() {
         &mut out,
     )
     .unwrap();
-    let left = out.events.iter().find(|e| e.kind == EventKind::LeftByTangency { to: Side::Minus }).unwrap();
+    let left = out
+        .events
+        .iter()
+        .find(|e| e.kind == EventKind::LeftByTangency { to: Side::Minus })
+        .unwrap();
     assert!((left.t - root2).abs() < 1e-11);
     close(end.x, vector![-0.5, root2, 1.0], 1e-10);
 }
 
 #[test]
 fn repelling_sliding_through_an_invisible_two_fold_backwards() {
-    // vw < 1: the sliding direction has mu > 0, motion goes from the repelling to the attracting region. With v = w = 0 the
-    // field on y = z is (1/2, 1/2): from (-1, -1) the two-fold is reached at t = 2, and (1.5, 1.5) at t = 5.
+    // vw < 1: the sliding direction has mu > 0, motion goes from the repelling to the attracting
+    // region. With v = w = 0 the field on y = z is (1/2, 1/2): from (-1, -1) the two-fold is
+    // reached at t = 2, and (1.5, 1.5) at t = 5.
     let n = visible_pair(false, false);
     let mut out = Trajectory::new(1);
-    let end = run(&n, vector![0.0, -1.0, -1.0], 5.0, &FilippovOptions::default(), STAY, &mut out).unwrap();
-    let reached = out.events.iter().find(|e| matches!(e.kind, EventKind::TwoFoldReached { .. })).unwrap();
+    let end = run(&n, vector![0.0, -1.0, -1.0], 5.0, &FilippovOptions::default(), STAY, &mut out)
+        .unwrap();
+    let reached =
+        out.events.iter().find(|e| matches!(e.kind, EventKind::TwoFoldReached { .. })).unwrap();
     assert!((reached.t - 2.0).abs() < 1e-12, "{}", reached.t);
     assert_eq!(end.mode, Some(Mode::SlidingAttracting));
     close(end.x, vector![0.0, 1.5, 1.5], 1e-11);
@@ -300,12 +386,18 @@ fn repelling_sliding_through_an_invisible_two_fold_backwards() {
 
 #[test]
 fn repelling_sliding_ends_at_an_invisible_fold() {
-    // v = w = 0: backwards p' = q, q' = p. From (p, q) = (1, -1/2): q = 0 at e^-s = 3^-1/2, t = 1.5 (1 - 3^-1/2),
-    // p = (3/4)^1/2; there only h > 0 is left.
+    // v = w = 0: backwards p' = q, q' = p. From (p, q) = (1, -1/2): q = 0 at e^-s = 3^-1/2, t = 1.5
+    // (1 - 3^-1/2), p = (3/4)^1/2; there only h > 0 is left.
     let mut out = Trajectory::new(1);
-    let _ =
-        run(&visible_pair(false, false), vector![0.0, -1.0, -0.5], 1.0, &FilippovOptions::default(), STAY, &mut out)
-            .unwrap();
+    let _ = run(
+        &visible_pair(false, false),
+        vector![0.0, -1.0, -0.5],
+        1.0,
+        &FilippovOptions::default(),
+        STAY,
+        &mut out,
+    )
+    .unwrap();
     let left = out
         .events
         .iter()
@@ -317,11 +409,14 @@ fn repelling_sliding_ends_at_an_invisible_fold() {
 
 #[test]
 fn grazing_and_its_neighbours() {
-    // f+ = (y, 1, 0) from (x0, -1, -1): x = x0 - t + t²/2 touches at t = 1 for x0 = 1/2; there f- points up.
+    // f+ = (y, 1, 0) from (x0, -1, -1): x = x0 - t + t²/2 touches at t = 1 for x0 = 1/2; there f-
+    // points up.
     let n = visible_pair(true, true);
     let fly = |x0: f64| {
         let mut out = Trajectory::new(1);
-        let end = run(&n, vector![x0, -1.0, -1.0], 3.0, &FilippovOptions::default(), STAY, &mut out).unwrap();
+        let end =
+            run(&n, vector![x0, -1.0, -1.0], 3.0, &FilippovOptions::default(), STAY, &mut out)
+                .unwrap();
         (end, out.events)
     };
     let (end, events) = fly(0.5);
@@ -334,10 +429,14 @@ fn grazing_and_its_neighbours() {
     assert!(events.is_empty(), "{events:?}");
     close(end.x, vector![2.0 + 1e-9, 2.0, -1.0], 1e-11);
 
-    // The dip below the surface lasts 9e-5 and is 1e-9 deep: far inside one step. It lands, slides, leaves at the fold.
+    // The dip below the surface lasts 9e-5 and is 1e-9 deep: far inside one step. It lands, slides,
+    // leaves at the fold.
     let (end, events) = fly(0.5 - 1e-9);
     let kinds: Vec<_> = events.iter().map(|e| e.kind).collect();
-    assert_eq!(kinds, [EventKind::Landing { from: Side::Plus }, EventKind::LeftByTangency { to: Side::Plus }]);
+    assert_eq!(
+        kinds,
+        [EventKind::Landing { from: Side::Plus }, EventKind::LeftByTangency { to: Side::Plus }]
+    );
     assert!((events[0].t - (1.0 - 2e-9_f64.sqrt())).abs() < 1e-8, "{:?}", events[0].t);
     close(end.x, vector![2.0, 2.0, -1.0], 1e-4);
 }
@@ -351,7 +450,8 @@ fn rules_do_what_they_say() {
     let speed = -mu * (y * y + z * z).sqrt() / (y + z);
     let exit = |rule: ExitRule| {
         let mut out = Trajectory::new(1);
-        let _ = run(&n, vector![0.0, 0.3, 0.5], 20.0, &FilippovOptions::default(), rule, &mut out).unwrap();
+        let _ = run(&n, vector![0.0, 0.3, 0.5], 20.0, &FilippovOptions::default(), rule, &mut out)
+            .unwrap();
         let departed = out.events.iter().find(|e| e.kind == EventKind::EnteredRepelling).unwrap().t;
         let e = *out.events.iter().find(|e| matches!(e.kind, EventKind::Exit { .. })).unwrap();
         let EventKind::Exit { to, time, arc, rule: recorded } = e.kind else { unreachable!() };
@@ -368,12 +468,17 @@ fn rules_do_what_they_say() {
     let (to, time, _) = exit(ExitRule::AtOnce { side: Side::Plus });
     assert!(to == Side::Plus && time > 0.0);
 
-    // Random: the numbers are those of the named generator, time first, then side; another seed gives others.
+    // Random: the numbers are those of the named generator, time first, then side; another seed
+    // gives others.
     use twofold::num::random::RandomStream;
     let mut sides = [0, 0];
     for seed in 0..12 {
-        let rule =
-            ExitRule::Random { law: SlidingLaw::Uniform { longest: 2.0 }, plus_probability: 0.3, seed, stream: 4 };
+        let rule = ExitRule::Random {
+            law: SlidingLaw::Uniform { longest: 2.0 },
+            plus_probability: 0.3,
+            seed,
+            stream: 4,
+        };
         let (to, time, _) = exit(rule);
         let mut stream = RandomStream::new(seed, 4);
         assert!((time - 2.0 * stream.uniform()).abs() < 1e-13);
@@ -388,7 +493,8 @@ fn bad_rules_are_named() {
     let n = invisible(-1.2, -1.4);
     let mut out = Trajectory::new(1);
     let rule = ExitRule::AfterTime { time: -1.0, side: Side::Plus };
-    let error = run(&n, vector![0.0, 0.3, 0.5], 1.0, &FilippovOptions::default(), rule, &mut out).unwrap_err();
+    let error = run(&n, vector![0.0, 0.3, 0.5], 1.0, &FilippovOptions::default(), rule, &mut out)
+        .unwrap_err();
     assert!(matches!(error, FilippovError::Invalid(ref m) if m.contains("time")), "{error}");
     let json = r#"{"random":{"law":{"exponential":{"mean":0.5}},"plus_probability":0.5,"seed":1,"stream":0}}"#;
     assert_eq!(serde_json::from_str::<ExitRule>(json).unwrap(), random(1, 0.5));
@@ -397,7 +503,8 @@ fn bad_rules_are_named() {
 
 #[test]
 fn stick_slip_limit_cycle() {
-    // Slip from (friction, belt): xi'' = weakening xi' - xi with xi = x - friction + weakening belt, until v = belt again.
+    // Slip from (friction, belt): xi'' = weakening xi' - xi with xi = x - friction + weakening
+    // belt, until v = belt again.
     let (b, friction, k) = (0.3, 1.0, 0.2);
     let s = builtin::<2>("stick-slip", &[("belt", b), ("friction", friction), ("weakening", k)]);
     let omega = (1.0 - 0.25 * k * k).sqrt();
@@ -419,11 +526,20 @@ fn stick_slip_limit_cycle() {
 
     let mut out = Trajectory::new(4);
     let _ = run(&s, vector![0.0, 0.0], 60.0, &FilippovOptions::default(), STAY, &mut out).unwrap();
-    let slips: Vec<_> = out.events.iter().filter(|e| e.kind == EventKind::LeftByTangency { to: Side::Minus }).collect();
-    let lands: Vec<_> = out.events.iter().filter(|e| e.kind == EventKind::Landing { from: Side::Minus }).collect();
+    let slips: Vec<_> = out
+        .events
+        .iter()
+        .filter(|e| e.kind == EventKind::LeftByTangency { to: Side::Minus })
+        .collect();
+    let lands: Vec<_> =
+        out.events.iter().filter(|e| e.kind == EventKind::Landing { from: Side::Minus }).collect();
     assert!(slips.len() >= 4);
     for pair in slips.windows(2) {
-        assert!((pair[1].t - pair[0].t - period).abs() < 1e-10, "{} {period}", pair[1].t - pair[0].t);
+        assert!(
+            (pair[1].t - pair[0].t - period).abs() < 1e-10,
+            "{} {period}",
+            pair[1].t - pair[0].t
+        );
         close(pair[1].state, vector![friction, b], 1e-11);
     }
     assert!((lands.last().unwrap().state[0] - x_land).abs() < 1e-10);
@@ -451,38 +567,77 @@ fn relay_with_parabolic_feedback() {
     let slow = builtin::<2>("relay-parabolic", &[("gain", 2.0)]);
     let t1 = (4.0_f64 / 3.0).sqrt();
     let mut out = Trajectory::new(4);
-    let end = run(&slow, vector![2.0, 0.0], t1 + 1.5, &FilippovOptions::default(), STAY, &mut out).unwrap();
+    let end = run(&slow, vector![2.0, 0.0], t1 + 1.5, &FilippovOptions::default(), STAY, &mut out)
+        .unwrap();
     let v = -t1 + 0.75;
     close(end.x, vector![v * v, v], 1e-11);
     assert!(drift(&slow, &out) <= 1e-12);
     // The origin, at t1 + 2 t1, is a rest: zero lies between the fields (0, -1) and (0, 1).
-    let end = run(&slow, vector![2.0, 0.0], 10.0, &FilippovOptions::default(), STAY, &mut Trajectory::new(1)).unwrap();
+    let end = run(
+        &slow,
+        vector![2.0, 0.0],
+        10.0,
+        &FilippovOptions::default(),
+        STAY,
+        &mut Trajectory::new(1),
+    )
+    .unwrap();
     assert!(end.x.amax() < 1e-6 && end.mode == Some(Mode::SlidingAttracting), "{end:?}");
-    let end =
-        run(&slow, vector![2.0, 0.0], 2.9 * t1, &FilippovOptions::default(), STAY, &mut Trajectory::new(1)).unwrap();
+    let end = run(
+        &slow,
+        vector![2.0, 0.0],
+        2.9 * t1,
+        &FilippovOptions::default(),
+        STAY,
+        &mut Trajectory::new(1),
+    )
+    .unwrap();
     assert!((end.x[1] + 0.05 * t1).abs() < 1e-9, "{end:?}");
 
-    // Gain 1/2: flights accumulate at t1 + t1 (1 + r)/(1 - r), r² = (1 - k)/(1 + k), t1² = 4/(1 + k).
+    // Gain 1/2: flights accumulate at t1 + t1 (1 + r)/(1 - r), r² = (1 - k)/(1 + k), t1² = 4/(1 +
+    // k).
     let fast = builtin::<2>("relay-parabolic", &[("gain", 0.5)]);
     let (t1, r) = ((4.0_f64 / 1.5).sqrt(), (0.5_f64 / 1.5).sqrt());
     let exact = t1 * (1.0 + (1.0 + r) / (1.0 - r));
     let mut out = Trajectory::new(1);
-    let end = run(&fast, vector![2.0, 0.0], 100.0, &FilippovOptions::default(), STAY, &mut out).unwrap();
+    let end =
+        run(&fast, vector![2.0, 0.0], 100.0, &FilippovOptions::default(), STAY, &mut out).unwrap();
     assert!(end.x.amax() < 1e-9 && end.t == 100.0, "{end:?}");
     let last = out.events.last().unwrap();
-    assert!(matches!(last.kind, EventKind::Accumulation { .. }) && (last.t - exact).abs() < 1e-8, "{last:?} {exact}");
+    assert!(
+        matches!(last.kind, EventKind::Accumulation { .. }) && (last.t - exact).abs() < 1e-8,
+        "{last:?} {exact}"
+    );
 
     // Gain 1, time-optimal: the switching curve is an orbit of f-, a fold at every point.
     let optimal = builtin::<2>("relay-parabolic", &[("gain", 1.0)]);
-    let error =
-        run(&optimal, vector![2.0, 0.0], 9.0, &FilippovOptions::default(), STAY, &mut Trajectory::new(1)).unwrap_err();
-    assert!(matches!(error, FilippovError::NonTransversal { t, .. } if (t - 2.0_f64.sqrt()).abs() < 1e-9), "{error}");
+    let error = run(
+        &optimal,
+        vector![2.0, 0.0],
+        9.0,
+        &FilippovOptions::default(),
+        STAY,
+        &mut Trajectory::new(1),
+    )
+    .unwrap_err();
+    assert!(
+        matches!(error, FilippovError::NonTransversal { t, .. } if (t
+            - 2.0_f64.sqrt()).abs() < 1e-9),
+        "{error}"
+    );
 }
 
 #[test]
 fn the_funnel_holds_every_exit() {
     let c = Caricature::with_reinjection(1e-1, 1e-5);
-    let grid = FunnelGrid { shortest: 0.05, longest: 1.5, times: 5, horizon: 60.0, until_two_fold: true, per_step: 2 };
+    let grid = FunnelGrid {
+        shortest: 0.05,
+        longest: 1.5,
+        times: 5,
+        horizon: 60.0,
+        until_two_fold: true,
+        per_step: 2,
+    };
     let f = funnel(&c, vector![0.2, 0.0, -1.0], 50.0, &FilippovOptions::default(), &grid).unwrap();
     assert!(f.point.amax() < 1e-14 && (f.t - 13.196).abs() < 1e-2, "{} {:?}", f.t, f.point);
     assert_eq!(f.members.len(), 10);
@@ -506,18 +661,23 @@ fn the_funnel_holds_every_exit() {
 
 #[test]
 fn a_step_cap_changes_no_event() {
-    // Uncapped steps straddle whole excursions; steps of 1e-3 do not. The sequence of events must be the same.
+    // Uncapped steps straddle whole excursions; steps of 1e-3 do not. The sequence of events must
+    // be the same.
     fn kinds<P: PiecewiseSmooth<3>>(system: &P, max_step: f64, t_end: f64) -> Vec<(String, f64)> {
         let settings = FilippovOptions { max_step, ..FilippovOptions::default() };
         let mut out = Trajectory::new(1);
         let start = vector![0.69267, 0.0, 0.0];
         let _ = run(system, start, t_end, &settings, ExitRule::All, &mut out).unwrap();
-        out.events.iter().map(|e| (format!("{:?}", e.kind).chars().take(12).collect(), e.t)).collect()
+        out.events
+            .iter()
+            .map(|e| (format!("{:?}", e.kind).chars().take(12).collect(), e.t))
+            .collect()
     }
     let (w, n) = (Wheel::default(), invisible(-0.5, -0.5));
-    for (coarse, fine) in
-        [(kinds(&w, f64::INFINITY, 3.0), kinds(&w, 1e-3, 3.0)), (kinds(&n, f64::INFINITY, 9.0), kinds(&n, 1e-3, 9.0))]
-    {
+    for (coarse, fine) in [
+        (kinds(&w, f64::INFINITY, 3.0), kinds(&w, 1e-3, 3.0)),
+        (kinds(&n, f64::INFINITY, 9.0), kinds(&n, 1e-3, 9.0)),
+    ] {
         assert!(!coarse.is_empty());
         assert_eq!(coarse.len(), fine.len(), "{coarse:?} {fine:?}");
         for (a, b) in coarse.iter().zip(&fine) {
@@ -550,7 +710,9 @@ fn a_step_that_straddles_two_crossings_misses_none() {
             let a = 0.05 + 0.37 * f64::from(k);
             let p = Parabola { a, b: a + gap };
             let mut out = Trajectory::new(1);
-            let _ = run(&p, vector![p.a * p.b, 0.0], 20.0, &FilippovOptions::default(), STAY, &mut out).unwrap();
+            let _ =
+                run(&p, vector![p.a * p.b, 0.0], 20.0, &FilippovOptions::default(), STAY, &mut out)
+                    .unwrap();
             assert_eq!(out.events.len(), 2, "gap {gap:e} a {a}: {:?}", out.events);
             let error = (out.events[0].t - p.a).abs().max((out.events[1].t - p.b).abs());
             assert!(error < 1e-13 * 20.0 / gap, "gap {gap:e} a {a}: {error:e}");
@@ -560,15 +722,19 @@ fn a_step_that_straddles_two_crossings_misses_none() {
 
 #[test]
 fn reversed_time_leads_back() {
-    // A repelling sliding orbit of the system is an attracting one of the reversed system, through the same points.
+    // A repelling sliding orbit of the system is an attracting one of the reversed system, through
+    // the same points.
     use twofold::system::Reversed;
     let c = Caricature::with_reinjection(1e-1, 1e-5);
     let mut forward = Trajectory::new(1);
     let rule = ExitRule::AfterTime { time: 0.9, side: Side::Plus };
-    let _ = run(&c, vector![0.0, 0.0, 0.0], 2.0, &FilippovOptions::default(), rule, &mut forward).unwrap();
+    let _ = run(&c, vector![0.0, 0.0, 0.0], 2.0, &FilippovOptions::default(), rule, &mut forward)
+        .unwrap();
     let exit = forward.events.iter().find(|e| matches!(e.kind, EventKind::Exit { .. })).unwrap();
     let mut back = Trajectory::new(1);
-    let end = run(&Reversed(c), exit.state, 5.0, &FilippovOptions::default(), ExitRule::All, &mut back).unwrap();
+    let end =
+        run(&Reversed(c), exit.state, 5.0, &FilippovOptions::default(), ExitRule::All, &mut back)
+            .unwrap();
     assert!(end.x.amax() < 1e-12 && (end.t - 0.9).abs() < 1e-10, "{end:?}");
 }
 
@@ -586,22 +752,41 @@ fn observers_of_ordinary_runs_work() {
     }
     let c = Caricature::with_reinjection(1e-1, 1e-5);
     let mut seen = Joined::default();
-    let _ =
-        run(&c, vector![0.2, 0.0, -1.0], 40.0, &FilippovOptions::default(), random(3, 0.5), &mut AllModes(&mut seen))
-            .unwrap();
+    let _ = run(
+        &c,
+        vector![0.2, 0.0, -1.0],
+        40.0,
+        &FilippovOptions::default(),
+        random(3, 0.5),
+        &mut AllModes(&mut seen),
+    )
+    .unwrap();
     assert_eq!((seen.0[0].0, seen.0.last().unwrap().1), (0.0, 40.0));
     assert!(seen.0.windows(2).all(|w| w[0].1 == w[1].0 && w[0].0 < w[0].1));
 }
 
 #[test]
 fn interpolants_are_in_physical_time_and_on_the_surface() {
-    // Between the ends of a sliding step too: |h| <= 1e-12 and the state at a time is the state of a run that ends there.
+    // Between the ends of a sliding step too: |h| <= 1e-12 and the state at a time is the state of
+    // a run that ends there.
     let w = Wheel::default();
     let mut out = Trajectory::new(16);
-    let _ = run(&w, vector![0.69267, 0.0, 0.0], 3.0, &FilippovOptions::default(), ExitRule::All, &mut out).unwrap();
+    let _ = run(
+        &w,
+        vector![0.69267, 0.0, 0.0],
+        3.0,
+        &FilippovOptions::default(),
+        ExitRule::All,
+        &mut out,
+    )
+    .unwrap();
     assert!(drift(&w, &out) <= 1e-12, "{:e}", drift(&w, &out));
-    let sliding: Vec<_> =
-        out.pieces.iter().filter(|p| p.mode == Mode::SlidingAttracting).flat_map(|p| &p.points).collect();
+    let sliding: Vec<_> = out
+        .pieces
+        .iter()
+        .filter(|p| p.mode == Mode::SlidingAttracting)
+        .flat_map(|p| &p.points)
+        .collect();
     assert!(sliding.len() > 100);
     for (t, x) in sliding.iter().step_by(sliding.len() / 7) {
         let end = run(
@@ -619,7 +804,8 @@ fn interpolants_are_in_physical_time_and_on_the_surface() {
 
 #[test]
 fn tolerance_buys_accuracy() {
-    // The first arrival at the two-fold after three crossings and a landing, against a run with tiny steps.
+    // The first arrival at the two-fold after three crossings and a landing, against a run with
+    // tiny steps.
     let c = Caricature::with_reinjection(1e-1, 1e-5);
     let arrival = |tolerance: f64, max_step: f64| {
         let settings = FilippovOptions {
@@ -627,7 +813,9 @@ fn tolerance_buys_accuracy() {
             max_step,
             ..FilippovOptions::default()
         };
-        run(&c, vector![0.2, 0.0, -1.0], 50.0, &settings, ExitRule::All, &mut Trajectory::new(1)).unwrap().t
+        run(&c, vector![0.2, 0.0, -1.0], 50.0, &settings, ExitRule::All, &mut Trajectory::new(1))
+            .unwrap()
+            .t
     };
     let exact = arrival(1e-13, 5e-3);
     for tolerance in [1e-6, 1e-8, 1e-10, 1e-12] {
@@ -639,7 +827,8 @@ fn tolerance_buys_accuracy() {
 
 #[test]
 fn every_point_of_the_repelling_region_has_a_past_at_the_two_fold() {
-    // Normal form: int dt = (1, 1) A^-1 (y, z) is also the time since the two-fold in the repelling region.
+    // Normal form: int dt = (1, 1) A^-1 (y, z) is also the time since the two-fold in the repelling
+    // region.
     let n = invisible(-1.2, -1.4);
     for (y, z) in [(-0.3, -0.8), (-1.0, -0.05), (-0.4, -0.4)] {
         let exact = -((1.2 * y + z) + (y + 1.4 * z)) / (1.2 * 1.4 - 1.0);
@@ -656,19 +845,32 @@ fn every_point_of_the_repelling_region_has_a_past_at_the_two_fold() {
 
 #[test]
 fn points_of_the_chaotic_set_are_connected_through_the_singularity() {
-    let mut reads = Reads::by("filippov::points_of_the_chaotic_set_are_connected_through_the_singularity");
+    let mut reads =
+        Reads::by("filippov::points_of_the_chaotic_set_are_connected_through_the_singularity");
     let c = Caricature::with_reinjection(1e-1, 1e-5);
     // Points of one orbit, taken from its free flight after the first visit.
     let mut orbit = Trajectory::new(2);
-    let _ = run(&c, vector![0.2, 0.0, -1.0], 90.0, &FilippovOptions::default(), random(3, 0.8), &mut orbit).unwrap();
-    let visit = orbit.events.iter().find(|e| matches!(e.kind, EventKind::TwoFoldReached { .. })).unwrap().t;
-    let flights: Vec<_> = orbit.pieces.iter().filter(|p| !p.mode.slides() && p.points[0].0 > visit).collect();
+    let _ = run(
+        &c,
+        vector![0.2, 0.0, -1.0],
+        90.0,
+        &FilippovOptions::default(),
+        random(3, 0.8),
+        &mut orbit,
+    )
+    .unwrap();
+    let visit =
+        orbit.events.iter().find(|e| matches!(e.kind, EventKind::TwoFoldReached { .. })).unwrap().t;
+    let flights: Vec<_> =
+        orbit.pieces.iter().filter(|p| !p.mode.slides() && p.points[0].0 > visit).collect();
     let mut connected = 0;
     let mut tried = 0;
     for flight in flights.iter().take(12) {
         let b = flight.points[flight.points.len() / 2].1;
         tried += 1;
-        let Ok(path) = connect(&c, vector![0.2, 0.0, -1.0], b, 200.0, &FilippovOptions::default(), 2) else {
+        let Ok(path) =
+            connect(&c, vector![0.2, 0.0, -1.0], b, 200.0, &FilippovOptions::default(), 2)
+        else {
             continue;
         };
         connected += 1;
@@ -676,15 +878,25 @@ fn points_of_the_chaotic_set_are_connected_through_the_singularity() {
         assert!((points[points.len() - 1].1 - b).amax() < 1e-12, "it ends at b");
         for pair in path.pieces.windows(2) {
             let (end, start) = (pair[0].points.last().unwrap(), pair[1].points[0]);
-            assert!((end.0 - start.0).abs() < 1e-10 && (end.1 - start.1).amax() < 1e-9, "{end:?} {start:?}");
+            assert!(
+                (end.0 - start.0).abs() < 1e-10 && (end.1 - start.1).amax() < 1e-9,
+                "{end:?} {start:?}"
+            );
         }
         // The second part is an orbit forwards too: run on from where it leaves the surface.
         let left = path.pieces.iter().rposition(|p| p.mode == Mode::SlidingRepelling).unwrap();
         let (t0, from) = *path.pieces[left].points.last().unwrap();
         let side = if path.pieces[left + 1].mode == Mode::Plus { Side::Plus } else { Side::Minus };
         let t = points[points.len() - 1].0 - t0;
-        let end =
-            run(&c, from, t, &FilippovOptions::default(), ExitRule::AtOnce { side }, &mut Trajectory::new(1)).unwrap();
+        let end = run(
+            &c,
+            from,
+            t,
+            &FilippovOptions::default(),
+            ExitRule::AtOnce { side },
+            &mut Trajectory::new(1),
+        )
+        .unwrap();
         assert!((end.x - b).amax() < 1e-7, "{:e}", (end.x - b).amax());
     }
     let share = f64::from(connected) / f64::from(tried);
@@ -694,10 +906,21 @@ fn points_of_the_chaotic_set_are_connected_through_the_singularity() {
 
 /// y = 0 crossings of the smoothed system in 113-bit arithmetic: (t, x, z).
 fn reference(name: &str, rows: usize) -> Vec<[f64; 3]> {
-    let text = std::fs::read_to_string(format!("{}/crates/verify/data/{name}", env!("CARGO_MANIFEST_DIR"))).unwrap();
+    let text = std::fs::read_to_string(format!(
+        "{}/crates/verify/data/{name}",
+        env!("CARGO_MANIFEST_DIR")
+    ))
+    .unwrap();
     let lines = text.lines().filter(|l| !l.starts_with('#')).skip(1);
     lines
-        .map(|l| l.split(',').take(3).map(|v| v.parse().unwrap()).collect::<Vec<f64>>().try_into().unwrap())
+        .map(|l| {
+            l.split(',')
+                .take(3)
+                .map(|v| v.parse().unwrap())
+                .collect::<Vec<f64>>()
+                .try_into()
+                .unwrap()
+        })
         .take(rows)
         .collect()
 }
@@ -719,7 +942,9 @@ fn the_smoothed_reference_lies_within_eps() {
             Flow::Continue
         }
     }
-    for (name, alpha, rows) in [("crossings-printed.csv", 1e-3, 4), ("crossings-reconstructed.csv", 1e-1, 2)] {
+    for (name, alpha, rows) in
+        [("crossings-printed.csv", 1e-3, 4), ("crossings-reconstructed.csv", 1e-1, 2)]
+    {
         let c = Caricature::with_reinjection(alpha, 1e-5);
         let mut section = Section::default();
         let _ = run(
@@ -742,18 +967,32 @@ fn the_smoothed_reference_lies_within_eps() {
 
 #[test]
 fn the_discontinuous_wheel_fills_a_box_like_the_smoothed_wheels() {
-    // SCIENCE.md section 7, smoothed with eps = 1e-3, 30 < t < 230: r in [0.22, 0.79], v in [-6.2, 5.5], omega in [-8.0, 4.6].
+    // SCIENCE.md section 7, smoothed with eps = 1e-3, 30 < t < 230: r in [0.22, 0.79], v in [-6.2,
+    // 5.5], omega in [-8.0, 4.6].
     let w = Wheel::default();
     let mut out = Trajectory::new(2);
-    let _ = run(&w, vector![0.69267, 0.0, 0.0], 230.0, &FilippovOptions::default(), random(5, 0.05), &mut out).unwrap();
+    let _ = run(
+        &w,
+        vector![0.69267, 0.0, 0.0],
+        230.0,
+        &FilippovOptions::default(),
+        random(5, 0.05),
+        &mut out,
+    )
+    .unwrap();
     let mut bounds = [[f64::INFINITY, f64::NEG_INFINITY]; 3];
     for (_, x) in out.points().filter(|(t, _)| *t > 30.0) {
         for (b, v) in bounds.iter_mut().zip(x.iter()) {
             *b = [b[0].min(*v), b[1].max(*v)];
         }
     }
-    let visits = out.events.iter().filter(|e| e.t > 30.0 && matches!(e.kind, EventKind::TwoFoldReached { .. })).count();
-    // Exits are our choice (exponential, mean 0.05), so the sizes agree only roughly; each side is at least as long.
+    let visits = out
+        .events
+        .iter()
+        .filter(|e| e.t > 30.0 && matches!(e.kind, EventKind::TwoFoldReached { .. }))
+        .count();
+    // Exits are our choice (exponential, mean 0.05), so the sizes agree only roughly; each side is
+    // at least as long.
     for (found, smoothed) in bounds.iter().zip([[0.22, 0.79], [-6.2, 5.5], [-8.0, 4.6]]) {
         let ratio = (found[1] - found[0]) / (smoothed[1] - smoothed[0]);
         assert!((0.95..1.35).contains(&ratio), "{found:?} {smoothed:?}");
@@ -779,14 +1018,30 @@ fn a_run_that_is_cut_short_says_why() {
     assert!(matches!(poor.within_budget(), Err(FilippovError::Stepping(_))));
 
     let mut out = Trajectory::new(1);
-    let cut = run_watched(&n, start, 100.0, &FilippovOptions::default(), ExitRule::All, &mut out, &Refuses).unwrap();
+    let cut = run_watched(
+        &n,
+        start,
+        100.0,
+        &FilippovOptions::default(),
+        ExitRule::All,
+        &mut out,
+        &Refuses,
+    )
+    .unwrap();
     assert_eq!(cut.stop, StopReason::Cancelled);
 
     let mut out = Trajectory::new(1).until_events(1);
     let seen = run(&n, start, 100.0, &FilippovOptions::default(), ExitRule::All, &mut out).unwrap();
     assert_eq!(seen.stop, StopReason::Observer);
     // A family is not made from runs that were cut short.
-    let grid = FunnelGrid { shortest: 0.1, longest: 1.0, times: 2, horizon: 5.0, until_two_fold: true, per_step: 1 };
+    let grid = FunnelGrid {
+        shortest: 0.1,
+        longest: 1.0,
+        times: 2,
+        horizon: 5.0,
+        until_two_fold: true,
+        per_step: 1,
+    };
     assert!(matches!(funnel(&n, start, 100.0, &few, &grid), Err(FilippovError::Stepping(_))));
 }
 
@@ -795,8 +1050,16 @@ fn a_funnel_counts_the_work_of_its_approach() {
     use twofold::job::simulate::simulate;
     use twofold::job::spec::{FunnelSpec, Method, MethodSpec, Observation, RunSpec, SwitchSpec};
     let c = Caricature::with_reinjection(1e-1, 1e-5);
-    let (start, settings) = (vector![0.2, 0.0, -1.0], FilippovOptions { max_step: 5.0, ..FilippovOptions::default() });
-    let grid = FunnelGrid { shortest: 0.1, longest: 1.0, times: 2, horizon: 5.0, until_two_fold: true, per_step: 1 };
+    let (start, settings) =
+        (vector![0.2, 0.0, -1.0], FilippovOptions { max_step: 5.0, ..FilippovOptions::default() });
+    let grid = FunnelGrid {
+        shortest: 0.1,
+        longest: 1.0,
+        times: 2,
+        horizon: 5.0,
+        until_two_fold: true,
+        per_step: 1,
+    };
     let alone = run(&c, start, 50.0, &settings, ExitRule::All, &mut Trajectory::new(1)).unwrap();
     let family = funnel(&c, start, 50.0, &settings, &grid).unwrap();
     assert_eq!(family.statistics, alone.statistics);
@@ -809,7 +1072,10 @@ fn a_funnel_counts_the_work_of_its_approach() {
         switch: SwitchSpec::Filippov { exit: ExitRule::All, funnel },
         start: start.as_slice().to_vec(),
         t_end: 50.0,
-        method: MethodSpec { tolerance: settings.tolerance, ..MethodSpec::ndsolve_defaults(Method::Dopri5) },
+        method: MethodSpec {
+            tolerance: settings.tolerance,
+            ..MethodSpec::ndsolve_defaults(Method::Dopri5)
+        },
         schedule: Default::default(),
         observe: Observation::Path { chord: 1e-3 },
     };

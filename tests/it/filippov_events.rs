@@ -1,10 +1,12 @@
-//! Events of Filippov motion: none is missed, none is invented, whatever the units and wherever the run ends.
+//! Events of Filippov motion: none is missed, none is invented, whatever the units and wherever the
+//! run ends.
 #![allow(clippy::disallowed_methods)] // exact solutions are compared to tolerances, not hashed
 
 use nalgebra::{SVector, vector};
 use twofold::integrate::Tolerance;
 use twofold::integrate::filippov::{
-    EventKind, ExitRule, FilippovError, FilippovOptions, FilippovSummary, Mode, Side, SlidingFlow, Trajectory, run,
+    EventKind, ExitRule, FilippovError, FilippovOptions, FilippovSummary, Mode, Side, SlidingFlow,
+    Trajectory, run,
 };
 use twofold::num::Elementary;
 use twofold::system::{Bound, Definition, PiecewiseSmooth, System, VectorField};
@@ -13,12 +15,17 @@ const PLUS: ExitRule = ExitRule::AtOnce { side: Side::Plus };
 
 /// A planar system from the text of its equations.
 fn planar(h: &str, plus: [&str; 2], minus: [&str; 2]) -> Bound<2> {
-    let text = format!("states = [\"x\", \"y\"]\nstart = [0, 0]\nh = \"{h}\"\nplus = {plus:?}\nminus = {minus:?}\n");
+    let text = format!(
+        "states = [\"x\", \"y\"]\nstart = [0, 0]\nh = \"{h}\"\nplus = {plus:?}\nminus = {minus:?}\n"
+    );
     System::new(Definition::from_toml(&text, "test.toml").unwrap()).bind().unwrap()
 }
 
 fn settings(tolerance: f64) -> FilippovOptions {
-    FilippovOptions { tolerance: Tolerance { rtol: tolerance, atol: tolerance }, ..FilippovOptions::default() }
+    FilippovOptions {
+        tolerance: Tolerance { rtol: tolerance, atol: tolerance },
+        ..FilippovOptions::default()
+    }
 }
 
 fn go<P, const N: usize, const M: usize>(
@@ -43,36 +50,44 @@ fn thin_windows_are_passed_through() {
         for factor in [1.0, 3e-15, 7e9] {
             let h = format!("{factor}*((x - ({center}))^2 - {width}^2)");
             let rate = format!("{}", 1.0 / width);
-            let (end, seen) = go(&planar(&h, ["1", "0"], ["1", &rate]), vector![-1.0, 0.0], 3.0, &settings(1e-9));
+            let (end, seen) =
+                go(&planar(&h, ["1", "0"], ["1", &rate]), vector![-1.0, 0.0], 3.0, &settings(1e-9));
             let y = end.unwrap().x[1];
             // The places of the two zeros are rounded to the spacing of the numbers there.
             let resolved = 1e-6 + 10.0 * f64::EPSILON / width;
-            assert!((y - 2.0).abs() < resolved && seen.events.len() == 2, "{center} {width} {factor}: {y}");
+            assert!(
+                (y - 2.0).abs() < resolved && seen.events.len() == 2,
+                "{center} {width} {factor}: {y}"
+            );
         }
     }
 }
 
-/// Windows of a function that is no polynomial: cos(x - c) > 1 - d for |x - c| < acos(1 - d), about sqrt(2 d).
+/// Windows of a function that is no polynomial: cos(x - c) > 1 - d for |x - c| < acos(1 - d), about
+/// sqrt(2 d).
 #[test]
 fn thin_windows_of_other_functions_are_passed_through() {
     for (center, d) in [(0.4, 1e-6), (0.9, 1e-10), (0.123, 1e-13)] {
         let h = format!("1 - {d} - cos(x - {center})");
         let half = (2.0 * d * (1.0 + d / 6.0)).sqrt();
         let rate = format!("{}", 1.0 / half);
-        let (end, _) = go(&planar(&h, ["1", "0"], ["1", &rate]), vector![-1.0, 0.0], 3.0, &settings(1e-9));
+        let (end, _) =
+            go(&planar(&h, ["1", "0"], ["1", &rate]), vector![-1.0, 0.0], 3.0, &settings(1e-9));
         let y = end.unwrap().x[1];
         // h is rounded by an epsilon of 1: a share of d.
         assert!((y - 2.0).abs() < 1e-6 + 10.0 * f64::EPSILON / d, "{center} {d}: {y}");
     }
 }
 
-/// Pairs of crossings near grazings come again and again with one distance: no accumulation. y' = 1 while sin(k x) > 1 - d.
+/// Pairs of crossings near grazings come again and again with one distance: no accumulation. y' = 1
+/// while sin(k x) > 1 - d.
 #[test]
 fn near_grazing_pairs_do_not_accumulate() {
     for (k, d, turns) in [(1.0, 1e-3, 30), (2.5, 1e-5, 60), (1.3, 1e-9, 40)] {
         let h = format!("sin({k}*x) - (1 - {d})");
         let t_end = f64::from(turns) * std::f64::consts::TAU / k;
-        let (end, seen) = go(&planar(&h, ["1", "1"], ["1", "0"]), vector![0.0, 0.0], t_end, &settings(1e-10));
+        let (end, seen) =
+            go(&planar(&h, ["1", "1"], ["1", "0"]), vector![0.0, 0.0], t_end, &settings(1e-10));
         let one = 2.0 / k * (2.0 * d * (1.0 + d / 6.0)).sqrt();
         let y = end.unwrap_or_else(|e| panic!("{k} {d}: {e}")).x[1];
         assert_eq!(seen.events.len(), 2 * turns as usize, "{k} {d}");
@@ -80,13 +95,18 @@ fn near_grazing_pairs_do_not_accumulate() {
     }
 }
 
-/// Where both fields vanish on the surface the motion stays: u' = -|u|^p with p < 1 comes to rest in finite time.
+/// Where both fields vanish on the surface the motion stays: u' = -|u|^p with p < 1 comes to rest
+/// in finite time.
 #[test]
 fn motion_comes_to_rest_on_the_surface() {
-    for (speed, power) in [(1.0, "sqrt(abs(x))"), (3.0, "sqrt(abs(x))"), (0.5, "sqrt(sqrt(abs(x)))")] {
+    for (speed, power) in
+        [(1.0, "sqrt(abs(x))"), (3.0, "sqrt(abs(x))"), (0.5, "sqrt(sqrt(abs(x)))")]
+    {
         let rate = |sign: &str| format!("{sign}{speed}*{power}");
         let system = planar("x", [&rate("-"), "0"], [&rate(""), "0"]);
-        let Ok(end) = go(&system, vector![1.0, 0.0], 8.0, &settings(1e-9)).0 else { panic!("{speed} {power}") };
+        let Ok(end) = go(&system, vector![1.0, 0.0], 8.0, &settings(1e-9)).0 else {
+            panic!("{speed} {power}")
+        };
         assert!(end.x[0].abs() < 1e-9 && end.t == 8.0, "{speed} {power}: {end:?}");
     }
 }
@@ -97,38 +117,56 @@ fn super_twisting(first: f64, second: f64) -> Bound<2> {
     planar("x", [&a, &b], [&c, &d])
 }
 
-/// Super-twisting control. In s with ds = dt/sqrt|x| each flight is linear: from (0, y) to (0, -r y) in the time |y| (1 + r)/second, with
-/// r = exp(-a pi/w), a = first/4, w^2 = second/2 - a^2; from (size, 0) the surface is met at y = -(second/w) e^(-a s) sin(w s) sqrt(size),
-/// tan(w s) = w/a.
+/// Super-twisting control. In s with ds = dt/sqrt|x| each flight is linear: from (0, y) to (0, -r
+/// y) in the time |y| (1 + r)/second, with r = exp(-a pi/w), a = first/4, w^2 = second/2 - a^2;
+/// from (size, 0) the surface is met at y = -(second/w) e^(-a s) sin(w s) sqrt(size), tan(w s) =
+/// w/a.
 #[test]
 fn crossings_accumulate_at_a_rest_and_the_motion_stays() {
-    for (first, second, size) in [(1.5, 1.1, 1.0), (1.5, 1.1, 0.09), (1.0, 1.2, 4.0), (2.0, 3.0, 1.0), (0.7, 1.0, 1.0)]
+    for (first, second, size) in
+        [(1.5, 1.1, 1.0), (1.5, 1.1, 0.09), (1.0, 1.2, 4.0), (2.0, 3.0, 1.0), (0.7, 1.0, 1.0)]
     {
         let a: f64 = first / 4.0;
         let w = (second / 2.0 - a * a).sqrt();
         let (r, s) = ((-a * std::f64::consts::PI / w).exp(), (w / a).atan() / w);
         let y = second / w * (-a * s).exp() * (w * s).sin() * f64::sqrt(size);
         let exact = y / second * (1.0 + (1.0 + r) / (1.0 - r));
-        let (end, seen) = go(&super_twisting(first, second), vector![size, 0.0], 100.0, &settings(1e-12));
+        let (end, seen) =
+            go(&super_twisting(first, second), vector![size, 0.0], 100.0, &settings(1e-12));
         let end = end.unwrap_or_else(|e| panic!("{first} {second} {size}: {e}"));
-        assert!(end.x.amax() < 1e-8 && end.mode == Some(Mode::SlidingAttracting), "{first} {second}: {end:?}");
+        assert!(
+            end.x.amax() < 1e-8 && end.mode == Some(Mode::SlidingAttracting),
+            "{first} {second}: {end:?}"
+        );
         let last = seen.events.last().unwrap();
         assert!(matches!(last.kind, EventKind::Accumulation { .. }), "{last:?}");
         // Near the surface the fields change by the root of what the state is off.
-        assert!((last.t - exact).abs() < 1e-6 * exact, "{first} {second} {size}: {} {exact}", last.t);
+        assert!(
+            (last.t - exact).abs() < 1e-6 * exact,
+            "{first} {second} {size}: {} {exact}",
+            last.t
+        );
     }
 }
 
-/// Crossings that accumulate where the motion does not stay are still refused: a drift along the surface.
+/// Crossings that accumulate where the motion does not stay are still refused: a drift along the
+/// surface.
 #[test]
 fn accumulation_where_the_motion_goes_on_is_no_rest() {
     let text = "states = [\"x\", \"y\", \"z\"]\nstart = [1, 0, 0]\nh = \"x\"\n\
-                plus = [\"y - 1.5*sqrt(abs(x))\", \"-1.1\", \"1\"]\nminus = [\"y + 1.5*sqrt(abs(x))\", \"1.1\", \"1\"]\n";
-    let system: Bound<3> = System::new(Definition::from_toml(text, "drift.toml").unwrap()).bind().unwrap();
+                plus = [\"y - 1.5*sqrt(abs(x))\", \"-1.1\", \"1\"]\nminus = [\"y + \
+                1.5*sqrt(abs(x))\", \"1.1\", \"1\"]\n";
+    let system: Bound<3> =
+        System::new(Definition::from_toml(text, "drift.toml").unwrap()).bind().unwrap();
     match go(&system, vector![1.0, 0.0, 0.0], 20.0, &settings(1e-10)).0 {
-        Err(FilippovError::Zeno { accumulates, .. }) => assert!((accumulates - 1.7414).abs() < 1e-3, "{accumulates}"),
+        Err(FilippovError::Zeno { accumulates, .. }) => {
+            assert!((accumulates - 1.7414).abs() < 1e-3, "{accumulates}")
+        }
         // Or the right motion: on x = y = 0 with z = t.
-        Ok(end) => assert!(end.x[0].abs() < 1e-8 && end.x[1].abs() < 1e-8 && (end.x[2] - 20.0).abs() < 1e-6, "{end:?}"),
+        Ok(end) => assert!(
+            end.x[0].abs() < 1e-8 && end.x[1].abs() < 1e-8 && (end.x[2] - 20.0).abs() < 1e-6,
+            "{end:?}"
+        ),
         Err(other) => panic!("{other}"),
     }
 }
@@ -146,7 +184,10 @@ fn runs_end_at_events() {
             t_end = t_end.next_up();
             let end = go(&system, vector![0.5 * k * k, 0.0], t_end, &settings(1e-10)).0;
             let end = end.unwrap_or_else(|e| panic!("{k} {t_end}: {e}"));
-            assert!(end.t == t_end && end.x[0].abs() < 1e-8 * k * k && (end.x[1] + k).abs() < 1e-8 * k, "{end:?}");
+            assert!(
+                end.t == t_end && end.x[0].abs() < 1e-8 * k * k && (end.x[1] + k).abs() < 1e-8 * k,
+                "{end:?}"
+            );
         }
     }
 }
@@ -177,38 +218,54 @@ where
     let system: Bound<N> = System::builtin(name).unwrap().bind().unwrap();
     let start = SVector::<f64, N>::from_column_slice(start);
     let of = |unit: f64, factor: f64| {
-        let settings =
-            FilippovOptions { tolerance: Tolerance { rtol: 1e-11, atol: 1e-11 * unit }, ..FilippovOptions::default() };
-        // Up to where there are many futures, if the motion comes there: from there on it depends on rounding.
+        let settings = FilippovOptions {
+            tolerance: Tolerance { rtol: 1e-11, atol: 1e-11 * unit },
+            ..FilippovOptions::default()
+        };
+        // Up to where there are many futures, if the motion comes there: from there on it depends
+        // on rounding.
         let mut seen = Trajectory::new(1);
-        let end =
-            run(&InUnits { system: &system, unit, factor }, start * unit, 6.0, &settings, ExitRule::All, &mut seen);
+        let end = run(
+            &InUnits { system: &system, unit, factor },
+            start * unit,
+            6.0,
+            &settings,
+            ExitRule::All,
+            &mut seen,
+        );
         let kinds: Vec<_> = seen.events.iter().map(|e| std::mem::discriminant(&e.kind)).collect();
         let times: Vec<f64> = seen.events.iter().map(|e| e.t).collect();
         (end.map(|end| end.x / unit).map_err(|e| std::mem::discriminant(&e)), kinds, times)
     };
     let (end, kinds, times) = of(1.0, 1.0);
-    for (unit, factor) in [(1e-12, 1.0), (1e12, 1.0), (1.0, 1e-13), (1.0, 1e11), (3e-7, 1e9), (1e-9, 1e-9)] {
+    for (unit, factor) in
+        [(1e-12, 1.0), (1e12, 1.0), (1.0, 1e-13), (1.0, 1e11), (3e-7, 1e9), (1e-9, 1e-9)]
+    {
         let (end_here, kinds_here, times_here) = of(unit, factor);
         assert_eq!(kinds_here, kinds, "{name}, {unit:e}, {factor:e}: {times_here:?}, {times:?}");
         let far = times.iter().zip(&times_here).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(far < 1e-6, "{name}, {unit:e}, {factor:e}: {times_here:?}, {times:?}");
         match (&end, &end_here) {
             (Ok(a), Ok(b)) => {
-                assert!((a - b).amax() < 1e-6 * (1.0 + a.amax()), "{name}, {unit:e}, {factor:e}: {a} {b}")
+                assert!(
+                    (a - b).amax() < 1e-6 * (1.0 + a.amax()),
+                    "{name}, {unit:e}, {factor:e}: {a} {b}"
+                )
             }
             (a, b) => assert_eq!(a, b, "{name}, {unit:e}, {factor:e}"),
         }
     }
 }
 
-/// Every shipped system with one surface moves alike in any units of its states and of its switching function.
+/// Every shipped system with one surface moves alike in any units of its states and of its
+/// switching function.
 #[test]
 fn units_change_nothing() {
     let mut tried = 0;
     for name in twofold::system::library::names() {
         let system = System::builtin(name).unwrap();
-        // The clock of the buck converter restarts within a millionth of its period: its field is not smooth.
+        // The clock of the buck converter restarts within a millionth of its period: its field is
+        // not smooth.
         if system.definition().second().is_some() || name == "buck" {
             continue;
         }
@@ -224,37 +281,53 @@ fn units_change_nothing() {
     assert!(tried >= 8, "{tried}");
 }
 
-/// A shipped system's file in other units: its states times `unit`, its switching functions times `factor`.
+/// A shipped system's file in other units: its states times `unit`, its switching functions times
+/// `factor`.
 fn file_in_units(name: &str, unit: f64, factor: f64) -> String {
     let definition = System::builtin(name).unwrap().definition().to_toml();
     let mut file: toml::Table = toml::from_str(&definition).unwrap();
-    let states: Vec<String> =
-        System::builtin(name).unwrap().definition().states().iter().map(|s| s.name.clone()).collect();
-    let lets = file.entry("let").or_insert_with(|| toml::Table::new().into()).as_table_mut().unwrap();
+    let states: Vec<String> = System::builtin(name)
+        .unwrap()
+        .definition()
+        .states()
+        .iter()
+        .map(|s| s.name.clone())
+        .collect();
+    let lets =
+        file.entry("let").or_insert_with(|| toml::Table::new().into()).as_table_mut().unwrap();
     for state in &states {
         lets.insert(state.clone(), format!("scaled_{state}/{unit:e}").into());
     }
-    let scale = |value: &toml::Value, by: f64| format!("{by:e}*({})", value.as_str().unwrap()).into();
+    let scale =
+        |value: &toml::Value, by: f64| format!("{by:e}*({})", value.as_str().unwrap()).into();
     let rescale = |table: &mut toml::Table| {
         table["h"] = scale(&table["h"], factor);
         for side in ["plus", "minus"] {
             let fields = table[side].as_array().unwrap();
-            table[side] = fields.iter().map(|f| scale(f, unit)).collect::<Vec<toml::Value>>().into();
+            table[side] =
+                fields.iter().map(|f| scale(f, unit)).collect::<Vec<toml::Value>>().into();
         }
     };
     rescale(&mut file);
     if let Some(second) = file.get_mut("second") {
         rescale(second.as_table_mut().unwrap());
     }
-    let start =
-        System::builtin(name).unwrap().definition().start().unwrap().iter().map(|x| x * unit).collect::<Vec<_>>();
+    let start = System::builtin(name)
+        .unwrap()
+        .definition()
+        .start()
+        .unwrap()
+        .iter()
+        .map(|x| x * unit)
+        .collect::<Vec<_>>();
     file["start"] = start.into();
     file["states"] = states.iter().map(|s| format!("scaled_{s}")).collect::<Vec<_>>().into();
     file.remove("axes");
     serde_json::to_string(&file).unwrap()
 }
 
-/// The systems with two surfaces, and the buck converter, whose clock restarts, with a smoothed switch.
+/// The systems with two surfaces, and the buck converter, whose clock restarts, with a smoothed
+/// switch.
 #[test]
 fn units_change_nothing_of_two_surfaces_and_of_a_clock() {
     let folder = tempfile::tempdir().unwrap();
@@ -262,25 +335,36 @@ fn units_change_nothing_of_two_surfaces_and_of_a_clock() {
     let end = |name: &str, unit: f64, factor: f64| -> Vec<f64> {
         std::fs::write(&file, file_in_units(name, unit, factor)).unwrap();
         let (eps, atol) = (format!("{:e}", 1e-2 * factor), format!("{:e}", 1e-10 * unit));
-        let switch: &[&str] =
-            if name == "buck" { &["--eps", &eps, "--t-end", "2"] } else { &["--switch", "filippov", "--t-end", "6"] };
+        let switch: &[&str] = if name == "buck" {
+            &["--eps", &eps, "--t-end", "2"]
+        } else {
+            &["--switch", "filippov", "--t-end", "6"]
+        };
         let run = std::process::Command::new(env!("CARGO_BIN_EXE_twofold"))
             .args([
-                "run", "--quiet", "--method", "dopri5", "--rtol", "1e-10", "--atol", &atol, "--out", "-", "--system",
+                "run", "--quiet", "--method", "dopri5", "--rtol", "1e-10", "--atol", &atol,
+                "--out", "-", "--system",
             ])
             .arg(&file)
             .args(switch)
             .output()
             .unwrap();
-        assert!(run.status.success(), "{name}, {unit:e}, {factor:e}: {}", String::from_utf8_lossy(&run.stderr));
+        assert!(
+            run.status.success(),
+            "{name}, {unit:e}, {factor:e}: {}",
+            String::from_utf8_lossy(&run.stderr)
+        );
         let text = String::from_utf8(run.stdout).unwrap();
         let names: Vec<&str> = text.lines().next().unwrap().split(',').collect();
-        let row: Vec<&str> = text.lines().rfind(|l| !l.starts_with('#')).unwrap().split(',').collect();
+        let row: Vec<&str> =
+            text.lines().rfind(|l| !l.starts_with('#')).unwrap().split(',').collect();
         let states = names.iter().zip(row).filter(|(name, _)| name.starts_with("scaled_"));
         states.map(|(_, v)| v.parse::<f64>().unwrap() / unit).collect()
     };
     let mut names: Vec<&str> = twofold::system::library::names().collect();
-    names.retain(|name| *name == "buck" || System::builtin(name).unwrap().definition().second().is_some());
+    names.retain(|name| {
+        *name == "buck" || System::builtin(name).unwrap().definition().second().is_some()
+    });
     assert_eq!(names.len(), 3, "{names:?}");
     for name in names {
         let expected = end(name, 1.0, 1.0);
@@ -299,9 +383,12 @@ fn units_change_nothing_of_two_surfaces_and_of_a_clock() {
 /// The end of a field's domain that a flight comes to is named, with time and state.
 #[test]
 fn a_flight_that_leaves_the_domain_says_which_expression_ends_where() {
-    for (plus, what) in [(["1 + 0*sqrt(y)", "-1"], "sqrt(y)"), (["1", "-1 + ln(y)/1000"], "ln(y)")] {
+    for (plus, what) in [(["1 + 0*sqrt(y)", "-1"], "sqrt(y)"), (["1", "-1 + ln(y)/1000"], "ln(y)")]
+    {
         let error =
-            go::<_, 2, 3>(&planar("x", plus, ["1", "-1"]), vector![1.0, 1.0], 3.0, &settings(1e-9)).0.unwrap_err();
+            go::<_, 2, 3>(&planar("x", plus, ["1", "-1"]), vector![1.0, 1.0], 3.0, &settings(1e-9))
+                .0
+                .unwrap_err();
         let said = error.to_string();
         assert!(said.contains(what) && said.contains("t = ") && said.contains("state ["), "{said}");
     }

@@ -1,6 +1,8 @@
 //! eps -> 0: the smoothed system against the Filippov motion.
 
-use twofold::analyse::limit::{AfterVisitQuestion, ConvergenceQuestion, after_visit, convergence, observed_rate};
+use twofold::analyse::limit::{
+    AfterVisitQuestion, ConvergenceQuestion, after_visit, convergence, observed_rate,
+};
 use twofold::analyse::passage::{PassageQuestion, passage};
 use twofold::integrate::filippov::{FilippovError, FilippovOptions, FunnelGrid, Mode};
 use twofold::system::{Caricature, Smoothed, Transition};
@@ -39,7 +41,10 @@ fn smoothed_orbits_converge_at_first_order_before_the_first_visit() {
 fn questions_that_cannot_be_answered_are_refused() {
     let c = Caricature::with_reinjection(1e-1, 1e-5);
     let error = convergence(&c, &before(&[14.0], &[1e-2])).unwrap_err();
-    assert!(matches!(error, FilippovError::NoSuchExit { .. }), "the future is a set there: {error}");
+    assert!(
+        matches!(error, FilippovError::NoSuchExit { .. }),
+        "the future is a set there: {error}"
+    );
     let mut short = before(&[2.0], &[1e-2]);
     short.start.pop();
     let error = convergence(&c, &short).unwrap_err();
@@ -54,7 +59,14 @@ fn smoothed_orbits_leave_inside_the_funnel() {
         t_end: 80.0,
         eps: vec![1e-2, 3e-3, 1e-3, 3e-4, 1e-4],
         beyond: 0.6,
-        grid: FunnelGrid { shortest: 1e-3, longest: 2.5, times: 80, horizon: 12.0, until_two_fold: true, per_step: 1 },
+        grid: FunnelGrid {
+            shortest: 1e-3,
+            longest: 2.5,
+            times: 80,
+            horizon: 12.0,
+            until_two_fold: true,
+            per_step: 1,
+        },
         refinements: 3,
         finer: 21,
         settings: FilippovOptions::default(),
@@ -68,8 +80,8 @@ fn smoothed_orbits_leave_inside_the_funnel() {
         };
         let found = after_visit(&c, &question, crossing).unwrap();
         assert_eq!(found.rows.len(), question.eps.len());
-        // Smoothing blurs a two-fold over a distance sqrt(eps): the orbit goes out within that of some member, in a
-        // funnel that is much wider.
+        // Smoothing blurs a two-fold over a distance sqrt(eps): the orbit goes out within that of
+        // some member, in a funnel that is much wider.
         assert!(found.width > 1.5, "{}", found.width);
         for r in &found.rows {
             println!("alpha {alpha} {r:?}");
@@ -81,7 +93,8 @@ fn smoothed_orbits_leave_inside_the_funnel() {
             let coarse = coarse.fold(f64::INFINITY, f64::min);
             assert!(r.distance <= coarse, "the search made it worse: {r:?} {coarse}");
         }
-        // The distance falls, but slowly and not steadily (figures/convergence): only the bound above and the end are certain.
+        // The distance falls, but slowly and not steadily (figures/convergence): only the bound
+        // above and the end are certain.
         let distance = |i: usize| found.rows[i].distance;
         assert!((0..4).all(|i| distance(4) < distance(i)), "nearest at the smallest eps");
         // Which member it follows depends on eps.

@@ -1,6 +1,7 @@
-//! No flag is ever ignored silently, looked at from outside: every command with each of its own flags. Either the flag is refused by name, or
-//! something comes out otherwise: a stream, an exit code, a file. The flags that describe a run, which eight commands share, have a test of their own
-//! on every kind of run (src/cli/flags.rs).
+//! No flag is ever ignored silently, looked at from outside: every command with each of its own
+//! flags. Either the flag is refused by name, or something comes out otherwise: a stream, an exit
+//! code, a file. The flags that describe a run, which eight commands share, have a test of their
+//! own on every kind of run (src/cli/flags.rs).
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -19,7 +20,12 @@ struct Outcome {
 }
 
 fn call(folder: &Path, arguments: &[String]) -> Outcome {
-    let output = Command::cargo_bin("twofold").unwrap().current_dir(folder).args(arguments).output().unwrap();
+    let output = Command::cargo_bin("twofold")
+        .unwrap()
+        .current_dir(folder)
+        .args(arguments)
+        .output()
+        .unwrap();
     let stderr = String::from_utf8_lossy(&output.stderr);
     Outcome {
         code: output.status.code(),
@@ -37,7 +43,10 @@ fn files(root: &Path, folder: &Path) -> BTreeMap<String, Vec<u8>> {
             found.extend(files(root, &path));
         } else if !path.ends_with("making.json") {
             // making.json holds times.
-            found.insert(path.strip_prefix(root).unwrap().display().to_string(), fs::read(&path).unwrap());
+            found.insert(
+                path.strip_prefix(root).unwrap().display().to_string(),
+                fs::read(&path).unwrap(),
+            );
         }
     }
     found
@@ -109,7 +118,14 @@ const TABLE: &[(&str, &str, &[&str])] = &[
     (
         "",
         "rests --system chua --within x=-3..3",
-        &["--system wheel", "--set alpha=8", "--within q=0..1", "--format json", "--out r.txt", "--quiet"],
+        &[
+            "--system wheel",
+            "--set alpha=8",
+            "--within q=0..1",
+            "--format json",
+            "--out r.txt",
+            "--quiet",
+        ],
     ),
     (
         "",
@@ -118,7 +134,8 @@ const TABLE: &[(&str, &str, &[&str])] = &[
     ),
     (
         "",
-        "scan --system stick-slip --section x=0.5 --over params.belt=0.3,0.4 --t-end 20 --out d.csv",
+        "scan --system stick-slip --section x=0.5 --over params.belt=0.3,0.4 --t-end 20 --out \
+            d.csv",
         &[
             "--plot p.png",
             "--show v",
@@ -132,12 +149,25 @@ const TABLE: &[(&str, &str, &[&str])] = &[
     ),
     (
         "",
-        "scan --system stick-slip --section x=0.5 --over params.belt=0.3,0.4 --t-end 20 --plot p.png",
+        "scan --system stick-slip --section x=0.5 --over params.belt=0.3,0.4 --t-end 20 --plot \
+            p.png",
         &["--show x", "--alike 0.5"],
     ),
-    ("", "scan --system chua --section y=0 --over params.alpha=8,8.5 --t-end 30 --plot p.png", &["--show z"]),
-    ("", "scan --system chua --section y=0 --over params.alpha=8,8.5 --t-end 30", &["--follow down", "--period 1"]),
-    ("", "scan --system impact-oscillator --period 1 --over params.w=2,2.1 --t-end 30", &["--period 2", "--follow up"]),
+    (
+        "",
+        "scan --system chua --section y=0 --over params.alpha=8,8.5 --t-end 30 --plot p.png",
+        &["--show z"],
+    ),
+    (
+        "",
+        "scan --system chua --section y=0 --over params.alpha=8,8.5 --t-end 30",
+        &["--follow down", "--period 1"],
+    ),
+    (
+        "",
+        "scan --system impact-oscillator --period 1 --over params.w=2,2.1 --t-end 30",
+        &["--period 2", "--follow up"],
+    ),
     (
         "",
         "sensitivities --system bouncing-ball --t-end 1",
@@ -145,7 +175,8 @@ const TABLE: &[(&str, &str, &[&str])] = &[
     ),
     (
         "",
-        "scan --system stick-slip --section x=0.5 --over params.belt=0.3,0.4 --over params.friction=1,2 --t-end 20 --plot p.png",
+        "scan --system stick-slip --section x=0.5 --over params.belt=0.3,0.4 --over \
+            params.friction=1,2 --t-end 20 --plot p.png",
         &["--show v", "--alike 0.5"],
     ),
     ("", "new a.toml", &["--from chua", "--list"]),
@@ -171,7 +202,11 @@ const TABLE: &[(&str, &str, &[&str])] = &[
             "--out p",
         ],
     ),
-    ("", "figure fig7 --t-end 30 --fresh --out o", &["--late", "--recompute", "--print-spec --late"]),
+    (
+        "",
+        "figure fig7 --t-end 30 --fresh --out o",
+        &["--late", "--recompute", "--print-spec --late"],
+    ),
     (
         "",
         "figure fig5 --t-end 2 --fresh --out o",
@@ -205,14 +240,22 @@ const TABLE: &[(&str, &str, &[&str])] = &[
             "--spec nowhere.json",
         ],
     ),
-    ("", "sweep --t-end 30 --over params.alpha=0.1..0.2 --random 2 --out s.csv", &["--random-seed 4", "--resume"]),
+    (
+        "",
+        "sweep --t-end 30 --over params.alpha=0.1..0.2 --random 2 --out s.csv",
+        &["--random-seed 4", "--resume"],
+    ),
     (
         "sweep --t-end 30 --over params.alpha=0.1,0.2 --out s.csv",
         "sweep --t-end 30 --over params.alpha=0.1,0.2 --out s.csv",
         &["--resume"],
     ),
     ("", "sweep --t-end 30 --runs 2", &["--shift 2e-9", "--resume", "--runs 3"]),
-    ("", "check fig1", &["--json", "--quiet", "--threads 2000", "--expected nowhere", "--against nowhere.json"]),
+    (
+        "",
+        "check fig1",
+        &["--json", "--quiet", "--threads 2000", "--expected nowhere", "--against nowhere.json"],
+    ),
     (
         "figure fig1 --fresh --out made",
         "check fig1 --against made",
@@ -232,23 +275,41 @@ const TABLE: &[(&str, &str, &[&str])] = &[
     (
         "",
         "bless fig1",
-        &["--reason why", "--json --quiet --reason=", "--threads 2000 --reason why", "--expected nowhere --reason why"],
+        &[
+            "--reason why",
+            "--json --quiet --reason=",
+            "--threads 2000 --reason why",
+            "--expected nowhere --reason why",
+        ],
     ),
     (
         "figure fig1 --fresh --out made",
         "report --figures made",
         &["--expected nowhere", "--out page.html", "--json", "--figures nowhere"],
     ),
-    ("figure fig1 --fresh --out made", "inspect made/fig1/fig1.png", &["--json", "--expected nowhere"]),
+    (
+        "figure fig1 --fresh --out made",
+        "inspect made/fig1/fig1.png",
+        &["--json", "--expected nowhere"],
+    ),
     ("", "verify REPOSITORY/proofs/certificates/printed-cycle.json", &["--json"]),
-    ("figure fig1 --store s --out made", "store --store s", &["--clear", "--prune", "--store nowhere"]),
+    (
+        "figure fig1 --store s --out made",
+        "store --store s",
+        &["--clear", "--prune", "--store nowhere"],
+    ),
 ];
 
-/// Flags that promise what is so anyway in a case where nothing else can be seen: given there, they are neither refused nor ignored.
+/// Flags that promise what is so anyway in a case where nothing else can be seen: given there, they
+/// are neither refused nor ignored.
 const KEPT_PROMISES: &[(&str, &str)] = &[
     ("rests --system chua --within x=-3..3", "--quiet"), // done before progress would be shown
     ("sensitivities --system bouncing-ball --t-end 1", "--quiet"),
-    ("plot --from run.csv --out p.svg", "--quiet"), // nothing is computed, so there is no progress to keep quiet about
+    (
+        "plot --from run.csv --out \
+        p.svg",
+        "--quiet",
+    ), // nothing is computed, so there is no progress to keep quiet about
 ];
 
 #[test]
@@ -265,7 +326,8 @@ fn no_flag_is_ignored_on_any_command() {
             // A flag given once more takes the place of the first.
             let name = flag.split_whitespace().next().unwrap_or_default();
             let mut arguments = words(base);
-            if let Some(at) = arguments.iter().position(|a| a == name).filter(|_| name != "--over") {
+            if let Some(at) = arguments.iter().position(|a| a == name).filter(|_| name != "--over")
+            {
                 arguments.drain(at..at + 2);
             }
             arguments.extend(words(flag));
@@ -276,7 +338,8 @@ fn no_flag_is_ignored_on_any_command() {
             tried += 1;
             let name = flag.split_whitespace().next().unwrap();
             let with = outcome(flag);
-            let refused = with.code == Some(2) && (with.stderr.contains(name) || with.stderr != plain.stderr);
+            let refused =
+                with.code == Some(2) && (with.stderr.contains(name) || with.stderr != plain.stderr);
             if !refused && with == plain && !KEPT_PROMISES.contains(&(base, name)) {
                 ignored.push(format!("twofold {base} {flag}"));
             }
@@ -291,7 +354,8 @@ fn no_flag_is_ignored_on_any_command() {
 fn the_table_knows_every_command_and_flag() {
     let folder = tempfile::tempdir().unwrap();
     let help = |command: &[&str]| {
-        let arguments: Vec<String> = command.iter().chain(&["--help"]).map(|s| (*s).to_owned()).collect();
+        let arguments: Vec<String> =
+            command.iter().chain(&["--help"]).map(|s| (*s).to_owned()).collect();
         String::from_utf8(call(folder.path(), &arguments).stdout).unwrap()
     };
     let flags = |text: &str| -> BTreeSet<String> {
@@ -329,8 +393,10 @@ fn the_table_knows_every_command_and_flag() {
             .filter(|word| word.starts_with("--"))
             .map(|word| word.split('=').next().unwrap().to_owned())
             .collect();
-        let missing: Vec<String> =
-            of(command).into_iter().filter(|flag| !shared.contains(flag) && !tabled.contains(flag)).collect();
+        let missing: Vec<String> = of(command)
+            .into_iter()
+            .filter(|flag| !shared.contains(flag) && !tabled.contains(flag))
+            .collect();
         assert!(missing.is_empty(), "twofold {command}: no row tries {missing:?}");
     }
 }

@@ -90,7 +90,8 @@ impl Maker {
             match self.below(11) {
                 0 if at < bytes.len() => bytes[at] ^= 1 << self.below(8),
                 1 if at < bytes.len() => {
-                    bytes[at] = [0, 0xff, 0x7f, 0x80, b' ', b'9', b'"', self.below(256) as u8][self.below(8)]
+                    bytes[at] = [0, 0xff, 0x7f, 0x80, b' ', b'9', b'"', self.below(256) as u8]
+                        [self.below(8)]
                 }
                 2 => bytes.truncate(at),
                 3 => drop(bytes.drain(low..high.min(low + 64))),
@@ -106,8 +107,13 @@ impl Maker {
                 // A number becomes another one.
                 7 | 8 => {
                     let digit = |b: &u8| b.is_ascii_digit() || b"+-.eE".contains(b);
-                    if let Some(start) = bytes[at..].iter().position(u8::is_ascii_digit).map(|i| i + at) {
-                        let end = bytes[start..].iter().position(|b| !digit(b)).map_or(bytes.len(), |i| i + start);
+                    if let Some(start) =
+                        bytes[at..].iter().position(u8::is_ascii_digit).map(|i| i + at)
+                    {
+                        let end = bytes[start..]
+                            .iter()
+                            .position(|b| !digit(b))
+                            .map_or(bytes.len(), |i| i + start);
                         let word = WORDS[self.below(13)];
                         bytes.splice(start..end, word.iter().copied());
                     }
@@ -152,27 +158,37 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// The inputs that a search begins with: those of fuzz/corpus, and what the repository holds of the kind.
+/// The inputs that a search begins with: those of fuzz/corpus, and what the repository holds of the
+/// kind.
 fn seeds(name: &str) -> Vec<Vec<u8>> {
     let mut folders = vec![root().join("fuzz/corpus").join(name)];
     match name {
         "system" => folders.push(root().join("systems")),
         "certificate" => folders.push(root().join("proofs/certificates")),
-        "manifest" => folders.extend(["fig1", "fig2", "fig6"].map(|figure| root().join("figures").join(figure))),
+        "manifest" => folders
+            .extend(["fig1", "fig2", "fig6"].map(|figure| root().join("figures").join(figure))),
         _ => {}
     }
     let mut paths: Vec<PathBuf> = folders
         .iter()
         .filter_map(|folder| fs::read_dir(folder).ok())
         .flat_map(|entries| entries.map(|entry| entry.unwrap().path()))
-        .filter(|path| path.is_file() && !path.extension().is_some_and(|e| name == "manifest" && e != "json"))
+        .filter(|path| {
+            path.is_file() && !path.extension().is_some_and(|e| name == "manifest" && e != "json")
+        })
         .collect();
     paths.sort();
     paths.into_iter().map(|path| fs::read(path).unwrap()).collect()
 }
 
-/// Gives inputs to a reader, for so long if `seconds` are given and else so many; the number of inputs and of kinds of answers.
-fn search(name: &str, target: targets::Target, seconds: Option<u64>, seed: u64) -> Result<(u64, usize), String> {
+/// Gives inputs to a reader, for so long if `seconds` are given and else so many; the number of
+/// inputs and of kinds of answers.
+fn search(
+    name: &str,
+    target: targets::Target,
+    seconds: Option<u64>,
+    seed: u64,
+) -> Result<(u64, usize), String> {
     let mut pool = seeds(name);
     assert!(!pool.is_empty(), "{name} has no inputs to begin with");
     let stream = targets::TARGETS.iter().position(|(other, _)| *other == name).unwrap_or(0) as u64;
@@ -191,7 +207,8 @@ fn search(name: &str, target: targets::Target, seconds: Option<u64>, seed: u64) 
         if !more {
             return Ok((count, kinds.len()));
         }
-        let bytes = if count < committed { pool[count as usize].clone() } else { maker.make(&pool) };
+        let bytes =
+            if count < committed { pool[count as usize].clone() } else { maker.make(&pool) };
         count += 1;
         if seconds.is_some() {
             // What ends the process at once is found here afterwards.
@@ -208,7 +225,10 @@ fn search(name: &str, target: targets::Target, seconds: Option<u64>, seed: u64) 
         if let Some(complaint) = complaint {
             let file = folder.join(format!("{name}-found"));
             fs::write(&file, &bytes).unwrap();
-            return Err(format!("{name} {complaint} at input {count} of seed {seed}: {}", file.display()));
+            return Err(format!(
+                "{name} {complaint} at input {count} of seed {seed}: {}",
+                file.display()
+            ));
         }
         if let Ok(said) = found
             && kinds.insert(kind(&said))
@@ -232,7 +252,10 @@ fn every_reader_survives() {
         }
         match search(name, target, seconds, seed) {
             Ok((inputs, kinds)) => {
-                println!("{name}: {inputs} inputs, {kinds} kinds of answers, at most {} MB", memory() / 1000)
+                println!(
+                    "{name}: {inputs} inputs, {kinds} kinds of answers, at most {} MB",
+                    memory() / 1000
+                )
             }
             Err(complaint) => found.push(complaint),
         }

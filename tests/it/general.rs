@@ -13,7 +13,12 @@ use twofold::render::{decode_png, read_provenance};
 use twofold::system::library;
 
 fn twofold_in(folder: &Path, arguments: &[&str]) -> (i32, Vec<u8>, String) {
-    let out = Command::cargo_bin("twofold").unwrap().current_dir(folder).args(arguments).output().unwrap();
+    let out = Command::cargo_bin("twofold")
+        .unwrap()
+        .current_dir(folder)
+        .args(arguments)
+        .output()
+        .unwrap();
     (out.status.code().unwrap(), out.stdout, String::from_utf8(out.stderr).unwrap())
 }
 
@@ -44,7 +49,8 @@ fn names(table: &Table) -> Vec<&str> {
 }
 
 fn json(folder: &Path, arguments: &[&str]) -> (Value, String) {
-    let (code, out, err) = twofold_in(folder, &[&["run", "--quiet", "--format", "json"], arguments].concat());
+    let (code, out, err) =
+        twofold_in(folder, &[&["run", "--quiet", "--format", "json"], arguments].concat());
     assert_eq!(code, 0, "{arguments:?}: {err}");
     (serde_json::from_slice(&out).unwrap(), err)
 }
@@ -82,7 +88,8 @@ fn every_general_system_that_ships_is_run_and_drawn() {
         let again = good(at, &[&["run", "--quiet"], &common[..]].concat());
         assert_eq!(good(at, &[&["run", "--quiet"], &common[..]].concat()), again, "{name}");
         good(at, &[&["run", "--quiet", "--out", "a.json"], &common[..]].concat());
-        let (_, whole) = twofold::job::encode::from_json(&fs::read(at.join("a.json")).unwrap()).unwrap();
+        let (_, whole) =
+            twofold::job::encode::from_json(&fs::read(at.join("a.json")).unwrap()).unwrap();
         let bits = |t: &Table| twofold::job::encode::bits(std::slice::from_ref(t));
         assert!(bits(&whole.tables[0]) == bits(&table), "{name}");
         good(at, &[&["plot", "--quiet", "--out", "a.png"], &common[..]].concat());
@@ -100,14 +107,33 @@ fn switches_and_events_are_where_formulas_have_them() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     // A fall from 1: the first impact at sqrt(2/g), where v = -r v.
-    let ball = run(at, &["--system", "bouncing-ball", "--set", "r=0.5", "--t-end", "1", "--every", "0.25"]);
+    let ball = run(
+        at,
+        &["--system", "bouncing-ball", "--set", "r=0.5", "--t-end", "1", "--every", "0.25"],
+    );
     let (t, v) = (ball.numbers("t"), ball.numbers("v"));
-    assert_eq!(ball.words("event").collect::<Vec<_>>(), ["", "", "impact", "impact", "", "", "impact", "impact", ""]);
+    assert_eq!(
+        ball.words("event").collect::<Vec<_>>(),
+        ["", "", "impact", "impact", "", "", "impact", "impact", ""]
+    );
     near(t[2], (2.0_f64 / 9.81).sqrt(), 1e-12);
     near(v[3], -0.5 * v[2], 1e-15);
     // Started elsewhere, the time begins elsewhere, too.
-    let ball =
-        run(at, &["--system", "bouncing-ball", "--start", "2,0", "--t-start", "10", "--t-end", "11", "--every", "0.5"]);
+    let ball = run(
+        at,
+        &[
+            "--system",
+            "bouncing-ball",
+            "--start",
+            "2,0",
+            "--t-start",
+            "10",
+            "--t-end",
+            "11",
+            "--every",
+            "0.5",
+        ],
+    );
     let t = ball.numbers("t");
     assert_eq!(t[0], 10.0);
     near(t[2], 10.0 + (4.0_f64 / 9.81).sqrt(), 1e-12);
@@ -126,7 +152,10 @@ fn switches_and_events_are_where_formulas_have_them() {
     // Modes: the heater is off from 22 degrees on.
     let room = run(at, &["--system", "relay-hysteresis", "--t-end", "20"]);
     let rows = room.words("mode").zip(room.words("event")).collect::<Vec<_>>();
-    assert!(rows.windows(2).any(|w| w[0] == ("on", "warm enough") && w[1] == ("off", "warm enough")), "{rows:?}");
+    assert!(
+        rows.windows(2).any(|w| w[0] == ("on", "warm enough") && w[1] == ("off", "warm enough")),
+        "{rows:?}"
+    );
 }
 
 /// A tank's steady heights: inflow = outlet h^(1/2), and above the rim also spill (h - rim).
@@ -156,7 +185,18 @@ fn the_order_of_two_relays_is_taken_and_recorded() {
         let code = if rule == "order:x" { 3 } else { 2 };
         refused(
             folder.path(),
-            &["run", "--quiet", "--system", "relays.toml", "--t-end", "2", "--out", "r.csv", "--intersection", rule],
+            &[
+                "run",
+                "--quiet",
+                "--system",
+                "relays.toml",
+                "--t-end",
+                "2",
+                "--out",
+                "r.csv",
+                "--intersection",
+                rule,
+            ],
             code,
             &[said],
         );
@@ -166,7 +206,8 @@ fn the_order_of_two_relays_is_taken_and_recorded() {
 #[test]
 fn a_tank_follows_its_table_to_the_steady_heights() {
     let folder = tempfile::tempdir().unwrap();
-    let tank = run(folder.path(), &["--system", "driven-by-data", "--t-end", "160", "--every", "10"]);
+    let tank =
+        run(folder.path(), &["--system", "driven-by-data", "--t-end", "160", "--every", "10"]);
     let (t, h) = (tank.numbers("t"), tank.numbers("height"));
     let at = |time: f64| h[t.iter().position(|t| *t == time).unwrap()];
     near(at(40.0), 0.16, 1e-6);
@@ -174,11 +215,13 @@ fn a_tank_follows_its_table_to_the_steady_heights() {
     near(at(160.0), 0.64, 1e-9);
 }
 
-/// Blocks stick as long as no spring's pull is larger than friction, 1; the first to slip does so where its pull is 1.
+/// Blocks stick as long as no spring's pull is larger than friction, 1; the first to slip does so
+/// where its pull is 1.
 #[test]
 fn three_blocks_stick_until_one_is_pulled_off() {
     let folder = tempfile::tempdir().unwrap();
-    let table = run(folder.path(), &["--system", "three-blocks", "--t-end", "12", "--every", "0.01"]);
+    let table =
+        run(folder.path(), &["--system", "three-blocks", "--t-end", "12", "--every", "0.01"]);
     let column = |name: &str| table.numbers(name);
     let (x, v) = (["x1", "x2", "x3"].map(column), ["v1", "v2", "v3"].map(column));
     let signs: Vec<&str> = table.words("signs").collect();
@@ -198,11 +241,13 @@ fn three_blocks_stick_until_one_is_pulled_off() {
     assert!(most > 1.0 - 0.0021, "{most}");
 }
 
-/// Fossas & Olivar (1996): at 24 V, below the doubling at 24.516 V, the orbit has the ramp's period.
+/// Fossas & Olivar (1996): at 24 V, below the doubling at 24.516 V, the orbit has the ramp's
+/// period.
 #[test]
 fn a_buck_converter_takes_its_ramps_period() {
     let folder = tempfile::tempdir().unwrap();
-    let buck = run(folder.path(), &["--system", "buck-ramp", "--t-end", "0.2", "--every", "0.0004"]);
+    let buck =
+        run(folder.path(), &["--system", "buck-ramp", "--t-end", "0.2", "--every", "0.0004"]);
     let v = buck.numbers("v");
     near(v[v.len() - 1], v[v.len() - 2], 1e-9);
 }
@@ -227,8 +272,10 @@ fn facts_say_how_a_run_ends() {
     let (answer, said) = json(at, &["--system", "stop.toml", "--t-end", "6"]);
     assert_eq!(answer["facts"]["stopped_by"], "impact");
     assert!(said.contains("impact ends the run at t = 0.45152364098"), "{said}");
-    // Two tanks between which one inflow switches: no state is set, so that nothing can rest on a surface.
-    let tanks = "states = ['a', 'b']\nstart = [1, 1]\n[modes.left]\nf = ['1.5 - 1', '-1']\n[modes.right]\nf = ['-1', '1.5 - 1']\n\
+    // Two tanks between which one inflow switches: no state is set, so that nothing can rest on a
+    // surface.
+    let tanks = "states = ['a', 'b']\nstart = [1, 1]\n[modes.left]\nf = ['1.5 - 1', \
+        '-1']\n[modes.right]\nf = ['-1', '1.5 - 1']\n\
         [[event]]\nname = 'to b'\nwhen = 'b'\ndirection = 'down'\nfrom = 'left'\nmode = 'right'\n\
         [[event]]\nname = 'to a'\nwhen = 'a'\ndirection = 'down'\nfrom = 'right'\nmode = 'left'";
     fs::write(at.join("tanks.toml"), tanks).unwrap();
@@ -237,12 +284,14 @@ fn facts_say_how_a_run_ends() {
     assert!(said.contains("infinitely often") && !said.contains("after_zeno"), "{said}");
 }
 
-/// On the circle x = cos t, v = -sin t: the section is crossed downwards at pi/3 and upwards at 5 pi/3.
+/// On the circle x = cos t, v = -sin t: the section is crossed downwards at pi/3 and upwards at 5
+/// pi/3.
 #[test]
 fn sections_say_their_direction_and_answers_their_switching_functions() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let text = "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-x - 0*sign(v - 3) + 0*floor(x/9)']";
+    let text =
+        "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-x - 0*sign(v - 3) + 0*floor(x/9)']";
     fs::write(at.join("circle.toml"), text).unwrap();
     let arguments = ["--system", "circle.toml", "--t-end", "6", "--section", "x = max(v, 0.5)"];
     let crossings = run(at, &arguments);
@@ -261,12 +310,14 @@ fn sections_say_their_direction_and_answers_their_switching_functions() {
 fn a_run_by_series_has_the_last_digits() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let arguments = ["--system", "bouncing-ball", "--method", "taylor", "--rtol", "1e-15", "--t-end", "3"];
+    let arguments =
+        ["--system", "bouncing-ball", "--method", "taylor", "--rtol", "1e-15", "--t-end", "3"];
     let (answer, _) = json(at, &arguments);
     assert_eq!(answer["about"]["question"]["method"]["name"], "taylor");
     let impacts: Vec<f64> = {
         let table = run(at, &arguments);
-        let times = table.numbers("t").iter().zip(table.words("event")).filter(|(_, e)| *e == "impact");
+        let times =
+            table.numbers("t").iter().zip(table.words("event")).filter(|(_, e)| *e == "impact");
         times.map(|(t, _)| *t).step_by(2).collect()
     };
     // The flights last 2 r^k sqrt(2/g).
@@ -278,12 +329,16 @@ fn a_run_by_series_has_the_last_digits() {
     }
     assert!(impacts.len() > 4, "{impacts:?}");
     for (name, t_end, _) in SHIPPED {
-        let drawn = ["plot", "--quiet", "--method", "taylor", "--out", "a.png", "--system", name, "--t-end", t_end];
+        let drawn = [
+            "plot", "--quiet", "--method", "taylor", "--out", "a.png", "--system", name, "--t-end",
+            t_end,
+        ];
         good(at, &drawn);
     }
 }
 
-const GUST: &str = "name = 'gust'\nstates = ['x']\nstart = [0]\nf = ['wind - x']\n[tables.wind]\nfile = 'wind.csv'\ntime = 't'\ncolumn = 'speed'\n";
+const GUST: &str = "name = 'gust'\nstates = ['x']\nstart = [0]\nf = ['wind - \
+    x']\n[tables.wind]\nfile = 'wind.csv'\ntime = 't'\ncolumn = 'speed'\n";
 
 #[test]
 fn a_table_stands_beside_its_system() {
@@ -307,7 +362,12 @@ fn a_table_stands_beside_its_system() {
         ("t,speed\n0,0\n", "at least two rows"),
     ] {
         fs::write(at.join("sub/wind.csv"), text).unwrap();
-        refused(at, &["run", "--system", "sub/gust.toml", "--t-end", "1"], 2, &["sub/gust.toml", "wind.csv", expected]);
+        refused(
+            at,
+            &["run", "--system", "sub/gust.toml", "--t-end", "1"],
+            2,
+            &["sub/gust.toml", "wind.csv", expected],
+        );
     }
 }
 
@@ -321,8 +381,16 @@ fn wrong_files_and_flags_are_refused() {
             "states = ['x', 'v']\nf = ['v', 'if(x, 1, 2)']",
             &["--> a.toml:2:15", "^", "a condition is wanted here", "x > 0"][..],
         ),
-        ("b.toml", "states = ['x']\nf = ['maxx(x, 0)']", &["--> b.toml:2:7", "did you mean `max`?"]),
-        ("c.toml", "states = ['x']\nf = ['1']\n[[event]]\nwhen = 'x'\nmode = 'on'", &["c.toml:5:8", "no mode `on`"]),
+        (
+            "b.toml",
+            "states = ['x']\nf = ['maxx(x, 0)']",
+            &["--> b.toml:2:7", "did you mean `max`?"],
+        ),
+        (
+            "c.toml",
+            "states = ['x']\nf = ['1']\n[[event]]\nwhen = 'x'\nmode = 'on'",
+            &["c.toml:5:8", "no mode `on`"],
+        ),
         ("d.json", r#"{"states": ["x"], "f": ["y"]}"#, &["d.json, f.1", "unknown name `y`"]),
         ("e.toml", "states = ['x']\nf = ['1']", &["--start, 1 numbers"]),
     ] {
@@ -330,16 +398,32 @@ fn wrong_files_and_flags_are_refused() {
         refused(at, &["run", "--quiet", "--system", file], 2, expected);
     }
     let ball = |more: &[&str], code: i32, expected: &[&str]| {
-        refused(at, &[&["run", "--quiet", "--system", "bouncing-ball"], more].concat(), code, expected);
+        refused(
+            at,
+            &[&["run", "--quiet", "--system", "bouncing-ball"], more].concat(),
+            code,
+            expected,
+        );
     };
-    for (flag, value) in [("--switch", "filippov"), ("--eps", "0.1"), ("--delay", "1"), ("--seed", "3")] {
+    for (flag, value) in
+        [("--switch", "filippov"), ("--eps", "0.1"), ("--delay", "1"), ("--seed", "3")]
+    {
         ball(&[flag, value], 2, &[&format!("{flag} has no effect here")]);
     }
     ball(&["--print-spec"], 2, &["--print-spec has no effect"]);
-    ball(&["--method", "lsoda"], 2, &["--method lsoda: general systems", "dopri5", "over many steps"]);
-    ball(&["--method", "taylor-extended"], 2, &["dopri5", "taylor for many digits", "double precision"]);
+    ball(
+        &["--method", "lsoda"],
+        2,
+        &["--method lsoda: general systems", "dopri5", "over many steps"],
+    );
+    ball(
+        &["--method", "taylor-extended"],
+        2,
+        &["dopri5", "taylor for many digits", "double precision"],
+    );
     ball(&["--method", "layered"], 2, &["dopri5", "smoothed"]);
-    let exponents = ["lyapunov", "--quiet", "--system", "sliding-mode-control", "--method", "taylor"];
+    let exponents =
+        ["lyapunov", "--quiet", "--system", "sliding-mode-control", "--method", "taylor"];
     refused(at, &exponents, 2, &["carried by dopri5; leave --method taylor out"]);
     ball(&["--exit", "all"], 2, &["at-once:plus or at-once:minus"]);
     ball(&["--set", "q=1"], 2, &["no parameter `q`", "g, r"]);
@@ -350,11 +434,27 @@ fn wrong_files_and_flags_are_refused() {
     ball(&["--section", "x = 0", "--every", "1"], 2, &["--every has no effect"]);
     ball(&["--t-start", "5", "--t-end", "1"], 2, &["--t-end, --t-start"]);
     let sweep = ["sweep", "--over", "params.r=0.5,0.6", "--quiet", "--system", "bouncing-ball"];
-    refused(at, &sweep, 2, &["--system bouncing-ball: a general system", "`twofold run`", "`scan`"]);
-    refused(at, &["run", "--system", "bouncing-bal"], 2, &["did you mean bouncing-ball?", "driven-by-data"]);
+    refused(
+        at,
+        &sweep,
+        2,
+        &["--system bouncing-ball: a general system", "`twofold run`", "`scan`"],
+    );
+    refused(
+        at,
+        &["run", "--system", "bouncing-bal"],
+        2,
+        &["did you mean bouncing-ball?", "driven-by-data"],
+    );
     // A system with one switch still says what it lacks, and who has it.
-    fs::write(at.join("f.toml"), "states = ['x']\nh = 'x'\nplus = ['max(x, 1)']\nminus = ['1']").unwrap();
-    refused(at, &["run", "--system", "f.toml"], 2, &["f.toml:3:10", "(a + b + abs(a - b))/2", "f = [...] has max"]);
+    fs::write(at.join("f.toml"), "states = ['x']\nh = 'x'\nplus = ['max(x, 1)']\nminus = ['1']")
+        .unwrap();
+    refused(
+        at,
+        &["run", "--system", "f.toml"],
+        2,
+        &["f.toml:3:10", "(a + b + abs(a - b))/2", "f = [...] has max"],
+    );
 }
 
 /// What is not decided, and the end of a domain: exit code 3, and the rows so far.
@@ -362,13 +462,22 @@ fn wrong_files_and_flags_are_refused() {
 fn runs_that_fail_keep_their_rows() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    fs::write(at.join("later.toml"), "states = ['x', 'y']\nstart = [0, -1]\nf = ['y*sign(x)', '1']").unwrap();
+    fs::write(
+        at.join("later.toml"),
+        "states = ['x', 'y']\nstart = [0, -1]\nf = ['y*sign(x)', '1']",
+    )
+    .unwrap();
     fs::write(at.join("root.toml"), "states = ['x']\nstart = [4]\nf = ['-sqrt(x) - 1']").unwrap();
-    fs::write(at.join("circle.toml"), "states = ['x', 'y']\nstart = [1, 0]\nf = ['y', '-x']").unwrap();
+    fs::write(at.join("circle.toml"), "states = ['x', 'y']\nstart = [1, 0]\nf = ['y', '-x']")
+        .unwrap();
     let leaves = 2.0 * (2.0 - 3.0_f64.ln());
     for (file, words, until) in [
         ("later.toml", &["not decided at t = 1", "x = 0", "--exit at-once:plus"][..], 1.0),
-        ("root.toml", &["square root of a negative number", "`-sqrt(x) - 1`", "t = 1.8027"], leaves),
+        (
+            "root.toml",
+            &["square root of a negative number", "`-sqrt(x) - 1`", "t = 1.8027"],
+            leaves,
+        ),
         ("circle.toml", &["1000 steps were made", "--max-steps"], 1e6),
     ] {
         let run = [
@@ -394,7 +503,10 @@ fn runs_that_fail_keep_their_rows() {
         assert!(String::from_utf8(bytes).unwrap().ends_with("# stop: failed\n"), "{file}");
     }
     // A side by name: x' = y from t = 1 on.
-    let table = run(at, &["--system", "later.toml", "--t-end", "3", "--every", "1", "--exit", "at-once:plus"]);
+    let table = run(
+        at,
+        &["--system", "later.toml", "--t-end", "3", "--every", "1", "--exit", "at-once:plus"],
+    );
     near(table.numbers("x")[3], 2.0, 1e-9);
 }
 
@@ -436,7 +548,12 @@ fn pictures_in_every_format() {
     good(at, &[&["run", "--quiet", "--out", "run.csv"][..], &ball].concat());
     let from = ["plot", "--from", "run.csv", "--out", "c.png"];
     refused(at, &from, 2, &["run.csv", "twofold plot --system bouncing-ball"]);
-    refused(at, &["plot", "--system", "bouncing-ball", "--kind", "space", "--out", "c.png"], 2, &["2"]);
+    refused(
+        at,
+        &["plot", "--system", "bouncing-ball", "--kind", "space", "--out", "c.png"],
+        2,
+        &["2"],
+    );
 }
 
 #[test]
@@ -449,11 +566,15 @@ fn new_begins_with_a_general_system() {
     }
     assert!(list.contains("A ball that bounces until it rests (x, v)"));
     good(at, &["new", "my.toml", "--from", "bouncing-ball"]);
-    assert_eq!(fs::read_to_string(at.join("my.toml")).unwrap(), library::general("bouncing-ball").unwrap());
+    assert_eq!(
+        fs::read_to_string(at.join("my.toml")).unwrap(),
+        library::general("bouncing-ball").unwrap()
+    );
     good(at, &["run", "--quiet", "--system", "my.toml", "--t-end", "1"]);
     // A table comes with its system, and replaces nothing unasked.
     fs::create_dir(at.join("sub")).unwrap();
-    let said = String::from_utf8(good(at, &["new", "sub/tank.toml", "--from", "driven-by-data"])).unwrap();
+    let said =
+        String::from_utf8(good(at, &["new", "sub/tank.toml", "--from", "driven-by-data"])).unwrap();
     assert!(said.contains("tank.toml and sub"), "{said}");
     let table = || fs::read_to_string(at.join("sub/inflow.csv")).unwrap();
     assert_eq!(table(), library::table("inflow.csv").unwrap());
@@ -464,7 +585,12 @@ fn new_begins_with_a_general_system() {
     assert!(table() == "mine" && !at.join("sub/other.toml").exists());
     good(at, &[&again[..], &["--force"]].concat());
     assert!(table() != "mine");
-    refused(at, &["new", "-", "--from", "driven-by-data"], 2, &["inflow.csv", "give a file's name"]);
+    refused(
+        at,
+        &["new", "-", "--from", "driven-by-data"],
+        2,
+        &["inflow.csv", "give a file's name"],
+    );
     refused(at, &["new", "a.toml", "--from", "bouncing-bal"], 2, &["did you mean bouncing-ball?"]);
 }
 
@@ -475,13 +601,23 @@ fn scanned(folder: &Path, arguments: &[&str]) -> Table {
     from_csv(&good(folder, &[&["scan", "--quiet"], arguments].concat())).unwrap().1
 }
 
-/// An attractor is followed past the place where another begins: two folds at p = -+2/sqrt(27), and both branches between them.
+/// An attractor is followed past the place where another begins: two folds at p = -+2/sqrt(27), and
+/// both branches between them.
 #[test]
 fn scans_follow_attractors_up_and_down() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     fs::write(at.join("folds.toml"), FOLDS).unwrap();
-    let base = ["--system", "folds.toml", "--over", "params.p=-0.6..0.6:25", "--period", "1", "--t-end", "60"];
+    let base = [
+        "--system",
+        "folds.toml",
+        "--over",
+        "params.p=-0.6..0.6:25",
+        "--period",
+        "1",
+        "--t-end",
+        "60",
+    ];
     let both = scanned(at, &[&base[..], &["--follow", "both", "--plot", "f.svg"]].concat());
     assert_eq!(names(&both), ["params.p", "follow", "t", "x"]);
     let ways: Vec<String> = both.words("follow").map(str::to_owned).collect();
@@ -499,19 +635,35 @@ fn scans_follow_attractors_up_and_down() {
     // Without it every run begins at the file's start, and the rows do not depend on the threads.
     let one = scanned(at, &base);
     assert_eq!(names(&one), ["params.p", "t", "x"]);
-    assert!(one.numbers("params.p").iter().zip(one.numbers("x")).all(|(p, x)| (*x > 0.0) == (*p > fold)));
+    assert!(
+        one.numbers("params.p")
+            .iter()
+            .zip(one.numbers("x"))
+            .all(|(p, x)| (*x > 0.0) == (*p > fold))
+    );
     for follow in ["up", "down", "both"] {
-        let flags = |n| [&["scan", "--quiet", "--threads", n, "--follow", follow][..], &base].concat();
+        let flags =
+            |n| [&["scan", "--quiet", "--threads", n, "--follow", follow][..], &base].concat();
         assert_eq!(good(at, &flags("1")), good(at, &flags("2")));
     }
     // Systems with h, plus and minus are followed by their crossings.
-    let slip = ["--system", "stick-slip", "--section", "x=0.5", "--over", "params.belt=0.3,0.4", "--t-end", "20"];
+    let slip = [
+        "--system",
+        "stick-slip",
+        "--section",
+        "x=0.5",
+        "--over",
+        "params.belt=0.3,0.4",
+        "--t-end",
+        "20",
+    ];
     let up = scanned(at, &[&slip[..], &["--follow", "up"]].concat());
     assert_eq!(names(&up), ["params.belt", "follow", "t", "x", "v"]);
     let sliding = scanned(at, &[&slip[..], &["--follow", "down", "--switch", "filippov"]].concat());
     assert_eq!(sliding.numbers("params.belt").first(), Some(&0.4));
     // What has a memory beside its coordinates is not handed on.
-    let memory = [&["scan", "--quiet", "--follow", "up", "--switch", "hysteretic"][..], &slip].concat();
+    let memory =
+        [&["scan", "--quiet", "--follow", "up", "--switch", "hysteretic"][..], &slip].concat();
     refused(at, &memory, 2, &["of a switch with a memory"]);
     for (more, says) in [
         (&["--follow", "up", "--section", "x=0"][..], "--period has no effect"),
@@ -522,10 +674,16 @@ fn scans_follow_attractors_up_and_down() {
     }
     let scan = ["scan", "--quiet", "--system", "folds.toml"];
     for (more, says) in [
-        (&["--over", "start.x=0,1", "--follow", "up", "--period", "1"][..], "begins where the run before ended"),
+        (
+            &["--over", "start.x=0,1", "--follow", "up", "--period", "1"][..],
+            "begins where the run before ended",
+        ),
         (&["--over", "params.p=0,1"], "give --section, such as x=0, or --period"),
         (&["--over", "params.q=0,1", "--period", "1"], "no parameter `q`"),
-        (&["--over", "eps=0.1,0.2", "--period", "1"], "eps belongs to systems with h, plus and minus"),
+        (
+            &["--over", "eps=0.1,0.2", "--period", "1"],
+            "eps belongs to systems with h, plus and minus",
+        ),
         (&["--over", "params.p=0..1", "--period", "1"], "drawn at random"),
         (&["--over", "params.p=0,1", "--period", "0"], "--period is 0"),
     ] {
@@ -537,7 +695,16 @@ fn scans_follow_attractors_up_and_down() {
 #[test]
 fn a_scan_shows_a_period_doubling() {
     let folder = tempfile::tempdir().unwrap();
-    let scan = ["--system", "buck-ramp", "--period", "4e-4", "--t-end", "0.12", "--over", "params.input=24,25"];
+    let scan = [
+        "--system",
+        "buck-ramp",
+        "--period",
+        "4e-4",
+        "--t-end",
+        "0.12",
+        "--over",
+        "params.input=24,25",
+    ];
     let table = scanned(folder.path(), &scan);
     let points = |input: f64| -> Vec<f64> {
         let mut found: Vec<f64> = (0..table.len())
@@ -558,7 +725,8 @@ fn scans_of_general_systems_map_endings() {
     let at = folder.path();
     fs::write(
         at.join("wells.toml"),
-        "states = ['x', 'v']\nstart = [0, 0]\nf = ['v', 'x - x^3 - 0.3*v']\n[[event]]\nname = 'edge'\nwhen = 'x - 3'\nstop = true",
+        "states = ['x', 'v']\nstart = [0, 0]\nf = ['v', 'x - x^3 - 0.3*v']\n[[event]]\nname = \
+            'edge'\nwhen = 'x - 3'\nstop = true",
     )
     .unwrap();
     let map = ["--system", "wells.toml", "--section", "v=0", "--t-end", "120"];
@@ -577,7 +745,8 @@ fn scans_of_general_systems_map_endings() {
     rests.dedup();
     assert_eq!(rests.len(), 3, "{words:?}");
     // A driven one: closed orbits.
-    let driven = ["--system", "impact-oscillator", "--period", "2.243994752564138", "--t-end", "400"];
+    let driven =
+        ["--system", "impact-oscillator", "--period", "2.243994752564138", "--t-end", "400"];
     let over = ["--over", "start.x=-0.1,0.1", "--over", "start.v=0,0.1"];
     let table = scanned(at, &[&driven[..], &over].concat());
     assert!(
@@ -592,7 +761,11 @@ fn scans_of_general_systems_map_endings() {
 fn sensitivities_of_a_run() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    fs::write(at.join("decay.toml"), "states = ['x']\nstart = [1]\nf = ['-k*x']\n[parameters]\nk = 2").unwrap();
+    fs::write(
+        at.join("decay.toml"),
+        "states = ['x']\nstart = [1]\nf = ['-k*x']\n[parameters]\nk = 2",
+    )
+    .unwrap();
     let base = ["sensitivities", "--quiet", "--system", "decay.toml", "--t-end", "1"];
     let table = from_csv(&good(at, &[&base[..], &["--format", "csv"]].concat())).unwrap().1;
     assert_eq!(names(&table), ["state", "value", "start.x", "params.k"]);
@@ -606,9 +779,19 @@ fn sensitivities_of_a_run() {
     refused(at, &[&base[..], &["--section", "x=0.5"]].concat(), 2, &["--section has no effect"]);
     refused(at, &["sensitivities", "--t-end", "5"], 2, &["give --switch filippov"]);
     // Sliding takes away what is normal to the surface.
-    let slip =
-        ["sensitivities", "--system", "stick-slip", "--switch", "filippov", "--start", "0.5,0.3", "--t-end", "1"];
-    let table = from_csv(&good(at, &[&slip[..], &["--format", "csv", "--by", "belt"]].concat())).unwrap().1;
+    let slip = [
+        "sensitivities",
+        "--system",
+        "stick-slip",
+        "--switch",
+        "filippov",
+        "--start",
+        "0.5,0.3",
+        "--t-end",
+        "1",
+    ];
+    let table =
+        from_csv(&good(at, &[&slip[..], &["--format", "csv", "--by", "belt"]].concat())).unwrap().1;
     let v = table.words("state").position(|s| s == "v").unwrap();
     near(table.numbers("start.v")[v], 0.0, 1e-12);
     near(table.numbers("params.belt")[v], 1.0, 1e-9);

@@ -1,5 +1,6 @@
-//! Golden tests: the committed hashes, recomputed. The figures that take a second are checked here, in whatever profile the tests
-//! run (they were blessed in release); `make check` recomputes all of them.
+//! Golden tests: the committed hashes, recomputed. The figures that take a second are checked here,
+//! in whatever profile the tests run (they were blessed in release); `make check` recomputes all of
+//! them.
 
 use std::fs;
 use std::path::Path;
@@ -12,8 +13,10 @@ use twofold::paper::{Alterations, Figure};
 use twofold::record::{Hash, Manifest};
 
 fn manifest(figure: &Figure) -> Manifest {
-    let path = figures::reference_file(&Path::new(env!("CARGO_MANIFEST_DIR")).join("figures"), &figure.id);
-    let text = fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}; make one with bless", path.display()));
+    let path =
+        figures::reference_file(&Path::new(env!("CARGO_MANIFEST_DIR")).join("figures"), &figure.id);
+    let text = fs::read_to_string(&path)
+        .unwrap_or_else(|e| panic!("{}: {e}; make one with bless", path.display()));
     Manifest::parse(&text, &figure.id).unwrap()
 }
 
@@ -38,15 +41,24 @@ fn golden_quick_figures_have_the_committed_hashes() {
     }
 }
 
-/// The long figures, shortened to t = 300: a digest of what is asked, found and drawn. A picture that changes on purpose gets its new line here; the
-/// test prints it.
+/// The long figures, shortened to t = 300: a digest of what is asked, found and drawn. A picture
+/// that changes on purpose gets its new line here; the test prints it.
 const SHORTENED: [(&str, &str); 6] = [
     ("fig7-printed-shortened", "26c5296d330eed2247d0dcb380ae39d3ffb94b99d3c3407ce128aee68856bdb7"),
-    ("fig7-reconstructed-shortened", "64d926489a8b7a62e35a99aeec56365b493f7aaf6f4ccda42f67b6c430069eac"),
+    (
+        "fig7-reconstructed-shortened",
+        "64d926489a8b7a62e35a99aeec56365b493f7aaf6f4ccda42f67b6c430069eac",
+    ),
     ("fig8-printed-shortened", "f1043bc650fc4cef226effdaadfa40f1b85a060cc330f0a1b0b275484fb40bfa"),
-    ("fig8-reconstructed-shortened", "26ad9bb4ba7ba38168282161cfc8503aa56bcf34598cb5fe5d6c83d8eb49fb29"),
+    (
+        "fig8-reconstructed-shortened",
+        "26ad9bb4ba7ba38168282161cfc8503aa56bcf34598cb5fe5d6c83d8eb49fb29",
+    ),
     ("fig9-printed-shortened", "7f9ce82d06d93b991546d134df765faa99e7e39e646d4e93718605cd02f590d9"),
-    ("fig9-reconstructed-shortened", "df554d4f444ef2d4ea2409e47fa1d6461f1516142300aa2c0f1a61724986391b"),
+    (
+        "fig9-reconstructed-shortened",
+        "df554d4f444ef2d4ea2409e47fa1d6461f1516142300aa2c0f1a61724986391b",
+    ),
 ];
 
 #[test]
@@ -58,7 +70,14 @@ fn golden_shortened_figures_have_the_committed_hashes() {
             let mut picture = picture.clone();
             picture.alter(&Alterations { t_end: Some(300.0), ..Alterations::default() });
             let hashes = compute(&picture, &executor).unwrap().record.hashes;
-            let all = [&hashes.spec, &hashes.data, &hashes.verdict, &hashes.pixels, &hashes.svg, &hashes.pdf];
+            let all = [
+                &hashes.spec,
+                &hashes.data,
+                &hashes.verdict,
+                &hashes.pixels,
+                &hashes.svg,
+                &hashes.pdf,
+            ];
             let joined: Vec<&str> = all.iter().map(|h| h.as_str()).collect();
             found.push((hashes.name, Hash::of(joined.join(" ").as_bytes())));
         }
@@ -66,7 +85,8 @@ fn golden_shortened_figures_have_the_committed_hashes() {
     for (name, hash) in &found {
         println!("    (\"{name}\", \"{}\"),", hash.as_str());
     }
-    let found: Vec<(&str, &str)> = found.iter().map(|(name, hash)| (name.as_str(), hash.as_str())).collect();
+    let found: Vec<(&str, &str)> =
+        found.iter().map(|(name, hash)| (name.as_str(), hash.as_str())).collect();
     assert_eq!(found, SHORTENED);
 }
 
@@ -75,7 +95,9 @@ fn golden_every_figure_has_a_reference_and_its_picture() {
     for figure in figures::all() {
         let expected = manifest(&figure);
         for picture in &figure.pictures {
-            let entry = expected.picture(&picture.name).unwrap_or_else(|| panic!("{} is not blessed", picture.name));
+            let entry = expected
+                .picture(&picture.name)
+                .unwrap_or_else(|| panic!("{} is not blessed", picture.name));
             let file = Path::new(env!("CARGO_MANIFEST_DIR"))
                 .join("figures")
                 .join(&*figure.id)
@@ -93,7 +115,8 @@ fn golden_every_figure_has_a_reference_and_its_picture() {
 /// A figure with its long runs shortened, so that every kind of panel is computed by these tests.
 fn short(figure: &Figure) -> Figure {
     let mut figure = figure.clone();
-    for picture in figure.pictures.iter_mut().filter(|p| p.panels.iter().any(|q| q.run.t_end > 1e3)) {
+    for picture in figure.pictures.iter_mut().filter(|p| p.panels.iter().any(|q| q.run.t_end > 1e3))
+    {
         picture.alter(&Alterations { t_end: Some(40.0), ..Alterations::default() });
     }
     figure
@@ -137,7 +160,13 @@ fn a_changed_question_changes_every_layer_it_should() {
     let difference = a.first_difference(&b).unwrap();
     assert_eq!(difference.layer, twofold::record::Layer::Spec);
     assert_eq!(difference.panels, ["i"]);
-    assert!(a.data != b.data && a.pixels != b.pixels && a.png != b.png && a.svg != b.svg && a.pdf != b.pdf);
+    assert!(
+        a.data != b.data
+            && a.pixels != b.pixels
+            && a.png != b.png
+            && a.svg != b.svg
+            && a.pdf != b.pdf
+    );
 }
 
 #[test]

@@ -1,7 +1,10 @@
-//! Steps that jump over what a method cannot see are taken back: pulses and layers that are far thinner than the steps around them.
+//! Steps that jump over what a method cannot see are taken back: pulses and layers that are far
+//! thinner than the steps around them.
 
 use nalgebra::{SVector, vector};
-use twofold::integrate::{DriveOptions, Failure, Ignore, Method, Stepper, Tolerance, WithStepper, drive};
+use twofold::integrate::{
+    DriveOptions, Failure, Ignore, Method, Stepper, Tolerance, WithStepper, drive,
+};
 use twofold::num::Elementary;
 use twofold::system::VectorField;
 
@@ -19,7 +22,8 @@ impl<F: VectorField<N>, const N: usize> WithStepper<N> for To<'_, F, N> {
     }
 }
 
-/// A Gaussian pulse at s = 5 beside a wave too small to matter: (s, y)' = (1, exp(-((s - 5)/width)^2) + wave sin(frequency s)).
+/// A Gaussian pulse at s = 5 beside a wave too small to matter: (s, y)' = (1, exp(-((s -
+/// 5)/width)^2) + wave sin(frequency s)).
 struct Pulse {
     width: f64,
     wave: f64,
@@ -39,7 +43,8 @@ fn a_pulse_between_two_steps_is_found() {
     for width in [1e-2, 1e-4, 1e-6] {
         for method in METHODS {
             let field = Pulse { width, wave: 0.0, frequency: 1.0 };
-            let (x, steps) = method.with_stepper(TOLERANCE, To(&field, vector![0.0, 0.0], 10.0)).unwrap();
+            let (x, steps) =
+                method.with_stepper(TOLERANCE, To(&field, vector![0.0, 0.0], 10.0)).unwrap();
             let area = std::f64::consts::PI.sqrt() * width;
             assert!((x[1] - area).abs() < 1e-6, "{method:?} {width:e}: {} for {area}", x[1]);
             assert!(steps < 3000, "{method:?} {width:e}: {steps} steps");
@@ -47,7 +52,8 @@ fn a_pulse_between_two_steps_is_found() {
     }
 }
 
-/// A wave that no error estimate shows hides nothing: a step with too many of its periods to be searched is made in shorter ones.
+/// A wave that no error estimate shows hides nothing: a step with too many of its periods to be
+/// searched is made in shorter ones.
 #[test]
 fn a_pulse_among_a_thousand_waves_is_found() {
     for method in METHODS {

@@ -18,11 +18,16 @@ fn twofold(arguments: &[&str]) -> Output {
 }
 
 fn inspect(file: &Path, expected: &Path) -> (i32, Value) {
-    let arguments = ["inspect", "--json", "--expected", expected.to_str().unwrap(), file.to_str().unwrap()];
+    let arguments =
+        ["inspect", "--json", "--expected", expected.to_str().unwrap(), file.to_str().unwrap()];
     let output = twofold(&arguments);
     let text = String::from_utf8(output.stdout).unwrap();
     let code = output.status.code().unwrap();
-    (code, serde_json::from_str(&text).unwrap_or_else(|_| Value::String(String::from_utf8(output.stderr).unwrap())))
+    (
+        code,
+        serde_json::from_str(&text)
+            .unwrap_or_else(|_| Value::String(String::from_utf8(output.stderr).unwrap())),
+    )
 }
 
 fn picture(name: &str) -> PathBuf {
@@ -32,11 +37,15 @@ fn picture(name: &str) -> PathBuf {
 #[test]
 fn our_files_are_ours() {
     let folder = tempfile::tempdir().unwrap();
-    let record: Value = serde_json::from_slice(&fs::read(picture("fig7-printed.json")).unwrap()).unwrap();
+    let record: Value =
+        serde_json::from_slice(&fs::read(picture("fig7-printed.json")).unwrap()).unwrap();
     for (ending, format) in [("png", "PNG"), ("svg", "SVG"), ("pdf", "PDF")] {
         let (code, said) = inspect(&picture(&format!("fig7-printed.{ending}")), folder.path());
         assert_eq!((code, &said["ours_and_unchanged"]), (0, &true.into()), "{said}");
-        assert_eq!((said["format"].as_str(), said["seal"].as_str()), (Some(format), Some("intact")));
+        assert_eq!(
+            (said["format"].as_str(), said["seal"].as_str()),
+            (Some(format), Some("intact"))
+        );
         assert_eq!(said["committed"]["state"], "no-manifests");
         assert_eq!(said["sha256"], record["hashes"][ending]);
         let provenance = said["provenance"].as_array().unwrap();
@@ -105,12 +114,17 @@ fn other_files_are_not_ours_or_not_pictures() {
         fs::write(&path, bytes).unwrap();
         path
     };
-    let (code, said) = inspect(&file("a.svg", b"<svg xmlns=\"http://www.w3.org/2000/svg\"/>"), folder.path());
+    let (code, said) =
+        inspect(&file("a.svg", b"<svg xmlns=\"http://www.w3.org/2000/svg\"/>"), folder.path());
     assert_eq!((code, said["seal"].as_str()), (1, Some("absent")), "{said}");
-    for path in [file("a.txt", b"hello"), file("empty.png", b""), folder.path().join("nowhere.png")] {
+    for path in [file("a.txt", b"hello"), file("empty.png", b""), folder.path().join("nowhere.png")]
+    {
         let (code, said) = inspect(&path, folder.path());
         assert_eq!(code, 2, "{said}");
-        assert!(said.as_str().unwrap().contains(path.file_name().unwrap().to_str().unwrap()), "{said}");
+        assert!(
+            said.as_str().unwrap().contains(path.file_name().unwrap().to_str().unwrap()),
+            "{said}"
+        );
     }
 }
 
@@ -119,11 +133,23 @@ fn text_for_people_says_the_same_and_steers_no_terminal() {
     let folder = tempfile::tempdir().unwrap();
     let svg = fs::read_to_string(picture("fig7-printed.svg")).unwrap();
     let file = folder.path().join("a.svg");
-    fs::write(&file, svg.replace("<entry key=\"Method\">lsoda", "<entry key=\"Method\">\u{1b}[2Jlsoda")).unwrap();
-    let output = twofold(&["inspect", file.to_str().unwrap(), "--expected", folder.path().to_str().unwrap()]);
+    fs::write(
+        &file,
+        svg.replace("<entry key=\"Method\">lsoda", "<entry key=\"Method\">\u{1b}[2Jlsoda"),
+    )
+    .unwrap();
+    let output = twofold(&[
+        "inspect",
+        file.to_str().unwrap(),
+        "--expected",
+        folder.path().to_str().unwrap(),
+    ]);
     let text = String::from_utf8(output.stdout).unwrap();
     assert_eq!(output.status.code(), Some(1));
-    assert!(text.contains("Made by twofold, and changed since.") && text.contains("[2Jlsoda"), "{text}");
+    assert!(
+        text.contains("Made by twofold, and changed since.") && text.contains("[2Jlsoda"),
+        "{text}"
+    );
     assert!(!text.contains('\u{1b}'));
 }
 
@@ -181,8 +207,11 @@ fn published_pictures_are_checked_criterion_by_criterion() {
     let output = twofold(&["check", "fig6", "--quiet", "--against", published.to_str().unwrap()]);
     let text = String::from_utf8(output.stdout).unwrap();
     assert_eq!(output.status.code(), Some(1), "{text}");
-    let line =
-        |start: &str| text.lines().find(|l| l.starts_with(start)).unwrap_or_else(|| panic!("no {start} in {text}"));
+    let line = |start: &str| {
+        text.lines()
+            .find(|l| l.starts_with(start))
+            .unwrap_or_else(|| panic!("no {start} in {text}"))
+    };
     for (file, words) in [
         ("a-file", "holds exactly (file"),
         ("b-pixels", "holds exactly in its pixels"),
@@ -216,10 +245,16 @@ fn published_pictures_are_checked_criterion_by_criterion() {
 fn a_picture_under_the_wrong_name_is_named() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("figures");
     let folder = tempfile::tempdir().unwrap();
-    for (name, code, state) in [("fig3.png", 0, "same"), ("mine.png", 0, "same"), ("fig1.png", 1, "misnamed")] {
+    for (name, code, state) in
+        [("fig3.png", 0, "same"), ("mine.png", 0, "same"), ("fig1.png", 1, "misnamed")]
+    {
         let file = folder.path().join(name);
         fs::copy(root.join("fig3/fig3.png"), &file).unwrap();
         let (found, said) = inspect(&file, &root);
-        assert_eq!((found, said["committed"]["state"].as_str()), (code, Some(state)), "{name}: {said}");
+        assert_eq!(
+            (found, said["committed"]["state"].as_str()),
+            (code, Some(state)),
+            "{name}: {said}"
+        );
     }
 }

@@ -1,10 +1,11 @@
-//! The method that works in the layer's own variable, against the reference, the other methods, and its own promises.
+//! The method that works in the layer's own variable, against the reference, the other methods, and
+//! its own promises.
 
 use nalgebra::{SVector, vector};
 use twofold::analyse::{Crossing, SectionRecorder};
 use twofold::integrate::{
-    Dopri5, DriveOptions, Failure, Flow, Ignore, Kick, KickLaw, Layered, Observer, Schedule, Step, StepCap, Stepper,
-    Taylor, Tolerance, drive,
+    Dopri5, DriveOptions, Failure, Flow, Ignore, Kick, KickLaw, Layered, Observer, Schedule, Step,
+    StepCap, Stepper, Taylor, Tolerance, drive,
 };
 use twofold::job::spec::*;
 use twofold::num::Elementary;
@@ -13,7 +14,8 @@ use twofold::system::{Caricature, Smoothed, System, Transition, VectorField};
 /// Any field, so that each method is compiled once.
 enum Field {
     Smooth(Smoothed<Caricature>),
-    /// Turns in x, y and drifts in z by a smoothed switch on the circle of radius 1: the layer's variable is no sum of states.
+    /// Turns in x, y and drifts in z by a smoothed switch on the circle of radius 1: the layer's
+    /// variable is no sum of states.
     Circle,
     /// The same with a quotient.
     Quotient,
@@ -32,7 +34,11 @@ impl VectorField<3> for Field {
 }
 
 fn caricature(alpha: f64, beta: f64, transition: Transition) -> Field {
-    Field::Smooth(Smoothed { system: Caricature::with_reinjection(alpha, beta), transition, eps: 1e-3 })
+    Field::Smooth(Smoothed {
+        system: Caricature::with_reinjection(alpha, beta),
+        transition,
+        eps: 1e-3,
+    })
 }
 
 const START: [f64; 3] = [0.2, 0.0, -1.0];
@@ -41,9 +47,15 @@ fn tolerance(size: f64) -> Tolerance {
     Tolerance { rtol: size, atol: size }
 }
 
-fn section(field: &Field, plane: (usize, f64), t_end: f64, mut method: impl Stepper<3>) -> Vec<Crossing> {
+fn section(
+    field: &Field,
+    plane: (usize, f64),
+    t_end: f64,
+    mut method: impl Stepper<3>,
+) -> Vec<Crossing> {
     let mut recorder = SectionRecorder::<3>::new(plane.0, plane.1);
-    let end = drive(field, START.into(), &DriveOptions::to(t_end), &mut method, &mut recorder, &()).unwrap();
+    let end = drive(field, START.into(), &DriveOptions::to(t_end), &mut method, &mut recorder, &())
+        .unwrap();
     assert_eq!(end.t, t_end);
     recorder.crossings().to_vec()
 }
@@ -52,38 +64,56 @@ fn error(a: &Crossing, b: &Crossing) -> f64 {
     (0..3).map(|i| (a.x[i] - b.x[i]).abs()).fold((a.t - b.t).abs(), f64::max)
 }
 
-/// Largest error over the first rows of crossings computed in 113-bit arithmetic outside this project.
+/// Largest error over the first rows of crossings computed in 113-bit arithmetic outside this
+/// project.
 fn against_the_reference(found: &[Crossing], text: &str, rows: usize) -> f64 {
     let lines = text.lines().filter(|l| !l.starts_with('#') && !l.starts_with("t,")).take(rows);
-    let want: Vec<Vec<f64>> = lines.map(|l| l.split(',').take(3).map(|n| n.parse().unwrap()).collect()).collect();
+    let want: Vec<Vec<f64>> =
+        lines.map(|l| l.split(',').take(3).map(|n| n.parse().unwrap()).collect()).collect();
     assert!(found.len() >= rows && want.len() == rows, "{found:?}");
-    let worst =
-        |(f, w): (&Crossing, &Vec<f64>)| (f.t - w[0]).abs().max((f.x[0] - w[1]).abs()).max((f.x[2] - w[2]).abs());
+    let worst = |(f, w): (&Crossing, &Vec<f64>)| {
+        (f.t - w[0]).abs().max((f.x[0] - w[1]).abs()).max((f.x[2] - w[2]).abs())
+    };
     found.iter().zip(&want).map(worst).fold(0.0, f64::max)
 }
 
 #[test]
 fn before_the_first_visit_its_error_is_no_larger_than_dormand_princes() {
     let printed = (1e-3, include_str!("../../crates/verify/data/crossings-printed.csv"), 4, 29.5);
-    let reconstructed = (1e-1, include_str!("../../crates/verify/data/crossings-reconstructed.csv"), 2, 4.8);
+    let reconstructed =
+        (1e-1, include_str!("../../crates/verify/data/crossings-reconstructed.csv"), 2, 4.8);
     for (alpha, text, rows, t_end) in [printed, reconstructed] {
         let field = caricature(alpha, 1e-5, Transition::Tanh);
         for size in [1e-6, 1.0536712e-8, 1e-10, 1e-12] {
-            let layered =
-                against_the_reference(&section(&field, (1, 0.0), t_end, Layered::new(tolerance(size))), text, rows);
-            let dopri5 =
-                against_the_reference(&section(&field, (1, 0.0), t_end, Dopri5::new(tolerance(size))), text, rows);
+            let layered = against_the_reference(
+                &section(&field, (1, 0.0), t_end, Layered::new(tolerance(size))),
+                text,
+                rows,
+            );
+            let dopri5 = against_the_reference(
+                &section(&field, (1, 0.0), t_end, Dopri5::new(tolerance(size))),
+                text,
+                rows,
+            );
             println!("alpha {alpha}, tolerance {size:e}: layered {layered:e}, dopri5 {dopri5:e}");
-            assert!(layered <= dopri5.max(1e-13), "alpha {alpha}, tolerance {size:e}: {layered:e} {dopri5:e}");
+            assert!(
+                layered <= dopri5.max(1e-13),
+                "alpha {alpha}, tolerance {size:e}: {layered:e} {dopri5:e}"
+            );
         }
     }
 }
 
-/// Starts from which orbits go into the layer, or are in it, and are held there until they reach the two-fold, at about t = 2.5.
+/// Starts from which orbits go into the layer, or are in it, and are held there until they reach
+/// the two-fold, at about t = 2.5.
 fn held() -> impl Iterator<Item = [f64; 3]> {
     (0..24).map(|k| {
         let part = f64::from(k) / 24.0;
-        [[11e-3, 0.0, -12e-3, 3e-3, -5e-3, 8e-3][k as usize % 6], 0.3 + 0.15 * part, 0.45 - 0.15 * part]
+        [
+            [11e-3, 0.0, -12e-3, 3e-3, -5e-3, 8e-3][k as usize % 6],
+            0.3 + 0.15 * part,
+            0.45 - 0.15 * part,
+        ]
     })
 }
 
@@ -101,19 +131,30 @@ fn while_an_orbit_is_held_its_error_is_no_larger_than_dormand_princes() {
             eps,
         });
         for t_end in [0.1, 0.5, 1.0, 1.8] {
-            let truth: Vec<_> =
-                held().map(|start| end(&field, start, t_end, Taylor::extended(tolerance(1e-20)))).collect();
+            let truth: Vec<_> = held()
+                .map(|start| end(&field, start, t_end, Taylor::extended(tolerance(1e-20))))
+                .collect();
             for size in [1e-6, 1.0536712e-8, 1e-10, 1e-12] {
                 // Of all starts together, root mean square: a single one may be lucky.
                 let error = |find: &dyn Fn([f64; 3]) -> SVector<f64, 3>| {
-                    let squares = held().zip(&truth).map(|(start, truth)| (find(start) - truth).norm_squared());
+                    let squares = held()
+                        .zip(&truth)
+                        .map(|(start, truth)| (find(start) - truth).norm_squared());
                     (squares.sum::<f64>() / truth.len() as f64).sqrt()
                 };
-                let layered = error(&|start| end(&field, start, t_end, Layered::new(tolerance(size))));
-                let dopri5 = error(&|start| end(&field, start, t_end, Dopri5::new(tolerance(size))));
-                println!("eps {eps}, t {t_end}, tolerance {size:e}: layered {layered:e}, dopri5 {dopri5:e}");
+                let layered =
+                    error(&|start| end(&field, start, t_end, Layered::new(tolerance(size))));
+                let dopri5 =
+                    error(&|start| end(&field, start, t_end, Dopri5::new(tolerance(size))));
+                println!(
+                    "eps {eps}, t {t_end}, tolerance {size:e}: layered {layered:e}, dopri5 \
+                        {dopri5:e}"
+                );
                 // Both may be far better than they need be.
-                assert!(layered <= dopri5.max(0.1 * size), "eps {eps}, t {t_end}, {size:e}: {layered:e} {dopri5:e}");
+                assert!(
+                    layered <= dopri5.max(0.1 * size),
+                    "eps {eps}, t {t_end}, {size:e}: {layered:e} {dopri5:e}"
+                );
             }
         }
     }
@@ -127,7 +168,8 @@ fn sections_are_met_while_an_orbit_is_held_and_where_it_leaves() {
         transition: Transition::Tanh,
         eps: 2e-2,
     });
-    let passages = |plane: (usize, f64), method: &mut dyn FnMut(&mut SectionRecorder<3>, [f64; 3])| {
+    let passages = |plane: (usize, f64),
+                    method: &mut dyn FnMut(&mut SectionRecorder<3>, [f64; 3])| {
         let mut all = Vec::new();
         for start in held().step_by(5) {
             let mut recorder = SectionRecorder::<3>::new(plane.0, plane.1);
@@ -140,12 +182,16 @@ fn sections_are_met_while_an_orbit_is_held_and_where_it_leaves() {
     for plane in [(0, 0.0), (0, 1e-3), (1, 0.0), (1, 0.1), (2, 0.0)] {
         let layered = passages(plane, &mut |recorder, start| {
             let mut method = Layered::new(tolerance(1e-13));
-            let end = drive(&field, start.into(), &DriveOptions::to(t_end), &mut method, recorder, &()).unwrap();
+            let end =
+                drive(&field, start.into(), &DriveOptions::to(t_end), &mut method, recorder, &())
+                    .unwrap();
             assert_eq!(end.t, t_end);
         });
         let taylor = passages(plane, &mut |recorder, start| {
             let mut method = Taylor::new(tolerance(1e-15));
-            let end = drive(&field, start.into(), &DriveOptions::to(t_end), &mut method, recorder, &()).unwrap();
+            let end =
+                drive(&field, start.into(), &DriveOptions::to(t_end), &mut method, recorder, &())
+                    .unwrap();
             assert_eq!(end.t, t_end);
         });
         let mut worst = 0.0_f64;
@@ -207,7 +253,8 @@ impl Observer<3> for Looking {
             18 => 0,
             _ => 1,
         }] += 1;
-        // The interpolant meets both ends, has the coordinates that it says, and stays within its reach.
+        // The interpolant meets both ends, has the coordinates that it says, and stays within its
+        // reach.
         let (first, last) = (step.interpolant.at(0.0), step.interpolant.at(1.0));
         self.worst = self.worst.max((first - step.x0).amax()).max((last - step.x1).amax());
         for theta in [0.1, 0.5, 0.83] {
@@ -216,7 +263,11 @@ impl Observer<3> for Looking {
                 assert_eq!(x[i].to_bits(), step.coordinate(theta, i).to_bits());
                 let (low, high) = (step.x0[i].min(step.x1[i]), step.x0[i].max(step.x1[i]));
                 let reach = step.interpolant.reach(i) + 1e-12 * (1.0 + x[i].abs());
-                assert!(x[i] >= low - reach && x[i] <= high + reach, "{i} {theta}: {} {low} {high} {reach}", x[i]);
+                assert!(
+                    x[i] >= low - reach && x[i] <= high + reach,
+                    "{i} {theta}: {} {low} {high} {reach}",
+                    x[i]
+                );
             }
         }
         Flow::Continue
@@ -227,10 +278,15 @@ impl Observer<3> for Looking {
 fn every_kind_of_step_has_its_interpolant_and_ends_where_it_should() {
     let field = caricature(1e-1, 1e-5, Transition::Tanh);
     let kick = Kick { every: 0.7, size: 1e-3, law: KickLaw::Sphere, seed: 3, stream: 0 };
-    // Kicks and restarts anywhere, also in the middle of the layer; caps far shorter than a crossing.
+    // Kicks and restarts anywhere, also in the middle of the layer; caps far shorter than a
+    // crossing.
     for (schedule, step_cap, t_end) in [
         (Schedule::default(), StepCap::None, 60.0),
-        (Schedule { restart_every: Some(0.31), kick: Some(kick) }, StepCap::FractionOfSegment(0.1), 60.0),
+        (
+            Schedule { restart_every: Some(0.31), kick: Some(kick) },
+            StepCap::FractionOfSegment(0.1),
+            60.0,
+        ),
         (Schedule::default(), StepCap::Absolute(3e-4), 14.0),
     ] {
         let mut looking = Looking { kinds: [0; 3], worst: 0.0 };
@@ -240,7 +296,8 @@ fn every_kind_of_step_has_its_interpolant_and_ends_where_it_should() {
         assert_eq!(end.t, t_end);
         assert!(looking.worst < 1e-12, "{:e}", looking.worst);
         assert!(
-            looking.kinds.iter().all(|kind| *kind > 0) && end.statistics.steps == looking.kinds.iter().sum::<u64>(),
+            looking.kinds.iter().all(|kind| *kind > 0)
+                && end.statistics.steps == looking.kinds.iter().sum::<u64>(),
             "{:?}",
             looking.kinds
         );
@@ -259,12 +316,32 @@ fn a_start_anywhere_in_the_layer_goes_on_as_taylor_does() {
         [0.0, 0.4, 0.7],
         [-30e-3, 0.4, 0.7],
     ] {
-        let run = |stepper: &mut dyn FnMut(&DriveOptions) -> SVector<f64, 3>| stepper(&DriveOptions::to(0.4));
+        let run = |stepper: &mut dyn FnMut(&DriveOptions) -> SVector<f64, 3>| {
+            stepper(&DriveOptions::to(0.4))
+        };
         let layered = run(&mut |options| {
-            drive(&field, start.into(), options, &mut Layered::new(tolerance(1e-11)), &mut Ignore, &()).unwrap().x
+            drive(
+                &field,
+                start.into(),
+                options,
+                &mut Layered::new(tolerance(1e-11)),
+                &mut Ignore,
+                &(),
+            )
+            .unwrap()
+            .x
         });
         let taylor = run(&mut |options| {
-            drive(&field, start.into(), options, &mut Taylor::new(tolerance(1e-15)), &mut Ignore, &()).unwrap().x
+            drive(
+                &field,
+                start.into(),
+                options,
+                &mut Taylor::new(tolerance(1e-15)),
+                &mut Ignore,
+                &(),
+            )
+            .unwrap()
+            .x
         });
         assert!((layered - taylor).amax() < 2e-9, "{start:?}: {layered} {taylor}");
     }
@@ -274,14 +351,28 @@ fn a_start_anywhere_in_the_layer_goes_on_as_taylor_does() {
 fn a_layer_that_is_no_plane_is_gone_through_in_time() {
     let run = |t_end: f64| {
         let mut method = Layered::new(tolerance(1e-11));
-        drive(&Field::Circle, vector![0.2, 0.9, 0.3], &DriveOptions::to(t_end), &mut method, &mut Ignore, &())
-            .unwrap()
-            .x
+        drive(
+            &Field::Circle,
+            vector![0.2, 0.9, 0.3],
+            &DriveOptions::to(t_end),
+            &mut method,
+            &mut Ignore,
+            &(),
+        )
+        .unwrap()
+        .x
     };
     let mut taylor = Taylor::new(tolerance(1e-15));
-    let want = drive(&Field::Circle, vector![0.2, 0.9, 0.3], &DriveOptions::to(20.0), &mut taylor, &mut Ignore, &())
-        .unwrap()
-        .x;
+    let want = drive(
+        &Field::Circle,
+        vector![0.2, 0.9, 0.3],
+        &DriveOptions::to(20.0),
+        &mut taylor,
+        &mut Ignore,
+        &(),
+    )
+    .unwrap()
+    .x;
     assert!((run(20.0) - want).amax() < 1e-8, "{} {want}", run(20.0));
 }
 
@@ -289,7 +380,9 @@ fn a_layer_that_is_no_plane_is_gone_through_in_time() {
 fn what_it_cannot_integrate_it_refuses() {
     for field in [Field::Quotient, caricature(1e-1, 1e-5, Transition::Arctan)] {
         let mut method = Layered::new(tolerance(1e-8));
-        let failure = drive(&field, START.into(), &DriveOptions::to(1.0), &mut method, &mut Ignore, &()).unwrap_err();
+        let failure =
+            drive(&field, START.into(), &DriveOptions::to(1.0), &mut method, &mut Ignore, &())
+                .unwrap_err();
         assert!(matches!(failure, Failure::NotApplicable { method: "layered", .. }), "{failure}");
         assert!(failure.to_string().contains("polynomial"), "{failure}");
     }

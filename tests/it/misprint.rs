@@ -1,4 +1,5 @@
-//! Eq. (5) prints f- = (-z, ...), eq. (4) prints (z, ...). Only +z makes the origin the two-fold that the paper describes.
+//! Eq. (5) prints f- = (-z, ...), eq. (4) prints (z, ...). Only +z makes the origin the two-fold
+//! that the paper describes.
 
 use crate::claims::Reads;
 use nalgebra::vector;
@@ -31,7 +32,9 @@ fn run(sign: MinusSign, t_end: f64) -> ([f64; 3], usize) {
     };
     let recording = simulate(&spec, &()).unwrap();
     match recording.data {
-        Data::Section(crossings) => (recording.x, crossings.iter().filter(|c| c.t > 0.5 * t_end).count()),
+        Data::Section(crossings) => {
+            (recording.x, crossings.iter().filter(|c| c.t > 0.5 * t_end).count())
+        }
         _ => unreachable!("a section was asked for"),
     }
 }
@@ -40,9 +43,13 @@ fn run(sign: MinusSign, t_end: f64) -> ([f64; 3], usize) {
 fn the_printed_sign_sticks_and_never_returns() {
     let (x, late_crossings) = run(MinusSign::PrintedInEquation5, 20_000.0);
     assert_eq!(late_crossings, 0, "it returned");
-    // The equilibrium of the sliding field, where f+ and f- balance on x = 0. (The project's notes give (0, 8.9, -9.4); the balance
-    // 0.527 - 0.473 * 1.4 + (1e-3 - 8.08e-5) * 146.6 = 0 and its z component hold here, not there.)
-    assert!(x[0].abs() < 1e-3 && (x[1] - 8.0840).abs() < 1e-3 && (x[2] + 9.0138).abs() < 1e-3, "{x:?}");
+    // The equilibrium of the sliding field, where f+ and f- balance on x = 0. (The project's notes
+    // give (0, 8.9, -9.4); the balance 0.527 - 0.473 * 1.4 + (1e-3 - 8.08e-5) * 146.6 = 0 and its z
+    // component hold here, not there.)
+    assert!(
+        x[0].abs() < 1e-3 && (x[1] - 8.0840).abs() < 1e-3 && (x[2] + 9.0138).abs() < 1e-3,
+        "{x:?}"
+    );
     let mut system = Reading::Printed.caricature();
     system.first_component_of_minus = MinusSign::PrintedInEquation5;
     let drift = |y, z| sliding_field(&system, &vector![0.0, y, z]).norm();
@@ -58,7 +65,9 @@ fn the_sign_of_equation_4_returns_for_ever() {
 
 #[test]
 fn only_the_sign_of_equation_4_gives_a_two_fold_invisible_from_both_sides() {
-    let mut reads = Reads::by("misprint::only_the_sign_of_equation_4_gives_a_two_fold_invisible_from_both_sides");
+    let mut reads = Reads::by(
+        "misprint::only_the_sign_of_equation_4_gives_a_two_fold_invisible_from_both_sides",
+    );
     let fold = |sign| {
         let mut system = Reading::Printed.caricature();
         system.first_component_of_minus = sign;

@@ -1,9 +1,11 @@
-//! Our LSODA against ODEPACK's own Fortran, as SciPy carries it: figures/workprecision/odepack/reference.json, made once by
-//! scripts/odepack_reference.py. Radau5 against the same reference solutions.
+//! Our LSODA against ODEPACK's own Fortran, as SciPy carries it:
+//! figures/workprecision/odepack/reference.json, made once by scripts/odepack_reference.py. Radau5
+//! against the same reference solutions.
 //!
-//! Step control magnifies rounding: after some hundred steps two programs that differ in the last bits make different
-//! decisions. The file therefore also says what ODEPACK does from starts 1e-12 away. Where it does the same from all of
-//! them, we must do exactly what it does; elsewhere its own spread is the yardstick, and the 15 % of issue 3 hold.
+//! Step control magnifies rounding: after some hundred steps two programs that differ in the last
+//! bits make different decisions. The file therefore also says what ODEPACK does from starts 1e-12
+//! away. Where it does the same from all of them, we must do exactly what it does; elsewhere its
+//! own spread is the yardstick, and the 15 % of issue 3 hold.
 
 #[allow(dead_code)]
 #[path = "../../figures/workprecision/data.rs"]
@@ -14,7 +16,9 @@ mod problems;
 use data::{Reference, ReferenceProblem, ReferenceRun, reference};
 use problems::{Problem, Visit, for_each};
 use twofold::integrate::lsoda::{Family, Lsoda, Switch};
-use twofold::integrate::{DriveOptions, Ignore, Radau5, Statistics, StepCap, Stepper, Tolerance, drive};
+use twofold::integrate::{
+    DriveOptions, Ignore, Radau5, Statistics, StepCap, Stepper, Tolerance, drive,
+};
 
 /// What our LSODA did.
 struct Ours {
@@ -25,7 +29,11 @@ struct Ours {
     bdf_orders: [u64; 5],
 }
 
-fn ours<const N: usize>(problem: &Problem<N>, known: &ReferenceProblem, run: &ReferenceRun) -> Ours {
+fn ours<const N: usize>(
+    problem: &Problem<N>,
+    known: &ReferenceProblem,
+    run: &ReferenceRun,
+) -> Ours {
     let mut lsoda = Lsoda::new(Tolerance { rtol: run.rtol, atol: run.atol });
     let cap = known.max_step.unwrap_or(f64::INFINITY);
     lsoda.restart(&problem.field, 0.0, problem.start, known.t_end, cap).unwrap();
@@ -59,7 +67,12 @@ fn compare(check: impl FnMut(&str, &ReferenceProblem, &ReferenceRun, &Ours)) {
     }
     impl<C: FnMut(&str, &ReferenceProblem, &ReferenceRun, &Ours)> Visit for Each<C> {
         fn visit<const N: usize>(&mut self, problem: &Problem<N>) {
-            let known = self.reference.problems.iter().find(|p| p.name == problem.name).expect(problem.name);
+            let known = self
+                .reference
+                .problems
+                .iter()
+                .find(|p| p.name == problem.name)
+                .expect(problem.name);
             assert_eq!(known.start, problem.start.as_slice(), "{}", problem.name);
             for run in &known.runs {
                 let label = format!("{} at {:.0e}", problem.name, run.rtol);
@@ -117,16 +130,20 @@ fn identical_where_rounding_does_not_decide() {
     });
     assert!(differing.is_empty(), "{differing:#?}");
     // The test would be empty if nothing were robust.
-    assert!(seen >= 25 && seen_switching >= 8, "{seen} robust runs, {seen_switching} with switches");
+    assert!(
+        seen >= 25 && seen_switching >= 8,
+        "{seen} robust runs, {seen_switching} with switches"
+    );
 }
 
 #[test]
 fn counts_within_fifteen_percent() {
     let mut worst: (f64, String) = (0.0, String::new());
     compare(|label, _, run, ours| {
-        for (what, a, b) in
-            [("steps", ours.statistics.steps, run.steps), ("evaluations", ours.statistics.evaluations, run.evaluations)]
-        {
+        for (what, a, b) in [
+            ("steps", ours.statistics.steps, run.steps),
+            ("evaluations", ours.statistics.evaluations, run.evaluations),
+        ] {
             let deviation = a as f64 / b as f64 - 1.0;
             if deviation.abs() > worst.0 {
                 worst = (deviation.abs(), format!("{label}: {a} {what}, ODEPACK {b}"));
@@ -142,7 +159,11 @@ fn errors_are_odepacks() {
     compare(|label, known, run, ours| {
         let theirs = run.shifted.iter().map(|s| s.error).fold(known.error(&run.x), f64::max);
         // The reference must be good enough to tell.
-        assert!(known.uncertainty() < 0.25 * theirs, "{label}: reference known to {}", known.uncertainty());
+        assert!(
+            known.uncertainty() < 0.25 * theirs,
+            "{label}: reference known to {}",
+            known.uncertainty()
+        );
         assert!(ours.error <= 2.0 * theirs, "{label}: {} ODEPACK {theirs}", ours.error);
     });
 }
@@ -154,11 +175,23 @@ fn switches_are_odepacks() {
         let s = &ours.statistics;
         let near = |what: &str, n: u64, (low, high): (u64, u64)| {
             let room = (high - low).max(high / 5).max(2);
-            assert!(low <= n + room && n <= high + room, "{label}: {n} {what}, ODEPACK {low}..{high}");
+            assert!(
+                low <= n + room && n <= high + room,
+                "{label}: {n} {what}, ODEPACK {low}..{high}"
+            );
         };
-        near("Jacobians", s.jacobians, range(run.jacobians, run.shifted.iter().map(|r| r.jacobians)));
-        near("BDF steps", s.stiff_steps, range(run.stiff_steps, run.shifted.iter().map(|r| r.stiff_steps)));
-        let counts = range(run.switches.len() as u64, run.shifted.iter().map(|r| r.switches.len() as u64));
+        near(
+            "Jacobians",
+            s.jacobians,
+            range(run.jacobians, run.shifted.iter().map(|r| r.jacobians)),
+        );
+        near(
+            "BDF steps",
+            s.stiff_steps,
+            range(run.stiff_steps, run.shifted.iter().map(|r| r.stiff_steps)),
+        );
+        let counts =
+            range(run.switches.len() as u64, run.shifted.iter().map(|r| r.switches.len() as u64));
         near("switches", s.method_switches, counts);
         if counts.0 != counts.1 || s.method_switches != counts.0 {
             return;
@@ -177,19 +210,27 @@ fn switches_are_odepacks() {
     });
 }
 
-/// Radau5 shares no code or idea with the makers of the reference solutions but the method's name: its error goes down
-/// with the tolerance on every problem, to far below it except where the problem itself magnifies errors.
+/// Radau5 shares no code or idea with the makers of the reference solutions but the method's name:
+/// its error goes down with the tolerance on every problem, to far below it except where the
+/// problem itself magnifies errors.
 #[test]
 fn radau5_reaches_the_reference_solutions() {
     struct Check(Reference);
     impl Visit for Check {
         fn visit<const N: usize>(&mut self, problem: &Problem<N>) {
-            let known = self.0.problems.iter().find(|p| p.name == problem.name).expect(problem.name);
+            let known =
+                self.0.problems.iter().find(|p| p.name == problem.name).expect(problem.name);
             let error = |tolerance: f64| {
-                let mut radau = Radau5::new(Tolerance { rtol: tolerance, atol: tolerance * known.atol_over_rtol });
+                let mut radau = Radau5::new(Tolerance {
+                    rtol: tolerance,
+                    atol: tolerance * known.atol_over_rtol,
+                });
                 let step_cap = known.max_step.map_or(StepCap::None, StepCap::Absolute);
-                let options = DriveOptions { step_cap, max_steps: 100_000, ..DriveOptions::to(known.t_end) };
-                let end = drive(&problem.field, problem.start, &options, &mut radau, &mut Ignore, &()).unwrap();
+                let options =
+                    DriveOptions { step_cap, max_steps: 100_000, ..DriveOptions::to(known.t_end) };
+                let end =
+                    drive(&problem.field, problem.start, &options, &mut radau, &mut Ignore, &())
+                        .unwrap();
                 known.error(end.within_budget().unwrap().x.as_slice())
             };
             let (loose, tight) = (error(1e-6), error(1e-10));
@@ -202,16 +243,19 @@ fn radau5_reaches_the_reference_solutions() {
     for_each(&mut Check(reference()));
 }
 
-/// The data of the work-precision picture: complete, and without the rows that a non-stiff method cannot give.
+/// The data of the work-precision picture: complete, and without the rows that a non-stiff method
+/// cannot give.
 #[test]
 fn work_precision_rows() {
     let rows = data::rows();
     for known in &reference().problems {
-        let count = |method| rows.iter().filter(|r| r.problem == known.name && r.method == method).count();
+        let count =
+            |method| rows.iter().filter(|r| r.problem == known.name && r.method == method).count();
         for method in ["odepack-lsoda", "lsoda", "radau5"] {
             assert_eq!(count(method), known.runs.len(), "{} {method}", known.name);
         }
-        let too_stiff = ["robertson", "van-der-pol-1000", "oregonator"].contains(&known.name.as_str());
+        let too_stiff =
+            ["robertson", "van-der-pol-1000", "oregonator"].contains(&known.name.as_str());
         assert_eq!(count("dopri5"), if too_stiff { 0 } else { known.runs.len() }, "{}", known.name);
     }
     assert!(rows.iter().all(|r| r.error.is_finite() && r.evaluations > 0));

@@ -1,4 +1,5 @@
-//! The files of a paper's folder: their keys, generated from the structs that read them, as a page and as JSON Schemas.
+//! The files of a paper's folder: their keys, generated from the structs that read them, as a page
+//! and as JSON Schemas.
 #![cfg(feature = "cli")]
 
 use std::fs;
@@ -35,7 +36,8 @@ fn checks() -> Vec<(String, Vec<String>)> {
     let text = source("src/folder/check.rs");
     let (_, body) = text.split_once("const KINDS:").unwrap();
     let (body, _) = body.split_once("\n];").unwrap();
-    let quoted = |line: &str| line.split('"').skip(1).step_by(2).map(str::to_owned).collect::<Vec<_>>();
+    let quoted =
+        |line: &str| line.split('"').skip(1).step_by(2).map(str::to_owned).collect::<Vec<_>>();
     let lines = body.lines().filter(|l| l.trim().starts_with("(\""));
     lines
         .map(|l| {
@@ -76,12 +78,19 @@ fn value(arg: &Arg) -> Value {
     let mut value = match arg.get_action() {
         ArgAction::SetTrue => json!({ "const": true }),
         _ if arg.get_long() == Some("set") => {
-            json!({ "type": ["object", "array", "string"], "additionalProperties": { "type": ["number", "string"] } })
+            json!({ "type": ["object", "array", "string"], "additionalProperties": {
+                "type": ["number", "string"] } })
         }
         _ if !arg.get_possible_values().is_empty() => {
-            json!({ "enum": arg.get_possible_values().iter().map(|v| v.get_name().to_owned()).collect::<Vec<_>>() })
+            let values = arg.get_possible_values();
+            let names: Vec<&str> =
+                values.iter().map(clap::builder::PossibleValue::get_name).collect();
+            json!({ "enum": names })
         }
-        _ => json!({ "type": ["number", "string", "array"], "items": { "type": ["number", "string"] } }),
+        _ => {
+            json!({ "type": ["number", "string", "array"], "items": { "type": ["number",
+                "string"] } })
+        }
     };
     value["description"] = meaning(arg).into();
     value
@@ -99,7 +108,8 @@ fn question(command: &str) -> Value {
         "run" => own.iter().filter(wanted).collect(),
         _ => command.get_arguments().filter(wanted).collect(),
     };
-    let properties: Map<String, Value> = flags.iter().map(|a| (a.get_long().unwrap().to_owned(), value(a))).collect();
+    let properties: Map<String, Value> =
+        flags.iter().map(|a| (a.get_long().unwrap().to_owned(), value(a))).collect();
     json!({ "type": "object", "additionalProperties": false, "properties": properties })
 }
 
@@ -115,13 +125,26 @@ fn typed(key: &Key) -> Value {
         "f64" => json!({ "type": "number" }),
         "u64" | "u32" | "u16" | "usize" => json!({ "type": "integer", "minimum": 0 }),
         "bool" => json!({ "type": "boolean" }),
-        "Vec<String>" | "Vec<Spanned<String>>" => json!({ "type": "array", "items": { "type": "string" } }),
-        "[String; 2]" => json!({ "type": "array", "items": { "type": "string" }, "minItems": 2, "maxItems": 2 }),
-        "[f64; 2]" => json!({ "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 }),
-        "Draw" => json!({ "enum": ["series", "plane", "space", "section", "columns", "halves", "surface"] }),
-        "Words" if ["orbit", "lyapunov", "rests"].contains(&key.name.as_str()) => question(&key.name),
+        "Vec<String>" | "Vec<Spanned<String>>" => {
+            json!({ "type": "array", "items": { "type": "string" } })
+        }
+        "[String; 2]" => {
+            json!({ "type": "array", "items": { "type": "string" }, "minItems": 2, "maxItems": 2 })
+        }
+        "[f64; 2]" => {
+            json!({ "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 })
+        }
+        "Draw" => {
+            json!({ "enum": ["series", "plane", "space", "section", "columns", "halves",
+                "surface"] })
+        }
+        "Words" if ["orbit", "lyapunov", "rests"].contains(&key.name.as_str()) => {
+            question(&key.name)
+        }
         "Words" => question("run"),
-        "Vec<Spanned<PanelFile>>" => json!({ "type": "array", "minItems": 1, "items": object("PanelFile") }),
+        "Vec<Spanned<PanelFile>>" => {
+            json!({ "type": "array", "minItems": 1, "items": object("PanelFile") })
+        }
         "toml::value::Datetime" => json!({}),
         "BTreeMap<Spanned<String>, ReadingFile>" => {
             json!({ "type": "object", "additionalProperties": object("ReadingFile") })
@@ -131,7 +154,8 @@ fn typed(key: &Key) -> Value {
         }
         "PanelClaim" => json!({ "oneOf": [
             { "enum": ["less-organised-than-next", "differs-from-next"] },
-            { "type": "object", "required": ["section"], "additionalProperties": false, "properties": { "section": { "oneOf": [
+            { "type": "object", "required": ["section"], "additionalProperties": false,
+                "properties": { "section": { "oneOf": [
                 { "enum": ["periodic", "chaos", "partly-washed-out"] },
                 { "type": "object", "required": ["period"], "additionalProperties": false,
                   "properties": { "period": { "type": "integer", "minimum": 1 } } },
@@ -144,7 +168,10 @@ fn typed(key: &Key) -> Value {
     match key.name.as_str() {
         "check" => value["enum"] = checks().into_iter().map(|(kind, _)| kind).collect(),
         "relation" => value["enum"] = json!(["less", "<", "greater", ">"]),
-        "take" => value["enum"] = json!(["last", "first", "max", "min", "mean", "span", "count", "modulus"]),
+        "take" => {
+            value["enum"] =
+                json!(["last", "first", "max", "min", "mean", "span", "count", "modulus"])
+        }
         "format" => value["const"] = json!(1),
         _ => {}
     }
@@ -156,7 +183,8 @@ fn object(name: &str) -> Value {
     let keys = of(name);
     let properties: Map<String, Value> = keys.iter().map(|k| (k.name.clone(), typed(k))).collect();
     let required: Vec<&str> = keys.iter().filter(|k| k.needed).map(|k| k.name.as_str()).collect();
-    json!({ "type": "object", "additionalProperties": false, "required": required, "properties": properties })
+    json!({ "type": "object", "additionalProperties": false, "required": required,
+        "properties": properties })
 }
 
 /// The schema of a file.
@@ -186,7 +214,11 @@ fn schemas_of_a_paper_are_as_its_readers() {
             fs::create_dir_all(path.parent().unwrap()).unwrap();
             fs::write(&path, text).unwrap();
         } else {
-            assert!(fs::read_to_string(&path).unwrap() == text, "{}: make reference", path.display());
+            assert!(
+                fs::read_to_string(&path).unwrap() == text,
+                "{}: make reference",
+                path.display()
+            );
         }
     }
 }
@@ -197,7 +229,9 @@ fn as_json(path: &Path) -> Value {
         match value {
             toml::Value::Datetime(date) => date.to_string().into(),
             toml::Value::Array(list) => list.into_iter().map(of).collect(),
-            toml::Value::Table(table) => Value::Object(table.into_iter().map(|(k, v)| (k, of(v))).collect()),
+            toml::Value::Table(table) => {
+                Value::Object(table.into_iter().map(|(k, v)| (k, of(v))).collect())
+            }
             other => serde_json::to_value(other).unwrap(),
         }
     }
@@ -207,8 +241,13 @@ fn as_json(path: &Path) -> Value {
 /// The files of a folder and the schema of each.
 fn files(folder: &Path) -> Vec<(std::path::PathBuf, &'static str)> {
     let mut files = vec![(folder.join("paper.toml"), "paper")];
-    files.extend(fs::read_dir(folder.join("figures")).unwrap().map(|e| (e.unwrap().path(), "figure")));
-    files.extend([("measures.toml", "measures"), ("claims.toml", "claims")].map(|(f, s)| (folder.join(f), s)));
+    files.extend(
+        fs::read_dir(folder.join("figures")).unwrap().map(|e| (e.unwrap().path(), "figure")),
+    );
+    files.extend(
+        [("measures.toml", "measures"), ("claims.toml", "claims")]
+            .map(|(f, s)| (folder.join(f), s)),
+    );
     files.retain(|f| f.0.exists());
     files
 }
@@ -216,7 +255,9 @@ fn files(folder: &Path) -> Vec<(std::path::PathBuf, &'static str)> {
 #[test]
 fn papers_follow_the_schemas() {
     let mut folders = vec![root().join("src/folder/template")];
-    folders.extend(fs::read_dir(root().join("papers")).into_iter().flatten().map(|e| e.unwrap().path()));
+    folders.extend(
+        fs::read_dir(root().join("papers")).into_iter().flatten().map(|e| e.unwrap().path()),
+    );
     folders.retain(|f| f.join("paper.toml").exists());
     for folder in folders {
         for (file, kind) in files(&folder) {
@@ -226,7 +267,8 @@ fn papers_follow_the_schemas() {
     }
 }
 
-/// What a schema refuses, the reader refuses, and the other way round: unknown keys, keys that are missing, values of another type.
+/// What a schema refuses, the reader refuses, and the other way round: unknown keys, keys that are
+/// missing, values of another type.
 #[test]
 fn a_schema_and_its_reader_refuse_the_same() {
     let changes: [(&str, &str, &str, &str); 8] = [
@@ -250,6 +292,9 @@ fn a_schema_and_its_reader_refuse_the_same() {
         assert!(text.contains(from));
         fs::write(&path, text.replace(from, to)).unwrap();
         assert!(twofold::folder::Folder::read(&folder).is_err(), "{to}: the reader takes it");
-        assert!(!schema::violations(&schema_of(kind), &as_json(&path)).is_empty(), "{to}: the schema takes it");
+        assert!(
+            !schema::violations(&schema_of(kind), &as_json(&path)).is_empty(),
+            "{to}: the schema takes it"
+        );
     }
 }

@@ -9,7 +9,14 @@ use tempfile::TempDir;
 
 fn paper(arguments: &[&str], folder: &Path) -> (i32, String, String) {
     let (action, rest) = arguments.split_first().expect("an action");
-    let run = Command::cargo_bin("twofold").unwrap().arg("paper").arg(action).arg(folder).args(rest).output().unwrap();
+    let run = Command::cargo_bin("twofold")
+        .unwrap()
+        .arg("paper")
+        .arg(action)
+        .arg(folder)
+        .args(rest)
+        .output()
+        .unwrap();
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
     (run.status.code().unwrap(), text(run.stdout), text(run.stderr))
 }
@@ -46,19 +53,27 @@ fn a_new_paper_is_made_blessed_checked_and_reported() {
     let codecheck = fs::read_to_string(root.join("out/codecheck.yml")).unwrap();
     assert!(codecheck.contains("file: \"fig1/fig1.png\""), "{codecheck}");
     let metadata: serde_json::Value =
-        serde_json::from_slice(&fs::read(root.join("out/ro-crate-metadata.json")).unwrap()).unwrap();
+        serde_json::from_slice(&fs::read(root.join("out/ro-crate-metadata.json")).unwrap())
+            .unwrap();
     assert!(metadata["@graph"].as_array().unwrap().iter().any(|e| e["@id"] == "fig1/fig1.svg"));
     // Blessed again, nothing is written.
     let before = fs::read(root.join("expected/CHANGES.md")).unwrap();
     let (_, out, _) = paper(&["bless", "--reason", "again", "--quiet"], &root);
-    assert!(out.contains("nothing changed") && fs::read(root.join("expected/CHANGES.md")).unwrap() == before, "{out}");
+    assert!(
+        out.contains("nothing changed")
+            && fs::read(root.join("expected/CHANGES.md")).unwrap() == before,
+        "{out}"
+    );
 }
 
 /// Where a paper lies, how many threads make it, and whether a store helps, changes no byte.
 #[test]
 fn a_paper_is_the_same_bytes_wherever_it_lies() {
     let (here, there) = (small(), small());
-    assert_eq!(paper(&["report", "--quiet", "--threads", "1", "--fresh"], &here.path().join("p")).0, 0);
+    assert_eq!(
+        paper(&["report", "--quiet", "--threads", "1", "--fresh"], &here.path().join("p")).0,
+        0
+    );
     assert_eq!(paper(&["report", "--quiet"], &there.path().join("p")).0, 0);
     let mut compared = 0;
     for file in [
@@ -85,7 +100,10 @@ fn a_rule_that_changes_after_its_data_is_said_to() {
     assert_eq!(paper(&["bless", "--reason", "first", "--quiet"], &root).0, 0);
     change(&root, "claims.toml", "within = 1e-6", "within = 1e-3");
     let (code, out, _) = paper(&["check", "--quiet"], &root);
-    assert!(code == 1 && out.contains("period: DIFFERS in its rule, changed when the data were known"), "{out}");
+    assert!(
+        code == 1 && out.contains("period: DIFFERS in its rule, changed when the data were known"),
+        "{out}"
+    );
     assert_eq!(paper(&["bless", "--reason", "wider", "--quiet"], &root).0, 0);
     assert_eq!(paper(&["report", "--quiet"], &root).0, 0);
     let page = fs::read_to_string(root.join("out/report.html")).unwrap();
@@ -114,16 +132,21 @@ fn a_ratio_is_of_two_measures() {
     let root = place.path().join("p");
     // Periods are 2 ln((1 + w)/(1 - w)): ln(11/9)/ln 3 is their ratio at w = 0.1 and 0.5.
     let ratio = "0.18265833864413814";
-    let from = "check = \"order\"\nof = \"narrow-cycle\"\nand = \"cycle\"\nread = \"period\"\nrelation = \"less\"";
+    let from = "check = \"order\"\nof = \"narrow-cycle\"\nand = \"cycle\"\nread \
+        = \"period\"\nrelation = \"less\"";
     let to = format!(
-        "check = \"ratio\"\nof = \"narrow-cycle\"\nand = \"cycle\"\nread = \"period\"\nequals = {ratio}\nwithin = 1e-6"
+        "check = \"ratio\"\nof = \"narrow-cycle\"\nand = \"cycle\"\nread = \"period\"\nequals = \
+            {ratio}\nwithin = 1e-6"
     );
     change(&root, "claims.toml", from, &to);
     let (code, out, said) = paper(&["make", "--quiet"], &root);
     assert!(code == 0 && out.contains("2 of 2 claims agree"), "{out}{said}");
     change(&root, "claims.toml", ratio, "0.5");
     let (_, out, _) = paper(&["make", "--quiet"], &root);
-    assert!(out.contains("narrower-is-faster: differs") && out.contains("0.5 in the paper"), "{out}");
+    assert!(
+        out.contains("narrower-is-faster: differs") && out.contains("0.5 in the paper"),
+        "{out}"
+    );
 }
 
 /// The share of starts in which a check holds.
@@ -131,8 +154,10 @@ fn a_ratio_is_of_two_measures() {
 fn a_check_has_odds_from_other_starts() {
     let place = small();
     let root = place.path().join("p");
-    let claim = "\n[[claim]]\nid = \"above\"\nplace = \"-\"\nsays = \"It ends above zero.\"\ndecided = 2026-11-26\n\
-                 check = \"order\"\nof = \"end\"\nread = \"x/0\"\nrelation = \"greater\"\nthan = 0\nodds = { starts = 40, spread = 1, at-least = 0.9 }\n";
+    let claim = "\n[[claim]]\nid = \"above\"\nplace = \"-\"\nsays = \"It ends above \
+        zero.\"\ndecided = 2026-11-26\n\
+                 check = \"order\"\nof = \"end\"\nread = \"x/0\"\nrelation = \"greater\"\nthan = \
+                 0\nodds = { starts = 40, spread = 1, at-least = 0.9 }\n";
     let mut text = fs::read_to_string(root.join("claims.toml")).unwrap();
     text.push_str(claim);
     fs::write(root.join("claims.toml"), text).unwrap();
@@ -140,13 +165,15 @@ fn a_check_has_odds_from_other_starts() {
     // x' = -x keeps its sign: it ends above zero if it starts there.
     text.push_str("\n[end]\nrun = { system = \"systems/decay.toml\", t-end = 1 }\n");
     fs::write(root.join("measures.toml"), text).unwrap();
-    fs::write(root.join("systems/decay.toml"), "states = [\"x\"]\nstart = [0.1]\nf = [\"-x\"]\n").unwrap();
+    fs::write(root.join("systems/decay.toml"), "states = [\"x\"]\nstart = [0.1]\nf = [\"-x\"]\n")
+        .unwrap();
     let (code, out, said) = paper(&["make", "--quiet", "--json"], &root);
     assert_eq!(code, 0, "{said}");
     let out: serde_json::Value = serde_json::from_str(&out).unwrap();
     let found = out["claims"].as_array().unwrap().iter().find(|c| c["claim"] == "above").unwrap();
     let hits = found["odds"][0].as_u64().unwrap();
-    // 0.1 + u with u uniform in [-1, 1]: 0.55 of them; 40 draws lie within five standard deviations.
+    // 0.1 + u with u uniform in [-1, 1]: 0.55 of them; 40 draws lie within five standard
+    // deviations.
     assert!((7..=37).contains(&hits) && found["odds"][1] == 40, "{found}");
     assert_eq!(found["outcome"], "differs", "{found}");
 }
@@ -182,7 +209,8 @@ fn papers_that_ship_are_reproduced() {
 /// Bad input: what is wrong, where, what to do; exit code 2 and nothing written.
 #[test]
 fn what_is_wrong_in_a_folder_is_said_with_its_place() {
-    let reading = "[readings.a]\nabout = \"\"\nextends = \"b\"\n[readings.b]\nabout = \"\"\nextends = \"a\"\n[run]";
+    let reading = "[readings.a]\nabout = \"\"\nextends = \"b\"\n[readings.b]\nabout \
+        = \"\"\nextends = \"a\"\n[run]";
     let cases: [(&str, &str, &str, &[&str]); 22] = [
         (
             "paper.toml",
@@ -199,25 +227,85 @@ fn what_is_wrong_in_a_folder_is_said_with_its_place() {
             "t-edn = 12",
             &["unknown key `t-edn`", "fig1.toml:10:40", "did you mean `t-end`?"],
         ),
-        ("figures/fig1.toml", "t-end = 12", "t-end = \"x\"", &["invalid value 'x'", "fig1.toml:10:40"]),
-        ("figures/fig1.toml", "t-end = 12", "t-end = { a = 1 }", &["`t-end` is a table", "fig1.toml:10:48"]),
-        ("figures/fig1.toml", "t-end = 12", "t-end = 12, out = \"../x\"", &["`out` is not part of a question"]),
-        ("figures/fig1.toml", "t-end = 12", "t-end = 12, eps = 1", &["--eps has no effect", "fig1.toml:10:"]),
-        ("figures/fig1.toml", "label = \"b\"", "label = \"a\"", &["two panels `a`", "fig1.toml:13:9"]),
-        ("figures/fig1.toml", "label = \"b\"", "label = \"../b\"", &["the label `../b` is no plain name"]),
-        ("figures/fig1.toml", "draw = \"series\"", "draw = \"serie\"", &["unknown variant `serie`", "fig1.toml:9:8"]),
+        (
+            "figures/fig1.toml",
+            "t-end = 12",
+            "t-end = \"x\"",
+            &["invalid value 'x'", "fig1.toml:10:40"],
+        ),
+        (
+            "figures/fig1.toml",
+            "t-end = 12",
+            "t-end = { a = 1 }",
+            &["`t-end` is a table", "fig1.toml:10:48"],
+        ),
+        (
+            "figures/fig1.toml",
+            "t-end = 12",
+            "t-end = 12, out = \"../x\"",
+            &["`out` is not part of a question"],
+        ),
+        (
+            "figures/fig1.toml",
+            "t-end = 12",
+            "t-end = 12, eps = 1",
+            &["--eps has no effect", "fig1.toml:10:"],
+        ),
+        (
+            "figures/fig1.toml",
+            "label = \"b\"",
+            "label = \"a\"",
+            &["two panels `a`", "fig1.toml:13:9"],
+        ),
+        (
+            "figures/fig1.toml",
+            "label = \"b\"",
+            "label = \"../b\"",
+            &["the label `../b` is no plain name"],
+        ),
+        (
+            "figures/fig1.toml",
+            "draw = \"series\"",
+            "draw = \"serie\"",
+            &["unknown variant `serie`", "fig1.toml:9:8"],
+        ),
         (
             "figures/fig1.toml",
             "systems/relay.toml",
             "../p/systems/relay.toml",
             &["does not lie in this folder", "fig1.toml:10:9"],
         ),
-        ("figures/fig1.toml", "systems/relay.toml", "systems/reley.toml", &["there is no system `systems/reley.toml`"]),
-        ("claims.toml", "of = \"cycle\"", "of = \"cycel\"", &["no panel or measure `cycel`", "did you mean `cycle`?"]),
+        (
+            "figures/fig1.toml",
+            "systems/relay.toml",
+            "systems/reley.toml",
+            &["there is no system `systems/reley.toml`"],
+        ),
+        (
+            "claims.toml",
+            "of = \"cycle\"",
+            "of = \"cycel\"",
+            &["no panel or measure `cycel`", "did you mean `cycle`?"],
+        ),
         ("claims.toml", "read = \"period\"", "", &["the claim reads nothing", "claims.toml:2:1"]),
-        ("claims.toml", "check = \"value\"", "check = \"valeu\"", &["no check `valeu`", "did you mean `value`?"]),
-        ("claims.toml", "within = 1e-6", "within = 1e-6\nsame = true", &["`same` has no effect on a check of value"]),
-        ("claims.toml", "check = \"value\"", "check = \"ratio\"", &["a check of ratio needs `and`", "claims.toml:2:1"]),
+        (
+            "claims.toml",
+            "check = \"value\"",
+            "check = \"valeu\"",
+            &["no check `valeu`", "did you mean `value`?"],
+        ),
+        (
+            "claims.toml",
+            "within = 1e-6",
+            "within = 1e-6\nsame = true",
+            &["`same` has no effect on a check of value"],
+        ),
+        (
+            "claims.toml",
+            "check = \"value\"",
+            "check = \"ratio\"",
+            &["a check of ratio needs `and`", "claims.toml:2:1"],
+        ),
         (
             "figures/fig1.toml",
             "draw = \"series\"",
@@ -227,7 +315,8 @@ fn what_is_wrong_in_a_folder_is_said_with_its_place() {
         (
             "figures/fig1.toml",
             "[[panel]]\nlabel = \"b\"",
-            "[[panel]]\nlabel = \"c\"\ndraw = \"columns\"\nof = \"fig1/a\"\nx = \"t\"\ny = [\"x\"]\nnames = []\n[[panel]]\nlabel = \"b\"",
+            "[[panel]]\nlabel = \"c\"\ndraw = \"columns\"\nof = \"fig1/a\"\nx = \"t\"\ny = \
+                [\"x\"]\nnames = []\n[[panel]]\nlabel = \"b\"",
             &["0 names for 1 columns", "fig1.toml"],
         ),
         (
@@ -266,11 +355,21 @@ fn a_system_behind_a_link_is_refused() {
 fn hostile_words_are_shown_as_they_are() {
     let place = small();
     let root = place.path().join("p");
-    change(&root, "paper.toml", "A relay with hysteresis, as an example", "<script>alert(1)</script>");
+    change(
+        &root,
+        "paper.toml",
+        "A relay with hysteresis, as an example",
+        "<script>alert(1)</script>",
+    );
     change(&root, "claims.toml", "A narrower loop", "<img src=x onerror=y>");
     change(&root, "figures/fig1.toml", "w = 0.1\"", "*_{<b>\"");
     let (code, _, said) = paper(&["report", "--quiet"], &root);
     assert_eq!(code, 0, "{said}");
     let page = fs::read_to_string(root.join("out/report.html")).unwrap();
-    assert!(!page.contains("<script") && !page.contains("<img src=x") && page.contains("&lt;script&gt;"), "{page}");
+    assert!(
+        !page.contains("<script")
+            && !page.contains("<img src=x")
+            && page.contains("&lt;script&gt;"),
+        "{page}"
+    );
 }

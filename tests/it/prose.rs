@@ -9,10 +9,24 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
+/// Where Rust is.
+const RUST: [&str; 10] = [
+    "crates", "src", "figures", "tests", "proofs", "examples", "benches", "fuzz", "python", "tools",
+];
+
 /// Every Markdown file that people write, and its text without blocks that programs write.
 fn pages() -> Vec<(String, String)> {
-    const FOLDERS: [&str; 9] =
-        ["", "docs", "notes", "proofs", "python", "benches", "tests/cases", "figures", "crates/render/fonts"];
+    const FOLDERS: [&str; 9] = [
+        "",
+        "docs",
+        "notes",
+        "proofs",
+        "python",
+        "benches",
+        "tests/cases",
+        "figures",
+        "crates/render/fonts",
+    ];
     const MADE: [&str; 3] = ["benches/cost.md", "figures/CHANGES.md", "proofs/forgeries.md"];
     let in_folder = |folder: &&str| -> Vec<PathBuf> {
         fs::read_dir(root().join(folder)).unwrap().map(|e| e.unwrap().path()).collect()
@@ -21,7 +35,9 @@ fn pages() -> Vec<(String, String)> {
         .iter()
         .flat_map(in_folder)
         .filter(|p| p.extension().is_some_and(|e| e == "md"))
-        .map(|p| (p.strip_prefix(root()).unwrap().display().to_string(), fs::read_to_string(&p).unwrap()))
+        .map(|p| {
+            (p.strip_prefix(root()).unwrap().display().to_string(), fs::read_to_string(&p).unwrap())
+        })
         .filter(|(name, text)| !MADE.contains(&name.as_str()) && !text.starts_with("<!-- made by"))
         .map(|(name, text)| (name, by_hand(&text)))
         .collect();
@@ -60,7 +76,9 @@ fn prose_has_at_most_100_columns() {
     for (name, text) in pages() {
         for (number, line, code) in lines(&text) {
             // A table's row and a picture are one line; a link cannot be wrapped.
-            let one = line.trim_start().starts_with(['|']) || line.starts_with("![") || !line.trim().contains(' ');
+            let one = line.trim_start().starts_with(['|'])
+                || line.starts_with("![")
+                || !line.trim().contains(' ');
             if !code && !one && line.chars().count() > 100 {
                 long.push(format!("{name}:{number}"));
             }
@@ -69,7 +87,28 @@ fn prose_has_at_most_100_columns() {
     assert!(long.is_empty(), "lines of more than 100 columns: {long:#?}");
 }
 
-/// The rules of markdownlint that these pages keep: MD001, MD009, MD012, MD022, MD025, MD031, MD040, MD041.
+#[test]
+fn rust_has_at_most_100_columns() {
+    let mut files = Vec::new();
+    for folder in RUST {
+        files_of(&root().join(folder), &["rs"], &mut files);
+    }
+    let mut long = Vec::new();
+    for file in files {
+        for (i, line) in fs::read_to_string(&file).unwrap().lines().enumerate() {
+            // A table's row is one line; digits, addresses and style sheets cannot be wrapped.
+            let row = line.trim_start().trim_start_matches(['/', '!']).starts_with(" |");
+            let whole = line.split_whitespace().any(|word| word.chars().count() > 80);
+            if line.chars().count() > 100 && !row && !whole {
+                long.push(format!("{}:{}", file.display(), i + 1));
+            }
+        }
+    }
+    assert!(long.is_empty(), "lines of more than 100 columns: {long:#?}");
+}
+
+/// The rules of markdownlint that these pages keep: MD001, MD009, MD012, MD022, MD025, MD031,
+/// MD040, MD041.
 #[test]
 fn markdown_is_well_formed() {
     let mut wrong = Vec::new();
@@ -81,7 +120,9 @@ fn markdown_is_well_formed() {
         }
         let (mut level, mut fence) = (0, false);
         for (i, line) in all.iter().enumerate() {
-            let blank = |at: Option<usize>| at.and_then(|at| all.get(at)).is_none_or(|l| l.trim().is_empty());
+            let blank = |at: Option<usize>| {
+                at.and_then(|at| all.get(at)).is_none_or(|l| l.trim().is_empty())
+            };
             if line.ends_with([' ', '\t']) {
                 say(i + 1, "ends with a space");
             }
@@ -90,7 +131,9 @@ fn markdown_is_well_formed() {
                     say(i + 1, "a block of code without a language");
                 }
                 let outside = if fence { Some(i + 1) } else { i.checked_sub(1) };
-                let mark = outside.and_then(|at| all.get(at)).is_some_and(|l| l.starts_with("<!-- file: "));
+                let mark = outside
+                    .and_then(|at| all.get(at))
+                    .is_some_and(|l| l.starts_with("<!-- file: "));
                 if !blank(outside) && !mark {
                     say(i + 1, "a block of code without a blank line around it");
                 }
@@ -138,26 +181,38 @@ fn subjects_of_commits_are_held_to_the_rule() {
             .unwrap();
         script.stdin.take().unwrap().write_all(subject.as_bytes()).unwrap();
         let output = script.wait_with_output().unwrap();
-        assert_eq!(output.status.success(), fine, "{subject}: {}", String::from_utf8_lossy(&output.stdout));
+        assert_eq!(
+            output.status.success(),
+            fine,
+            "{subject}: {}",
+            String::from_utf8_lossy(&output.stdout)
+        );
     }
 }
 
 const KINDS: [&str; 4] = ["Tutorial", "How-to", "Reference", "Explanation"];
 
-/// docs/SUMMARY.md lists every page under its kind; the page's first line says the same kind, and for whom it is.
+/// docs/SUMMARY.md lists every page under its kind; the page's first line says the same kind, and
+/// for whom it is.
 #[test]
 fn every_page_of_the_book_says_its_kind_and_its_reader() {
     let mut kind = "Explanation";
     for line in fs::read_to_string(root().join("docs/SUMMARY.md")).unwrap().lines() {
         if let Some(part) = line.strip_prefix("# ").filter(|part| *part != "Summary") {
-            kind = KINDS.into_iter().find(|k| *k == part).unwrap_or_else(|| panic!("\"{part}\" is no kind of page"));
+            kind = KINDS
+                .into_iter()
+                .find(|k| *k == part)
+                .unwrap_or_else(|| panic!("\"{part}\" is no kind of page"));
         }
         let Some((_, file)) = line.split_once("](") else { continue };
         let file = file.trim_end_matches(')');
         let text = fs::read_to_string(root().join("docs").join(file)).unwrap();
         let first = text.lines().skip(1).find(|l| !l.is_empty()).unwrap();
         let said = format!("{kind} for readers ");
-        assert!(first.starts_with(&said), "docs/{file}: its first line is \"{first}\", not \"{said}who ...\"");
+        assert!(
+            first.starts_with(&said),
+            "docs/{file}: its first line is \"{first}\", not \"{said}who ...\""
+        );
     }
 }
 
@@ -167,7 +222,8 @@ fn pages_of_the_book_have_at_most_1500_words() {
         if file.extension().is_some_and(|e| e == "md") {
             let text = fs::read_to_string(&file).unwrap();
             // The marks of tables are no words.
-            let words = text.split_whitespace().filter(|w| w.chars().any(char::is_alphanumeric)).count();
+            let words =
+                text.split_whitespace().filter(|w| w.chars().any(char::is_alphanumeric)).count();
             assert!(words <= 1500, "{}: {words} words", file.display());
         }
     }
@@ -181,7 +237,8 @@ fn a_version_of_the_changelog_has_at_most_40_lines() {
     }
 }
 
-/// Terms that pages link to the glossary where they first use them; its other entries are also ordinary words.
+/// Terms that pages link to the glossary where they first use them; its other entries are also
+/// ordinary words.
 const TERMS: [&str; 22] = [
     "canard",
     "captured",
@@ -209,12 +266,14 @@ const TERMS: [&str; 22] = [
 
 /// The prose of a page in one line: no code, tables, headings and pictures.
 fn running_text(text: &str) -> String {
-    let prose = lines(text).filter(|(_, line, code)| !code && !line.starts_with(['#', '|', '!', '<']));
+    let prose =
+        lines(text).filter(|(_, line, code)| !code && !line.starts_with(['#', '|', '!', '<']));
     let joined = prose.flat_map(|(_, line, _)| [line.trim(), " "]).collect::<String>();
     joined.split('`').step_by(2).collect()
 }
 
-/// Where `term`, or its plural, first stands in `text` outside the texts of links, unless a link to the glossary comes before.
+/// Where `term`, or its plural, first stands in `text` outside the texts of links, unless a link to
+/// the glossary comes before.
 fn first_unlinked(text: &str, term: &str) -> bool {
     let (text, term) = (text.to_lowercase(), term.to_lowercase());
     let target = format!("](glossary.md#{})", term.replace(' ', "-"));
@@ -248,12 +307,18 @@ fn terms_are_linked_to_the_glossary_where_they_are_first_used() {
     for (name, text) in pages().iter().filter(|(name, _)| name.starts_with("docs/")) {
         if !["docs/glossary.md", "docs/SUMMARY.md"].contains(&name.as_str()) {
             let text = running_text(text);
-            missing.extend(TERMS.iter().filter(|t| first_unlinked(&text, t)).map(|t| format!("{name}: {t}")));
+            missing.extend(
+                TERMS.iter().filter(|t| first_unlinked(&text, t)).map(|t| format!("{name}: {t}")),
+            );
         }
     }
-    assert!(missing.is_empty(), "link these to docs/glossary.md where they first stand: {missing:#?}");
     assert!(
-        first_unlinked("a canard.", "canard") && !first_unlinked("a [canard](glossary.md#canard), canard", "canard")
+        missing.is_empty(),
+        "link these to docs/glossary.md where they first stand: {missing:#?}"
+    );
+    assert!(
+        first_unlinked("a canard.", "canard")
+            && !first_unlinked("a [canard](glossary.md#canard), canard", "canard")
     );
     assert!(!first_unlinked("[Canards](two-fold.md) and canardly", "canard"));
 }
@@ -261,7 +326,9 @@ fn terms_are_linked_to_the_glossary_where_they_are_first_used() {
 /// Files below a folder that end in one of these extensions; no folder that programs fill.
 fn files_of(folder: &Path, extensions: &[&str], found: &mut Vec<PathBuf>) {
     for path in fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()) {
-        let made = path.file_name().is_none_or(|n| ["target", "node_modules", "__pycache__"].iter().any(|m| n == *m));
+        let made = path
+            .file_name()
+            .is_none_or(|n| ["target", "node_modules", "__pycache__"].iter().any(|m| n == *m));
         if path.is_dir() && !made {
             files_of(&path, extensions, found);
         } else if path.extension().is_some_and(|e| extensions.iter().any(|x| e == *x)) {
@@ -273,14 +340,16 @@ fn files_of(folder: &Path, extensions: &[&str], found: &mut Vec<PathBuf>) {
 #[test]
 fn comments_do_not_begin_in_the_middle_of_a_sentence() {
     let mut files = Vec::new();
-    for folder in ["crates", "src", "figures", "tests", "proofs", "examples", "benches", "python/src"] {
+    for folder in RUST {
         files_of(&root().join(folder), &["rs"], &mut files);
     }
     assert!(files.len() > 200);
     let mut wrong = Vec::new();
     for file in files {
         for (i, line) in fs::read_to_string(&file).unwrap().lines().enumerate() {
-            if line.trim_start().trim_start_matches(['/', '!']).starts_with(" ... ") && line.contains("//") {
+            if line.trim_start().trim_start_matches(['/', '!']).starts_with(" ... ")
+                && line.contains("//")
+            {
                 wrong.push(format!("{}:{}", file.display(), i + 1));
             }
         }
@@ -288,8 +357,8 @@ fn comments_do_not_begin_in_the_middle_of_a_sentence() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
-/// Words of the first versions with a meaning that only their authors knew, and pronouns that stand for a program, a
-/// caller or a user. STYLE: the field's word, and the thing itself.
+/// Words of the first versions with a meaning that only their authors knew, and pronouns that stand
+/// for a program, a caller or a user. STYLE: the field's word, and the thing itself.
 const PRIVATE: [&str; 19] = [
     "desk",
     "bear out",
@@ -321,15 +390,16 @@ const BLESSED: [&str; 2] = ["figures/census/figure.rs", "figures/basin/figure.rs
 /// Whether `text`, in lower case, holds these words, not as a part of longer ones.
 fn says(text: &str, words: &str) -> bool {
     let inside = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || c == '_');
-    text.match_indices(words)
-        .any(|(at, _)| !inside(text[..at].chars().next_back()) && !inside(text[at + words.len()..].chars().next()))
+    text.match_indices(words).any(|(at, _)| {
+        !inside(text[..at].chars().next_back()) && !inside(text[at + words.len()..].chars().next())
+    })
 }
 
-/// Every source and page that people write, by its path from the root: Rust, Python, scripts and Markdown. Not the
-/// texts that name the private words: this file, and the note about them.
+/// Every source and page that people write, by its path from the root: Rust, Python, scripts and
+/// Markdown. Not the texts that name the private words: this file, and the note about them.
 fn texts() -> Vec<(String, String)> {
     let mut files = Vec::new();
-    for folder in ["crates", "src", "figures", "tests", "proofs", "examples", "benches", "fuzz", "python/src"] {
+    for folder in RUST {
         files_of(&root().join(folder), &["rs"], &mut files);
     }
     for folder in ["python", "scripts", "benches", "cluster"] {
@@ -340,8 +410,11 @@ fn texts() -> Vec<(String, String)> {
         let text = fs::read_to_string(&path).unwrap();
         (name, text)
     });
-    let mut all: Vec<_> = named.chain(pages()).filter(|(name, _)| !name.starts_with("target/")).collect();
-    all.retain(|(name, _)| !["tests/it/prose.rs", "notes/words.md", "CHANGELOG.md"].contains(&name.as_str()));
+    let mut all: Vec<_> =
+        named.chain(pages()).filter(|(name, _)| !name.starts_with("target/")).collect();
+    all.retain(|(name, _)| {
+        !["tests/it/prose.rs", "notes/words.md", "CHANGELOG.md"].contains(&name.as_str())
+    });
     all
 }
 
@@ -352,12 +425,15 @@ fn no_text_uses_a_private_word() {
         if BLESSED.contains(&name.as_str()) {
             continue;
         }
-        let parts =
-            name.ends_with("src/lib.rs") || ["docs/architecture.md", "CONTRIBUTING.md"].contains(&name.as_str());
-        // Comments and paragraphs are wrapped: two neighbouring lines are read together, without their marks.
+        let parts = name.ends_with("src/lib.rs")
+            || ["docs/architecture.md", "CONTRIBUTING.md"].contains(&name.as_str());
+        // Comments and paragraphs are wrapped: two neighbouring lines are read together, without
+        // their marks.
         let lines: Vec<String> = text
             .lines()
-            .map(|l| l.trim().trim_start_matches(['/', '!', '#', '>', '*', '-']).trim().to_lowercase())
+            .map(|l| {
+                l.trim().trim_start_matches(['/', '!', '#', '>', '*', '-']).trim().to_lowercase()
+            })
             .collect();
         for (i, line) in lines.iter().enumerate() {
             let next = lines.get(i + 1).map_or("", String::as_str);
@@ -369,7 +445,12 @@ fn no_text_uses_a_private_word() {
                     found.push(format!("{name}:{}: {words:?}", i + 1));
                 }
             }
-            found.extend(PARTS.iter().filter(|w| parts && says(line, w)).map(|w| format!("{name}:{}: {w:?}", i + 1)));
+            found.extend(
+                PARTS
+                    .iter()
+                    .filter(|w| parts && says(line, w))
+                    .map(|w| format!("{name}:{}: {w:?}", i + 1)),
+            );
         }
     }
     assert!(found.is_empty(), "say it in the field's words: {found:#?}");
@@ -378,8 +459,8 @@ fn no_text_uses_a_private_word() {
 
 /// Names of types that once stood for several things.
 const ONE_MEANING: [&str; 14] = [
-    "Alike", "Course", "Desk", "Fate", "Kind", "Panel", "Passage", "Plan", "Plane", "Run", "Settings", "Standing",
-    "Stands", "Monitor",
+    "Alike", "Course", "Desk", "Fate", "Kind", "Panel", "Passage", "Plan", "Plane", "Run",
+    "Settings", "Standing", "Stands", "Monitor",
 ];
 
 #[test]
@@ -387,20 +468,28 @@ fn a_type_name_that_stood_for_several_things_stands_for_one() {
     let mut defined = std::collections::BTreeMap::<&str, Vec<String>>::new();
     for (name, text) in texts().iter().filter(|(name, _)| name.ends_with(".rs")) {
         for line in text.lines() {
-            let mut words = line.split(|c: char| !c.is_alphanumeric() && c != '_').filter(|w| !w.is_empty());
+            let mut words =
+                line.split(|c: char| !c.is_alphanumeric() && c != '_').filter(|w| !w.is_empty());
             // `pub(super) struct Name`: the keyword, then the name.
-            let Some(_) = words.by_ref().take(3).find(|w| ["struct", "enum", "trait", "type"].contains(w)) else {
+            let Some(_) =
+                words.by_ref().take(3).find(|w| ["struct", "enum", "trait", "type"].contains(w))
+            else {
                 continue;
             };
             let code = !line.trim_start().starts_with("//") && !line.contains('"');
-            if let Some(of) = words.next().and_then(|w| ONE_MEANING.iter().find(|m| **m == w)).filter(|_| code) {
+            if let Some(of) =
+                words.next().and_then(|w| ONE_MEANING.iter().find(|m| **m == w)).filter(|_| code)
+            {
                 defined.entry(of).or_default().push(name.clone());
             }
         }
     }
     // `job::Run` is the question of a run.
     for (name, places) in &defined {
-        assert!(*name == "Run" && places == &["crates/job/src/run.rs"], "{name} is defined in {places:?}");
+        assert!(
+            *name == "Run" && places == &["crates/job/src/run.rs"],
+            "{name} is defined in {places:?}"
+        );
     }
     assert_eq!(defined.len(), 1, "the test sees definitions: {defined:?}");
 }

@@ -13,16 +13,23 @@ fn text(path: &str) -> String {
 
 #[test]
 fn golden_table_of_verdicts_is_that_of_the_references() {
-    let manifests: Vec<Manifest> =
-        figures::all().iter().map(|f| Manifest::parse(figures::reference(&f.id).unwrap(), &f.id).unwrap()).collect();
+    let manifests: Vec<Manifest> = figures::all()
+        .iter()
+        .map(|f| Manifest::parse(figures::reference(&f.id).unwrap(), &f.id).unwrap())
+        .collect();
     let written = text("docs/findings.md");
     let table = verdict_table::table(&manifests);
-    assert_eq!(table.lines().filter(|l| l.contains("| agrees |") || l.contains("| differs |")).count(), 11, "{table}");
-    let made =
-        verdict_table::with_table(&written, &table).expect("docs/findings.md has a place for the table of verdicts");
+    assert_eq!(
+        table.lines().filter(|l| l.contains("| agrees |") || l.contains("| differs |")).count(),
+        11,
+        "{table}"
+    );
+    let made = verdict_table::with_table(&written, &table)
+        .expect("docs/findings.md has a place for the table of verdicts");
     assert!(
         made == written,
-        "the table of verdicts in docs/findings.md is not that of figures/*/expected.json; run `twofold bless`:\n{table}"
+        "the table of verdicts in docs/findings.md is not that of figures/*/expected.json; run \
+            `twofold bless`:\n{table}"
     );
 }
 
@@ -84,7 +91,14 @@ fn findings() -> String {
             *page = without(page, capture::BEGIN, capture::END);
         }
     }
-    let pages = [findings, text("docs/theorems.md"), text("docs/differences.md"), census, captures, parameters];
+    let pages = [
+        findings,
+        text("docs/theorems.md"),
+        text("docs/differences.md"),
+        census,
+        captures,
+        parameters,
+    ];
     unwrapped(&pages.join("\n\n")).join("\n")
 }
 
@@ -111,7 +125,10 @@ fn every_number_of_the_findings_is_named_in_the_file_of_numbers() {
             .map(|n| n.trim_matches(['.', ',']))
             .filter(|n| n.bytes().any(|b| b.is_ascii_digit()))
             .collect();
-        assert!(unnamed.is_empty(), "{unnamed:?} are in the findings but not in docs/numbers.toml: {line}");
+        assert!(
+            unnamed.is_empty(),
+            "{unnamed:?} are in the findings but not in docs/numbers.toml: {line}"
+        );
     }
 }
 
@@ -119,15 +136,23 @@ fn every_number_of_the_findings_is_named_in_the_file_of_numbers() {
 fn readme_is_short() {
     let readme = text("README.md");
     assert!(readme.lines().count() <= 120, "{} lines", readme.lines().count());
-    assert!(readme.split_whitespace().count() <= 900, "{} words", readme.split_whitespace().count());
-    let long: Vec<&str> = readme.lines().filter(|l| l.chars().count() > 100 && !l.starts_with("![")).collect();
+    assert!(
+        readme.split_whitespace().count() <= 900,
+        "{} words",
+        readme.split_whitespace().count()
+    );
+    let long: Vec<&str> =
+        readme.lines().filter(|l| l.chars().count() > 100 && !l.starts_with("![")).collect();
     assert!(long.is_empty(), "{long:?}");
 }
 
 #[test]
 fn the_commands_and_tests_behind_the_numbers_exist() {
     let help = |arguments: &[&str]| {
-        let output = std::process::Command::new(env!("CARGO_BIN_EXE_twofold")).args(arguments).output().unwrap();
+        let output = std::process::Command::new(env!("CARGO_BIN_EXE_twofold"))
+            .args(arguments)
+            .output()
+            .unwrap();
         String::from_utf8(output.stdout).unwrap()
     };
     let makefile = text("Makefile");
@@ -135,7 +160,9 @@ fn the_commands_and_tests_behind_the_numbers_exist() {
         assert!(!quotes.is_empty());
         let words: Vec<&str> = command.split_whitespace().collect();
         match words[..] {
-            ["make", target] => assert!(makefile.contains(&format!("\n{target}:")), "no target {target}"),
+            ["make", target] => {
+                assert!(makefile.contains(&format!("\n{target}:")), "no target {target}")
+            }
             ["twofold", sub, ..] => {
                 assert!(help(&["--help"]).contains(&format!("\n  {sub}")), "no command {sub}");
                 let known = help(&[sub, "--help"]);
@@ -162,7 +189,13 @@ fn futures_come_back_as_often_as_the_findings_say() {
     use twofold::job::spec::*;
     use twofold::paper::Reading;
     for (reading, back) in [(Reading::Reconstructed, 40), (Reading::Printed, 35)] {
-        let funnel = FunnelSpec { shortest: 0.1, longest: 3.0, times: 20, horizon: 300.0, until_two_fold: true };
+        let funnel = FunnelSpec {
+            shortest: 0.1,
+            longest: 3.0,
+            times: 20,
+            horizon: 300.0,
+            until_two_fold: true,
+        };
         let run = RunSpec {
             system: reading.caricature().into(),
             switch: SwitchSpec::Filippov { exit: ExitRule::All, funnel: Some(funnel) },
@@ -179,17 +212,24 @@ fn futures_come_back_as_often_as_the_findings_say() {
             schedule: Schedule::default(),
             observe: Observation::Path { chord: 1e-3 },
         };
-        let Data::Funnel { futures, .. } = simulate(&run, &()).unwrap().data else { panic!("a funnel was asked for") };
+        let Data::Funnel { futures, .. } = simulate(&run, &()).unwrap().data else {
+            panic!("a funnel was asked for")
+        };
         let comes_back = |f: &&twofold::job::recording::Future| {
             f.motion.events.iter().any(|e| matches!(e.kind, EventKind::TwoFoldReached { .. }))
         };
         let found = futures.iter().filter(comes_back).count();
         let word = reading.word();
-        let quantity = format!("share of the first visit's futures that come back within 300, {word}");
+        let quantity =
+            format!("share of the first visit's futures that come back within 300, {word}");
         reads.read("3.6", &quantity, found as f64 / futures.len() as f64);
         assert_eq!((found, futures.len()), (back, 40), "{word}");
         // Fig. 4 says so on its face.
-        let fig4 = figures::fig4::figure().pictures.into_iter().find(|p| p.reading == Some(reading)).unwrap();
+        let fig4 = figures::fig4::figure()
+            .pictures
+            .into_iter()
+            .find(|p| p.reading == Some(reading))
+            .unwrap();
         let said = format!("{back} of 40 futures come back within 300;");
         assert!(fig4.panels[0].title.starts_with(&said), "{}", fig4.panels[0].title);
     }

@@ -1,21 +1,24 @@
-//! Systems as data against the same systems as compiled Rust: bit for bit, in every arithmetic, at random points and along orbits.
+//! Systems as data against the same systems as compiled Rust: bit for bit, in every arithmetic, at
+//! random points and along orbits.
 
 use nalgebra::SVector;
 use proptest::prelude::*;
 use twofold::analyse::tangent::Tangent;
 use twofold::integrate::filippov::{self, ExitRule, Side, Trajectory};
 use twofold::integrate::{
-    Dopri5, DriveOptions, Flow, Observer, Schedule, Step, StepCap, Stepper, Taylor, Tolerance, drive,
+    Dopri5, DriveOptions, Flow, Observer, Schedule, Step, StepCap, Stepper, Taylor, Tolerance,
+    drive,
 };
 use twofold::num::series::{Constants, Solution};
 use twofold::num::{Arithmetic, DoubleDouble, Dual, Elementary, Tape};
 use twofold::system::caricature::MinusSign;
 use twofold::system::{
-    Caricature, Compiled, Field, Hysteretic, PiecewiseSmooth, Relaxation, Smoothed, System, Transition, VectorField,
-    Wheel,
+    Caricature, Compiled, Field, Hysteretic, PiecewiseSmooth, Relaxation, Smoothed, System,
+    Transition, VectorField, Wheel,
 };
 
-/// All bits of a number; both zeros of a derivative or low part count as one, because a record leaves out what is multiplied by 0.
+/// All bits of a number; both zeros of a derivative or low part count as one, because a record
+/// leaves out what is multiplied by 0.
 trait Bits: Elementary {
     fn bits(self) -> Vec<u64>;
 }
@@ -131,24 +134,30 @@ proptest! {
     }
 
     #[test]
-    fn records_of_the_smoothed_systems(x in prop::array::uniform3(-2.0..2.0_f64), near in -0.03..0.03_f64) {
+    fn records_of_the_smoothed_systems(x in prop::array::uniform3(-2.0..2.0_f64),
+        near in -0.03..0.03_f64) {
         for transition in TRANSITIONS {
             for x in [x, [near, x[1], x[2]]] {
                 let compiled = Smoothed { system: caricature(), transition, eps: 1e-3 };
-                let record = Field::smoothed(&System::from(caricature()), transition, 1e-3).bind::<3>().unwrap();
+                let record = Field::smoothed(&System::from(caricature()), transition,
+                    1e-3).bind::<3>().unwrap();
                 everywhere(x, &mut |check| check(&mut Whole(&compiled, &record)));
             }
             let compiled = Smoothed { system: Wheel::default(), transition, eps: 1e-3 };
-            let record = Field::smoothed(&System::from(Wheel::default()), transition, 1e-3).bind::<3>().unwrap();
+            let record = Field::smoothed(&System::from(Wheel::default()), transition,
+                1e-3).bind::<3>().unwrap();
             everywhere(x, &mut |check| check(&mut Whole(&compiled, &record)));
         }
     }
 
     #[test]
-    fn records_of_the_hysteretic_system(x in prop::array::uniform3(-2.0..2.0_f64), h in -2e-3..2e-3_f64, phi in 0.0..1.0_f64) {
+    fn records_of_the_hysteretic_system(x in prop::array::uniform3(-2.0..2.0_f64),
+        h in -2e-3..2e-3_f64, phi in 0.0..1.0_f64) {
         for relaxation in [Relaxation::Literal, Relaxation::Single] {
-            let compiled = Hysteretic { system: caricature(), eps: 1e-3, eps_prime: 1e-2, relaxation };
-            let record = Field::hysteretic(&System::from(caricature()), 1e-3, 1e-2, relaxation).bind::<4>().unwrap();
+            let compiled = Hysteretic { system: caricature(), eps: 1e-3, eps_prime: 1e-2,
+                relaxation };
+            let record = Field::hysteretic(&System::from(caricature()), 1e-3, 1e-2,
+                relaxation).bind::<4>().unwrap();
             for first in [x[0], h] {
                 let state = SVector::from([first, x[1], x[2], phi]);
                 prop_assert_eq!(bits(compiled.eval(&state)), bits(record.eval(&state)));
@@ -159,16 +168,20 @@ proptest! {
     }
 
     #[test]
-    fn records_of_the_variational_equation(x in prop::array::uniform3(-2.0..2.0_f64), h in -2e-3..2e-3_f64, v in prop::array::uniform9(-1.0..1.0_f64)) {
+    fn records_of_the_variational_equation(x in prop::array::uniform3(-2.0..2.0_f64),
+        h in -2e-3..2e-3_f64, v in prop::array::uniform9(-1.0..1.0_f64)) {
         let compiled = Smoothed { system: caricature(), transition: Transition::Tanh, eps: 1e-3 };
-        let record = Field::smoothed(&System::from(caricature()), Transition::Tanh, 1e-3).variational(3).bind::<12>().unwrap();
-        let state = SVector::<f64, 12>::from_fn(|i, _| match i { 0 => h, i if i < 3 => x[i], i => v[i - 3] });
+        let record = Field::smoothed(&System::from(caricature()), Transition::Tanh,
+            1e-3).variational(3).bind::<12>().unwrap();
+        let state = SVector::<f64, 12>::from_fn(|i, _| match i { 0 => h, i if i < 3 => x[i],
+            i => v[i - 3] });
         let want: SVector<f64, 12> = Tangent::<_, 3>(&compiled).eval(&state);
         prop_assert_eq!(bits(want.add_scalar(0.0)), bits(record.eval(&state).add_scalar(0.0)));
     }
 
     #[test]
-    fn a_sliding_flow_stays_on_the_surface_and_is_filippovs(y in -2.0..2.0_f64, z in -2.0..2.0_f64) {
+    fn a_sliding_flow_stays_on_the_surface_and_is_filippovs(y in -2.0..2.0_f64,
+        z in -2.0..2.0_f64) {
         use twofold::system::filippov::{lie_derivatives, sliding_field};
         let system = System::builtin("caricature").unwrap();
         let flow = Field::sliding(&system).bind::<4>().unwrap();
@@ -192,7 +205,8 @@ proptest! {
         prop_assert_eq!(back.minus(&x), -forward.minus(&x));
         prop_assert_eq!(back.switching(&x), forward.switching(&x));
         let field = Field::smoothed(&system, Transition::Tanh, 1e-2);
-        prop_assert_eq!(field.reversed().bind::<3>().unwrap().eval(&x), -field.bind::<3>().unwrap().eval(&x));
+        prop_assert_eq!(field.reversed().bind::<3>().unwrap().eval(&x),
+            -field.bind::<3>().unwrap().eval(&x));
     }
 }
 
@@ -238,17 +252,29 @@ fn whole_orbits_are_the_same() {
     let record = Field::smoothed(&system, transition, 1e-3).bind::<3>().unwrap();
     let dopri5 = || Dopri5::<3>::new(TIGHT);
     assert_eq!(orbit(&compiled, start, 500.0, dopri5()), orbit(&record, start, 500.0, dopri5()));
-    assert_eq!(orbit(&compiled, start, 200.0, Taylor::new(TIGHT)), orbit(&record, start, 200.0, Taylor::new(TIGHT)));
+    assert_eq!(
+        orbit(&compiled, start, 200.0, Taylor::new(TIGHT)),
+        orbit(&record, start, 200.0, Taylor::new(TIGHT))
+    );
     let extended = || Taylor::extended(Tolerance { rtol: 1e-20, atol: 1e-20 });
     assert_eq!(orbit(&compiled, start, 50.0, extended()), orbit(&record, start, 50.0, extended()));
 
     let wheel = Smoothed { system: Wheel::default(), transition, eps: 1e-3 };
-    let record = Field::smoothed(&System::from(Wheel::default()), transition, 1e-3).bind::<3>().unwrap();
+    let record =
+        Field::smoothed(&System::from(Wheel::default()), transition, 1e-3).bind::<3>().unwrap();
     let start = [0.69267, 0.0, 0.0];
     assert_eq!(orbit(&wheel, start, 20.0, dopri5()), orbit(&record, start, 20.0, dopri5()));
-    assert_eq!(orbit(&wheel, start, 8.0, Taylor::new(TIGHT)), orbit(&record, start, 8.0, Taylor::new(TIGHT)));
+    assert_eq!(
+        orbit(&wheel, start, 8.0, Taylor::new(TIGHT)),
+        orbit(&record, start, 8.0, Taylor::new(TIGHT))
+    );
 
-    let hysteretic = Hysteretic { system: caricature(), eps: 1e-3, eps_prime: 1e-2, relaxation: Relaxation::Literal };
+    let hysteretic = Hysteretic {
+        system: caricature(),
+        eps: 1e-3,
+        eps_prime: 1e-2,
+        relaxation: Relaxation::Literal,
+    };
     let record = Field::hysteretic(&system, 1e-3, 1e-2, Relaxation::Literal).bind::<4>().unwrap();
     let start = [0.2, 0.0, -1.0, 1.0];
     let dopri5 = || Dopri5::<4>::new(TIGHT);
@@ -260,11 +286,15 @@ fn filippov_motions_are_the_same() {
     let motion = |system: &dyn Fn(&mut Trajectory<3>) -> SVector<f64, 3>| {
         let mut record = Trajectory::new(4);
         let end = system(&mut record);
-        (bits(end), record.events.iter().map(|e| (e.t.to_bits(), bits(e.state))).collect::<Vec<_>>())
+        (
+            bits(end),
+            record.events.iter().map(|e| (e.t.to_bits(), bits(e.state))).collect::<Vec<_>>(),
+        )
     };
     let rule = ExitRule::AfterTime { time: 0.4, side: Side::Plus };
     let (settings, start) = (filippov::FilippovOptions::default(), SVector::from([0.2, 0.0, -1.0]));
-    let compiled = motion(&|r| filippov::run(&caricature(), start, 60.0, &settings, rule, r).unwrap().x);
+    let compiled =
+        motion(&|r| filippov::run(&caricature(), start, 60.0, &settings, rule, r).unwrap().x);
     let bound = System::from(caricature()).bind::<3>().unwrap();
     let record = motion(&|r| filippov::run(&bound, start, 60.0, &settings, rule, r).unwrap().x);
     assert!(compiled.1.len() > 10);
@@ -279,11 +309,13 @@ fn the_fast_path_is_found_by_equations_not_by_name() {
     assert_eq!(System::from(Wheel::default()).compiled(), Some(Compiled::Wheel(Wheel::default())));
     assert_eq!(System::builtin("stick-slip").unwrap().compiled(), None);
     // The same equations under another name, and other equations under the same name.
-    let renamed =
-        twofold::system::library::text("caricature").unwrap().replace("name = \"caricature\"", "name = \"mine\"");
+    let renamed = twofold::system::library::text("caricature")
+        .unwrap()
+        .replace("name = \"caricature\"", "name = \"mine\"");
     let read = |text: &str| System::new(twofold::system::Definition::from_toml(text, "f").unwrap());
     assert!(read(&renamed).compiled().is_some());
-    let changed = twofold::system::library::text("caricature").unwrap().replace("[\"z\", ", "[\"2*z\", ");
+    let changed =
+        twofold::system::library::text("caricature").unwrap().replace("[\"z\", ", "[\"2*z\", ");
     assert_eq!(read(&changed).compiled(), None);
     assert_eq!(read(&changed).name(), "caricature");
 }
@@ -293,15 +325,20 @@ fn systems_come_back_from_json() {
     for name in twofold::system::library::names() {
         let mut system = System::builtin(name).unwrap();
         let parameter = system.parameters().next().unwrap().0.to_string();
-        system =
-            system.with(&parameter, "0.12345678901234567890123".parse::<twofold::num::Decimal>().unwrap()).unwrap();
+        system = system
+            .with(&parameter, "0.12345678901234567890123".parse::<twofold::num::Decimal>().unwrap())
+            .unwrap();
         let json = serde_json::to_string(&system).unwrap();
-        assert!(!json.contains("references") && json.contains("0.12345678901234567890123"), "{json}");
+        assert!(
+            !json.contains("references") && json.contains("0.12345678901234567890123"),
+            "{json}"
+        );
         let back: System = serde_json::from_str(&json).unwrap();
         assert_eq!(back, system, "{name}");
         assert_eq!(back.definition().title(), system.definition().title());
         // A document under a built-in's name with other equations stays what it is.
-        let other: System = serde_json::from_str(&json.replacen("\"h\":\"", "\"h\":\"1 + ", 1)).unwrap();
+        let other: System =
+            serde_json::from_str(&json.replacen("\"h\":\"", "\"h\":\"1 + ", 1)).unwrap();
         assert_ne!(other.canonical(), system.canonical());
     }
 }
@@ -320,8 +357,10 @@ fn parameters_are_checked() {
 
 #[test]
 fn decimal_parameters_reach_extended_precision() {
-    // x' = gamma: with gamma = pi/4 to 36 digits, the series' slope is pi/4 to 31, and to 16 if read as binary.
-    let text = "states = ['x']\nh = 'x'\nplus = ['4*gamma']\nminus = ['1']\n[parameters]\ngamma = '0.785398163397448309615660845819875721'";
+    // x' = gamma: with gamma = pi/4 to 36 digits, the series' slope is pi/4 to 31, and to 16 if
+    // read as binary.
+    let text = "states = ['x']\nh = 'x'\nplus = ['4*gamma']\nminus = ['1']\n[parameters]\ngamma = \
+        '0.785398163397448309615660845819875721'";
     let system = System::new(twofold::system::Definition::from_toml(text, "f").unwrap());
     let field = Field::plus(&system);
     let slope = |constants| {
@@ -343,7 +382,9 @@ fn chain(n: usize) -> String {
     };
     let side = |sign: &str| -> String {
         let all: Vec<String> = (0..n)
-            .flat_map(|i| [format!("\"v{i}\""), format!("\"{}{}\"", force(i), if i == 0 { sign } else { "" })])
+            .flat_map(|i| {
+                [format!("\"v{i}\""), format!("\"{}{}\"", force(i), if i == 0 { sign } else { "" })]
+            })
             .collect();
         all.join(", ")
     };
@@ -357,8 +398,10 @@ fn chain(n: usize) -> String {
 
 #[test]
 fn eight_states_and_more() {
-    let system =
-        System::new(twofold::system::Definition::from_toml(&chain(4), "chain").unwrap_or_else(|e| panic!("{e}")));
+    let system = System::new(
+        twofold::system::Definition::from_toml(&chain(4), "chain")
+            .unwrap_or_else(|e| panic!("{e}")),
+    );
     assert_eq!(system.dimension(), 8);
     let field = Field::smoothed(&system, Transition::Tanh, 1e-2).bind::<8>().unwrap();
     let x0 = SVector::<f64, 8>::from_fn(|i, _| 0.1 * i as f64);

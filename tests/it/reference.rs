@@ -1,5 +1,5 @@
-//! The reference pages of the book, generated from the program: `TWOFOLD_UPDATE=1 cargo test --test it reference::` rewrites them, and
-//! without that variable the test compares.
+//! The reference pages of the book, generated from the program: `TWOFOLD_UPDATE=1 cargo test --test
+//! it reference::` rewrites them, and without that variable the test compares.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -9,7 +9,8 @@ use std::process::Command;
 use clap::Arg;
 use twofold::cli::commands::definition;
 
-const BEGIN: &str = "<!-- made by `TWOFOLD_UPDATE=1 cargo test --test it reference::`; do not edit -->";
+const BEGIN: &str =
+    "<!-- made by `TWOFOLD_UPDATE=1 cargo test --test it reference::`; do not edit -->";
 const END: &str = "<!-- end of what is made -->";
 
 pub fn root() -> &'static Path {
@@ -26,8 +27,10 @@ pub fn hold(page: &str, blocks: &[String]) {
     let mut made = String::new();
     let mut rest = committed.as_str();
     for block in blocks {
-        let (before, after) = rest.split_once(BEGIN).unwrap_or_else(|| panic!("{page}: too few places: {BEGIN}"));
-        let (_, behind) = after.split_once(END).unwrap_or_else(|| panic!("{page}: a place does not end: {END}"));
+        let (before, after) =
+            rest.split_once(BEGIN).unwrap_or_else(|| panic!("{page}: too few places: {BEGIN}"));
+        let (_, behind) =
+            after.split_once(END).unwrap_or_else(|| panic!("{page}: a place does not end: {END}"));
         let _ = write!(made, "{before}{BEGIN}\n\n{}\n\n{END}", block.trim());
         rest = behind;
     }
@@ -35,7 +38,10 @@ pub fn hold(page: &str, blocks: &[String]) {
     if std::env::var_os("TWOFOLD_UPDATE").is_some() {
         fs::write(root().join(page), made).unwrap();
     } else {
-        assert!(made == committed, "{page} is not what the program says: make reference, and look at the difference");
+        assert!(
+            made == committed,
+            "{page} is not what the program says: make reference, and look at the difference"
+        );
     }
 }
 
@@ -47,7 +53,9 @@ fn cell(text: &str) -> String {
 /// "`--eps EPS`".
 fn flag(arg: &Arg) -> String {
     let value = arg.get_action().takes_values().then(|| {
-        let names = arg.get_value_names().map(|n| n.iter().map(ToString::to_string).collect::<Vec<_>>().join(" "));
+        let names = arg
+            .get_value_names()
+            .map(|n| n.iter().map(ToString::to_string).collect::<Vec<_>>().join(" "));
         names.unwrap_or_else(|| arg.get_id().as_str().to_uppercase())
     });
     let value = value.filter(|v| !v.is_empty());
@@ -62,11 +70,13 @@ fn flag(arg: &Arg) -> String {
 pub fn meaning(arg: &Arg) -> String {
     let help = arg.get_long_help().or(arg.get_help()).map(ToString::to_string).unwrap_or_default();
     let mut text = help.trim_end_matches('.').to_owned();
-    let choices: Vec<String> = arg.get_possible_values().iter().map(|v| format!("`{}`", v.get_name())).collect();
+    let choices: Vec<String> =
+        arg.get_possible_values().iter().map(|v| format!("`{}`", v.get_name())).collect();
     if !choices.is_empty() && arg.get_action().takes_values() {
         let _ = write!(text, ": {}", choices.join(", "));
     }
-    let defaults: Vec<String> = arg.get_default_values().iter().map(|v| v.to_string_lossy().into_owned()).collect();
+    let defaults: Vec<String> =
+        arg.get_default_values().iter().map(|v| v.to_string_lossy().into_owned()).collect();
     if !defaults.is_empty() && arg.get_action().takes_values() {
         let _ = write!(text, " [default: {}]", defaults.join(" "));
     }
@@ -103,7 +113,8 @@ fn flags_of_a_run_are_as_the_page_says() {
     }
     let mut text = String::new();
     for heading in headings {
-        let of = flags.iter().filter(|a| a.get_help_heading().unwrap_or("A run from a file") == heading);
+        let of =
+            flags.iter().filter(|a| a.get_help_heading().unwrap_or("A run from a file") == heading);
         let _ = write!(text, "## {heading}\n\n{}\n", flags_table(of));
     }
     hold("docs/run-flags.md", &[text]);
@@ -111,8 +122,19 @@ fn flags_of_a_run_are_as_the_page_says() {
 
 /// Commands that know figures and files, not runs of a system.
 fn of_figures(name: &str) -> bool {
-    !["run", "plot", "orbit", "lyapunov", "rests", "scan", "sensitivities", "sweep", "sweep merge", "new"]
-        .contains(&name)
+    ![
+        "run",
+        "plot",
+        "orbit",
+        "lyapunov",
+        "rests",
+        "scan",
+        "sensitivities",
+        "sweep",
+        "sweep merge",
+        "new",
+    ]
+    .contains(&name)
 }
 
 /// A section for each of these commands.
@@ -151,7 +173,8 @@ fn commands_are_as_the_pages_say() {
     hold("docs/commands-figures.md", &[sections(of_figures)]);
 }
 
-/// A field of a struct in a source file: its name in files, whether it must be given, and its documentation.
+/// A field of a struct in a source file: its name in files, whether it must be given, and its
+/// documentation.
 pub struct Key {
     pub name: String,
     pub needed: bool,
@@ -161,7 +184,8 @@ pub struct Key {
 }
 
 pub fn keys(text: &str, of: &str) -> Vec<Key> {
-    let (_, body) = text.split_once(&format!("struct {of} {{")).unwrap_or_else(|| panic!("no struct {of}"));
+    let (_, body) =
+        text.split_once(&format!("struct {of} {{")).unwrap_or_else(|| panic!("no struct {of}"));
     let (body, _) = body.split_once("\n}").unwrap();
     let (mut about, mut needed, mut renamed) = (String::new(), true, None);
     let mut keys = Vec::new();
@@ -171,13 +195,17 @@ pub fn keys(text: &str, of: &str) -> Vec<Key> {
             about.push(' ');
         } else if let Some(attribute) = line.strip_prefix("#[serde(") {
             needed &= !attribute.contains("default");
-            renamed = attribute.split_once("rename = \"").and_then(|(_, r)| r.split('"').next()).map(str::to_owned);
+            renamed = attribute
+                .split_once("rename = \"")
+                .and_then(|(_, r)| r.split('"').next())
+                .map(str::to_owned);
         } else if let Some((name, rest)) = line.split_once(':') {
             let of_type = rest.trim().trim_end_matches(',').to_owned();
             needed &= !of_type.starts_with("Option<");
             assert!(!about.is_empty(), "{of}: {name} has no documentation");
-            let name =
-                renamed.take().unwrap_or_else(|| name.trim_start_matches("pub ").trim_start_matches("r#").to_owned());
+            let name = renamed.take().unwrap_or_else(|| {
+                name.trim_start_matches("pub ").trim_start_matches("r#").to_owned()
+            });
             keys.push(Key { name, needed, about: cell(&about), of: of_type });
             (about, needed) = (String::new(), true);
         }
@@ -248,16 +276,35 @@ fn functions() -> String {
     let text = source("crates/system/src/expression.rs");
     let about = |of: &str, variant: String| {
         let (_, body) = text.split_once(&format!("pub enum {of} {{")).unwrap();
-        let at = body.find(&format!("    {variant},\n")).unwrap_or_else(|| panic!("no {of}::{variant}"));
-        let doc: Vec<&str> = body[..at].lines().rev().map_while(|l| l.trim().strip_prefix("/// ")).collect::<Vec<_>>();
-        cell(&doc.into_iter().rev().collect::<Vec<_>>().join(" ").replace("[`Function::Ln`]", "`ln`"))
+        let at =
+            body.find(&format!("    {variant},\n")).unwrap_or_else(|| panic!("no {of}::{variant}"));
+        let doc: Vec<&str> = body[..at]
+            .lines()
+            .rev()
+            .map_while(|l| l.trim().strip_prefix("/// "))
+            .collect::<Vec<_>>();
+        cell(
+            &doc.into_iter()
+                .rev()
+                .collect::<Vec<_>>()
+                .join(" ")
+                .replace("[`Function::Ln`]", "`ln`"),
+        )
     };
     let mut block = String::from("| function | of | meaning |\n|---|---|---|\n");
     for (name, function) in Function::ALL {
-        let _ = writeln!(block, "| `{name}` | any system | {} |", about("Function", format!("{function:?}")));
+        let _ = writeln!(
+            block,
+            "| `{name}` | any system | {} |",
+            about("Function", format!("{function:?}"))
+        );
     }
     for (name, function, _) in General::ALL {
-        let _ = writeln!(block, "| `{name}` | general systems | {} |", about("General", format!("{function:?}")));
+        let _ = writeln!(
+            block,
+            "| `{name}` | general systems | {} |",
+            about("General", format!("{function:?}"))
+        );
     }
     block
 }
@@ -273,7 +320,12 @@ fn exit_codes_are_as_the_page_says() {
         match (line.strip_prefix("/// "), line.split_once(" = ")) {
             (Some(doc), _) => about = format!("{about} {doc}"),
             (None, Some((_, code))) => {
-                let _ = writeln!(block, "| {} | {} |", code.trim_end_matches(','), cell(about.trim_end_matches('.')));
+                let _ = writeln!(
+                    block,
+                    "| {} | {} |",
+                    code.trim_end_matches(','),
+                    cell(about.trim_end_matches('.'))
+                );
                 about.clear();
             }
             _ => {}
@@ -283,7 +335,11 @@ fn exit_codes_are_as_the_page_says() {
 }
 
 fn twofold(folder: &Path, arguments: &[&str]) -> std::process::Output {
-    Command::new(env!("CARGO_BIN_EXE_twofold")).args(arguments).current_dir(folder).output().unwrap()
+    Command::new(env!("CARGO_BIN_EXE_twofold"))
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .unwrap()
 }
 
 /// What each column holds. A column without a line here fails the test.
@@ -296,21 +352,28 @@ const COLUMNS: [(&str, &str); 46] = [
     ("direction", "`up` or `down`: the way in which the section is crossed"),
     (
         "mode",
-        "`plus` or `minus` in that field, `sliding-attracting` or `sliding-repelling` on the surface; of a general system the mode's name",
+        "`plus` or `minus` in that field, `sliding-attracting` or `sliding-repelling` on the \
+            surface; of a general system the mode's name",
     ),
     (
         "signs",
-        "a character for each switching function: `+`, `-`, `0` where motion slides on its zero, `#` for `floor` and `mod`, `.` where it decides nothing; the fact `signs` names the functions",
+        "a character for each switching function: `+`, `-`, `0` where motion slides on its zero, \
+            `#` for `floor` and `mod`, `.` where it decides nothing; the fact `signs` names the \
+            functions",
     ),
     ("piece", "number of the piece of the motion between two events"),
     (
         "event",
-        "what happens, such as `crossing`, `landing`, `two-fold-reached`, `exit`; of a general system the event's name, before and after its reset",
+        "what happens, such as `crossing`, `landing`, `two-fold-reached`, `exit`; of a general \
+            system the event's name, before and after its reset",
     ),
     ("from", "the mode before the event"),
     ("to", "the mode behind it"),
     ("side", "the side from which the motion comes (landing, grazing) or to which it goes"),
-    ("leg", "duration of the last stretch into a two-fold or an accumulation, which a formula gives"),
+    (
+        "leg",
+        "duration of the last stretch into a two-fold or an accumulation, which a formula gives",
+    ),
     ("error", "estimated error of the arrival at a two-fold"),
     ("time", "at an exit: for how long the motion slid where the surface repels"),
     ("arc", "at an exit: the length of that path"),
@@ -320,7 +383,10 @@ const COLUMNS: [(&str, &str); 46] = [
     ("exit_side", "the side to which it leaves"),
     ("key", "the leading 60 bits of the digest of the row's question"),
     ("outcome", "what the run ends on ([the words](sweeps.md#a-row))"),
-    ("period", "of a sweep: returns to the section in one period; of a closed orbit: its period, as time"),
+    (
+        "period",
+        "of a sweep: returns to the section in one period; of a closed orbit: its period, as time",
+    ),
     ("captured_at", "from this time on the run only turns around one periodic orbit"),
     ("settled_at", "from this time on it is within tolerance of the orbit"),
     ("radius", "distance of the last returns from the orbit"),
@@ -348,22 +414,39 @@ const COLUMNS: [(&str, &str); 46] = [
 #[test]
 fn columns_are_as_the_page_says() {
     let folder = tempfile::tempdir().unwrap();
-    let general = "states = ['x']\nstart = [0]\n[modes.a]\nf = ['1 + sign(x - 2)']\n[modes.b]\nf = ['1']\n[[event]]\nwhen = 'x'\n";
+    let general = "states = ['x']\nstart = [0]\n[modes.a]\nf = ['1 + sign(x - 2)']\n[modes.b]\nf = \
+        ['1']\n[[event]]\nwhen = 'x'\n";
     fs::write(folder.path().join("general.toml"), general).unwrap();
     let filippov = ["--switch", "filippov", "--exit", "after-time:0.3:plus"];
     let cases: Vec<(&str, Vec<&str>)> = vec![
         ("`twofold run`", vec!["run", "--t-end", "1"]),
         ("`twofold run --section`", vec!["run", "--t-end", "3", "--section", "y=0"]),
-        ("`twofold run --switch hysteretic`", vec!["run", "--t-end", "0.1", "--switch", "hysteretic"]),
+        (
+            "`twofold run --switch hysteretic`",
+            vec!["run", "--t-end", "0.1", "--switch", "hysteretic"],
+        ),
         ("`twofold run --switch filippov`", [&["run", "--t-end", "3"][..], &filippov].concat()),
-        ("`twofold run`, a general system", vec!["run", "--t-end", "1", "--system", "general.toml"]),
+        (
+            "`twofold run`, a general system",
+            vec!["run", "--t-end", "1", "--system", "general.toml"],
+        ),
         (
             "`twofold run --section`, a general system",
             vec!["run", "--t-end", "1", "--system", "general.toml", "--section", "x=0.5"],
         ),
         (
             "`twofold orbit`",
-            vec!["orbit", "--system", "stick-slip", "--switch", "filippov", "--section", "v=0", "--format", "csv"],
+            vec![
+                "orbit",
+                "--system",
+                "stick-slip",
+                "--switch",
+                "filippov",
+                "--section",
+                "v=0",
+                "--format",
+                "csv",
+            ],
         ),
         (
             "`twofold orbit --along`",
@@ -386,10 +469,23 @@ fn columns_are_as_the_page_says() {
             ],
         ),
         ("`twofold sweep`", vec!["sweep", "--t-end", "1", "--over", "eps=1e-2,2e-2"]),
-        ("`twofold scan`, one setting", vec!["scan", "--t-end", "1", "--section", "y=0", "--over", "eps=1e-2,2e-2"]),
+        (
+            "`twofold scan`, one setting",
+            vec!["scan", "--t-end", "1", "--section", "y=0", "--over", "eps=1e-2,2e-2"],
+        ),
         (
             "`twofold scan`, two settings",
-            vec!["scan", "--t-end", "1", "--section", "y=0", "--over", "start.x=1,2", "--over", "start.y=1,2"],
+            vec![
+                "scan",
+                "--t-end",
+                "1",
+                "--section",
+                "y=0",
+                "--over",
+                "start.x=1,2",
+                "--over",
+                "start.y=1,2",
+            ],
         ),
     ];
     let mut block = String::new();
@@ -433,7 +529,8 @@ fn columns_are_as_the_page_says() {
         }
     }
     assert!(missing.is_empty(), "columns without a meaning in COLUMNS: {missing:#?}");
-    let unused: Vec<&str> = COLUMNS.iter().map(|c| c.0).filter(|c| !used.iter().any(|u| u == c)).collect();
+    let unused: Vec<&str> =
+        COLUMNS.iter().map(|c| c.0).filter(|c| !used.iter().any(|u| u == c)).collect();
     assert!(unused.is_empty(), "no table has {unused:?}");
     hold("docs/columns.md", &[block]);
 }
@@ -452,7 +549,8 @@ fn literals(source: &str) -> Vec<Literal> {
     let (mut i, mut depth) = (0, 0);
     let mut attribute: Option<String> = None;
     let mut found = Vec::new();
-    let begins = |i: usize, with: &str| with.chars().enumerate().all(|(k, w)| c.get(i + k) == Some(&w));
+    let begins =
+        |i: usize, with: &str| with.chars().enumerate().all(|(k, w)| c.get(i + k) == Some(&w));
     while i < c.len() {
         if begins(i, "//") {
             while i < c.len() && c[i] != '\n' {
@@ -460,12 +558,14 @@ fn literals(source: &str) -> Vec<Literal> {
             }
         } else if begins(i, "#[") || begins(i, "#![") {
             let start = i + if c[i + 1] == '!' { 3 } else { 2 };
-            attribute = Some(c[start..].iter().take_while(|c| c.is_alphanumeric() || **c == '_').collect());
+            attribute =
+                Some(c[start..].iter().take_while(|c| c.is_alphanumeric() || **c == '_').collect());
             (i, depth) = (start, 1);
         } else if begins(i, "r#\"") {
             let start = i + 3;
             i = (start..c.len()).find(|k| begins(*k, "\"#")).unwrap();
-            found.push(Literal { text: c[start..i].iter().collect(), attribute: attribute.clone() });
+            found
+                .push(Literal { text: c[start..i].iter().collect(), attribute: attribute.clone() });
             i += 2;
         } else if c[i] == '\'' {
             // A character, or the name of a lifetime.
@@ -513,10 +613,15 @@ fn literals(source: &str) -> Vec<Literal> {
 
 #[test]
 fn literals_are_found() {
-    let source = "#[error(\"no \\\"{0}\\\" \\\n    here\")]\n// \"not\"\nfn f<'a>() { g('\"', '\\'', r#\"raw \"x\"\"#, \"b\"); }\n#[cfg(test)] \"no\"";
-    let found: Vec<(String, Option<String>)> = literals(source).into_iter().map(|l| (l.text, l.attribute)).collect();
+    let source = "#[error(\"no \\\"{0}\\\" \\\n    here\")]\n// \"not\"\nfn f<'a>() { g('\"', \
+        '\\'', r#\"raw \"x\"\"#, \"b\"); }\n#[cfg(test)] \"no\"";
+    let found: Vec<(String, Option<String>)> =
+        literals(source).into_iter().map(|l| (l.text, l.attribute)).collect();
     let expected = [("no \"{0}\" here", Some("error")), ("raw \"x\"", None), ("b", None)];
-    assert_eq!(found, expected.map(|(text, attribute)| (text.to_owned(), attribute.map(str::to_owned))));
+    assert_eq!(
+        found,
+        expected.map(|(text, attribute)| (text.to_owned(), attribute.map(str::to_owned)))
+    );
 }
 
 /// Rust files in a folder, with its folders, in order.
@@ -555,7 +660,8 @@ fn filled(text: &str) -> String {
 
 /// Whether something is said besides what is filled in.
 fn says_something(text: &str) -> bool {
-    text.split_whitespace().filter(|w| w.chars().filter(|c| c.is_alphabetic()).count() > 1).count() >= 3
+    text.split_whitespace().filter(|w| w.chars().filter(|c| c.is_alphabetic()).count() > 1).count()
+        >= 3
 }
 
 #[test]

@@ -1,4 +1,5 @@
-//! The report: a page, its twin for programs, and metadata for archives, made from real (short) runs.
+//! The report: a page, its twin for programs, and metadata for archives, made from real (short)
+//! runs.
 
 use crate::common;
 
@@ -51,7 +52,13 @@ impl Bench {
     /// Runs the command; its standard output.
     fn run(&self, more: &[&str]) -> String {
         let (made, expected) = (self.made(), self.expected());
-        let mut all = vec!["report", "--figures", made.to_str().unwrap(), "--expected", expected.to_str().unwrap()];
+        let mut all = vec![
+            "report",
+            "--figures",
+            made.to_str().unwrap(),
+            "--expected",
+            expected.to_str().unwrap(),
+        ];
         all.extend(more);
         let output = twofold(&all);
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -65,7 +72,11 @@ impl Bench {
     fn report(&self) -> Report {
         let known = twofold::paper::figures::all();
         assemble(
-            &visit_tree(&self.made(), &|_| true, &|path, place| MadeFile::read(path, place, &known)).unwrap().0,
+            &visit_tree(&self.made(), &|_| true, &|path, place| {
+                MadeFile::read(path, place, &known)
+            })
+            .unwrap()
+            .0,
             &read_tree(&self.expected(), &|_| true).unwrap().files,
             &Program {
                 figures: &known,
@@ -104,7 +115,10 @@ fn sound(html: &str) {
         }
         for attribute in ["src", "href"] {
             if let Some(address) = element.attribute(attribute) {
-                assert!(!address.contains("//") || address.starts_with("data:"), "{address} leads out of the folder");
+                assert!(
+                    !address.contains("//") || address.starts_with("data:"),
+                    "{address} leads out of the folder"
+                );
             }
         }
     }
@@ -120,11 +134,19 @@ fn sound(html: &str) {
         }
         match name(element).as_str() {
             "img" => {
-                assert!(element.attribute("alt").is_some_and(|a| a.len() > 10), "a picture without a text");
-                assert!(element.attribute("src").unwrap().starts_with("data:image/png;base64,iVBOR"));
+                assert!(
+                    element.attribute("alt").is_some_and(|a| a.len() > 10),
+                    "a picture without a text"
+                );
+                assert!(
+                    element.attribute("src").unwrap().starts_with("data:image/png;base64,iVBOR")
+                );
             }
             "th" => assert!(element.attribute("scope").is_some(), "a heading cell without scope"),
-            "table" => assert!(element.children().any(|c| name(&c) == "caption"), "a table without caption"),
+            "table" => assert!(
+                element.children().any(|c| name(&c) == "caption"),
+                "a table without caption"
+            ),
             "h1" | "h2" | "h3" | "h4" => {
                 let here: u32 = name(element)[1..].parse().unwrap();
                 assert!(here <= level + 1, "heading {here} follows heading {level}");
@@ -144,9 +166,11 @@ fn the_page_is_sound_and_self_contained() {
     let html = bench.read("index.html");
     sound(&html);
     // The checker checks.
-    for (good, bad) in
-        [(" alt=\"", " title=\""), ("<th scope=\"col\"", "<th class=\"col\""), ("id=\"claims\"", "id=\"summary\"")]
-    {
+    for (good, bad) in [
+        (" alt=\"", " title=\""),
+        ("<th scope=\"col\"", "<th class=\"col\""),
+        ("id=\"claims\"", "id=\"summary\""),
+    ] {
         let broken = html.replacen(good, bad, 1);
         assert_ne!(broken, html, "{good} is not on the page");
         assert!(std::panic::catch_unwind(|| sound(&broken)).is_err(), "{bad} was not noticed");
@@ -175,9 +199,14 @@ fn what_it_says_is_what_the_records_say() {
     assert_eq!(report["summary"]["same"], 2);
     assert_eq!(report["problems"], serde_json::json!([]));
     for reading in ["printed", "reconstructed"] {
-        let record: Value = serde_json::from_str(&bench.read(&format!("fig7/fig7-{reading}.json"))).unwrap();
-        let picture =
-            report["figures"][0]["pictures"].as_array().unwrap().iter().find(|p| p["reading"] == reading).unwrap();
+        let record: Value =
+            serde_json::from_str(&bench.read(&format!("fig7/fig7-{reading}.json"))).unwrap();
+        let picture = report["figures"][0]["pictures"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .find(|p| p["reading"] == reading)
+            .unwrap();
         assert_eq!(picture["hashes"], record["hashes"]);
         assert_eq!(picture["panels"][1]["statistics"], record["panels"][1]["statistics"]);
         assert_eq!(picture["panels"][1]["run"], record["panels"][1]["run"]);
@@ -185,8 +214,12 @@ fn what_it_says_is_what_the_records_say() {
             assert!(html.contains(record["hashes"][hash].as_str().unwrap()));
         }
         let verdicts = record["verdicts"].as_array().unwrap();
-        let summary =
-            report["summary"]["readings"].as_array().unwrap().iter().find(|r| r["reading"] == reading).unwrap();
+        let summary = report["summary"]["readings"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .find(|r| r["reading"] == reading)
+            .unwrap();
         assert_eq!(summary["claims"], verdicts.len());
         assert_eq!(summary["agree"], verdicts.iter().filter(|v| v["agrees"] == true).count());
     }
@@ -194,7 +227,8 @@ fn what_it_says_is_what_the_records_say() {
     let all: Value = serde_json::from_str(&bench.read("verdicts.json")).unwrap();
     let mut recorded = Vec::new();
     for reading in ["printed", "reconstructed"] {
-        let record: Value = serde_json::from_str(&bench.read(&format!("fig7/fig7-{reading}.json"))).unwrap();
+        let record: Value =
+            serde_json::from_str(&bench.read(&format!("fig7/fig7-{reading}.json"))).unwrap();
         recorded.extend(record["verdicts"].as_array().unwrap().clone());
     }
     assert!(!recorded.is_empty());
@@ -262,7 +296,9 @@ fn spoil(png: &Path) -> u64 {
 fn a_mismatch_shows_ours_difference_and_theirs() {
     let bench = Bench::new();
     let changed = spoil(&bench.expected().join("fig7/fig7-printed.png"));
-    bench.edit(&bench.expected().join("fig7/expected.json"), |m| m["pictures"][0]["pixels"] = "0".repeat(64).into());
+    bench.edit(&bench.expected().join("fig7/expected.json"), |m| {
+        m["pictures"][0]["pixels"] = "0".repeat(64).into()
+    });
     let said = bench.run(&[]);
     assert!(said.contains("1 of 2 pictures match"), "{said}");
     let report: Value = serde_json::from_str(&bench.read("report.json")).unwrap();
@@ -274,7 +310,8 @@ fn a_mismatch_shows_ours_difference_and_theirs() {
     let html = bench.read("index.html");
     sound(&html);
     let document = parse(&html);
-    let boxes: Vec<_> = document.descendants().filter(|n| n.has_attribute("data-triptych")).collect();
+    let boxes: Vec<_> =
+        document.descendants().filter(|n| n.has_attribute("data-triptych")).collect();
     assert_eq!(boxes.len(), 1);
     let texts: Vec<String> = boxes[0]
         .descendants()
@@ -282,22 +319,30 @@ fn a_mismatch_shows_ours_difference_and_theirs() {
         .map(|n| n.text().unwrap().to_owned())
         .collect();
     assert_eq!(texts, ["Ours", "Difference", "Reference"]);
-    let sources: BTreeSet<&str> = boxes[0].descendants().filter_map(|n| n.attribute("src")).collect();
+    let sources: BTreeSet<&str> =
+        boxes[0].descendants().filter_map(|n| n.attribute("src")).collect();
     assert_eq!(sources.len(), 3, "three different pictures");
-    let notice = document.descendants().find(|n| n.attribute("data-mismatch") == Some("fig7-printed")).unwrap();
-    let words: String = notice.descendants().filter_map(|n| n.text().filter(|_| n.is_text())).collect();
+    let notice = document
+        .descendants()
+        .find(|n| n.attribute("data-mismatch") == Some("fig7-printed"))
+        .unwrap();
+    let words: String =
+        notice.descendants().filter_map(|n| n.text().filter(|_| n.is_text())).collect();
     for word in ["pixels", &changed.to_string(), "RMS", "SSIM"] {
         assert!(words.contains(word), "no {word} in: {words}");
     }
 }
 
-/// What a referee looks for: findings in sentences, rules with every threshold, how it was made, how to cite; and a page that is light.
+/// What a referee looks for: findings in sentences, rules with every threshold, how it was made,
+/// how to cite; and a page that is light.
 #[test]
 fn a_referee_finds_findings_rules_making_and_citation() {
     let bench = Bench::new();
     let making = serde_json::json!({ "format": "twofold-making", "version": 1, "runs": [{
-        "figures": ["fig7"], "program": "twofold 9.9.9", "commit": "0123abcd", "compiler": "rustc 1", "target": "here", "profile": "release",
-        "threads": 3, "store": false, "seconds": 12.345, "computed": [{ "what": "fig7 <b>", "seconds": 11.5 }],
+        "figures": ["fig7"], "program": "twofold 9.9.9", "commit": "0123abcd",
+            "compiler": "rustc 1", "target": "here", "profile": "release",
+        "threads": 3, "store": false, "seconds": 12.345, "computed": [{ "what": "fig7 <b>",
+            "seconds": 11.5 }],
     }]});
     fs::write(bench.made().join("making.json"), making.to_string()).unwrap();
     bench.run(&[]);
@@ -305,7 +350,8 @@ fn a_referee_finds_findings_rules_making_and_citation() {
     sound(&html);
     let document = parse(&html);
     let text = |id: &str| -> String {
-        let section = document.descendants().find(|n| n.attribute("aria-labelledby") == Some(id)).unwrap();
+        let section =
+            document.descendants().find(|n| n.attribute("aria-labelledby") == Some(id)).unwrap();
         section.descendants().filter_map(|n| n.text().filter(|_| n.is_text())).collect()
     };
     let record: Value = serde_json::from_str(&bench.read("fig7/fig7-printed.json")).unwrap();
@@ -317,12 +363,22 @@ fn a_referee_finds_findings_rules_making_and_citation() {
     );
     assert!(text("findings").contains(&said), "{said} is not in: {}", text("findings"));
     assert!(text("findings").contains("Each visit to the singularity costs digits."));
-    let odds = document.descendants().find(|n| n.attribute("aria-labelledby") == Some("odds")).unwrap();
-    let tables: Vec<_> =
-        odds.descendants().filter(|n| n.has_tag_name(("http://www.w3.org/1999/xhtml", "table"))).collect();
+    let odds =
+        document.descendants().find(|n| n.attribute("aria-labelledby") == Some("odds")).unwrap();
+    let tables: Vec<_> = odds
+        .descendants()
+        .filter(|n| n.has_tag_name(("http://www.w3.org/1999/xhtml", "table")))
+        .collect();
     let rows = ODDS.lines().filter(|l| l.starts_with('|') && !l.starts_with("|---"));
-    let shown = odds.descendants().filter(|n| n.has_tag_name(("http://www.w3.org/1999/xhtml", "tr"))).count();
-    assert!(tables.len() >= 2 && shown == rows.count(), "{} tables with {shown} rows", tables.len());
+    let shown = odds
+        .descendants()
+        .filter(|n| n.has_tag_name(("http://www.w3.org/1999/xhtml", "tr")))
+        .count();
+    assert!(
+        tables.len() >= 2 && shown == rows.count(),
+        "{} tables with {shown} rows",
+        tables.len()
+    );
     let thresholds = verdict["evidence"]["section"]["thresholds"].as_object().unwrap();
     for (name, value) in thresholds {
         assert!(
@@ -330,7 +386,15 @@ fn a_referee_finds_findings_rules_making_and_citation() {
             "{name} = {value}"
         );
     }
-    for word in ["twofold 9.9.9", "0123abcd", "rustc 1", "here, profile release", "12.3 s", "fig7 <b>", "11.50"] {
+    for word in [
+        "twofold 9.9.9",
+        "0123abcd",
+        "rustc 1",
+        "here, profile release",
+        "12.3 s",
+        "fig7 <b>",
+        "11.50",
+    ] {
         assert!(text("making").contains(word), "no {word} in: {}", text("making"));
     }
     for word in [
@@ -392,7 +456,9 @@ fn files_that_are_not_what_the_record_says_are_named() {
     assert_eq!(state("fig7-printed-ii.csv"), "changed since it was made");
     assert_eq!(state("fig7-printed-i.csv"), "as recorded");
     assert_eq!(state("fig7-reconstructed.svg"), "as recorded");
-    for damaged in ["fig7-printed.pdf: not there", "fig7-printed.svg: changed", "fig7-printed-ii.csv: changed"] {
+    for damaged in
+        ["fig7-printed.pdf: not there", "fig7-printed.svg: changed", "fig7-printed-ii.csv: changed"]
+    {
         assert!(report.problems.iter().any(|p| p.contains(damaged)), "{:?}", report.problems);
     }
     // A file that was changed is not the reference, whatever its record says.
@@ -405,7 +471,8 @@ fn altered_pictures_are_shown_and_not_counted() {
     let bench = Bench::new();
     let rename = |ending: &str| {
         let from = bench.made().join("fig7").join(format!("fig7-printed{ending}"));
-        fs::rename(from, bench.made().join("fig7").join(format!("fig7-printed-shortened{ending}"))).unwrap();
+        fs::rename(from, bench.made().join("fig7").join(format!("fig7-printed-shortened{ending}")))
+            .unwrap();
     };
     [".png", ".svg", ".pdf", ".json", "-i.csv", "-ii.csv"].iter().for_each(|ending| rename(ending));
     bench.edit(&bench.made().join("fig7/fig7-printed-shortened.json"), |r| {
@@ -415,7 +482,11 @@ fn altered_pictures_are_shown_and_not_counted() {
     let report = bench.report();
     assert_eq!((report.summary.pictures, report.summary.same, report.summary.altered), (1, 1, 1));
     assert_eq!(report.summary.readings.len(), 1);
-    assert!(report.problems.iter().any(|p| p.contains("fig7-printed.png: not made")), "{:?}", report.problems);
+    assert!(
+        report.problems.iter().any(|p| p.contains("fig7-printed.png: not made")),
+        "{:?}",
+        report.problems
+    );
     let html = String::from_utf8(page(&report, Links::Beside)).unwrap();
     assert!(html.contains("Not the published picture: shortened: t = 60 instead of 200000"));
     sound(&html);
@@ -444,7 +515,11 @@ fn other_files_in_the_folder_do_no_harm() {
     assert_eq!(ids, ["fig7", "lottery"]);
     assert_eq!(report.figures[1].unrecorded.len(), 1);
     assert_eq!(report.problems.len(), 2, "{:?}", report.problems);
-    let extra = report.figures[0].pictures[0].files.iter().find(|f| f.path == "fig7/fig7-printed-lottery.csv").unwrap();
+    let extra = report.figures[0].pictures[0]
+        .files
+        .iter()
+        .find(|f| f.path == "fig7/fig7-printed-lottery.csv")
+        .unwrap();
     assert_eq!((extra.integrity.words(), extra.panel.as_deref()), ("no hash recorded", None));
     assert_eq!(report.summary.damaged_files, 0);
     let html = String::from_utf8(page(&report, Links::None)).unwrap();
@@ -457,10 +532,14 @@ fn other_files_in_the_folder_do_no_harm() {
 fn the_twin_follows_its_schema() {
     let bench = Bench::new();
     spoil(&bench.expected().join("fig7/fig7-printed.png"));
-    bench.edit(&bench.expected().join("fig7/expected.json"), |m| m["pictures"][0]["pixels"] = "0".repeat(64).into());
+    bench.edit(&bench.expected().join("fig7/expected.json"), |m| {
+        m["pictures"][0]["pixels"] = "0".repeat(64).into()
+    });
     fs::remove_file(bench.made().join("fig7/fig7-reconstructed.svg")).unwrap();
     bench.run(&[]);
-    let text = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/schemas/report.schema.json")).unwrap();
+    let text =
+        fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/schemas/report.schema.json"))
+            .unwrap();
     let rules: Value = serde_json::from_str(&text).unwrap();
     let report: Value = serde_json::from_str(&bench.read("report.json")).unwrap();
     assert_eq!(schema::violations(&rules, &report), Vec::<String>::new());
@@ -475,7 +554,9 @@ fn the_twin_follows_its_schema() {
     spoilt(&|r| drop(r.as_object_mut().unwrap().remove("summary")));
     spoilt(&|r| r["figures"][0]["pictures"][0]["hashes"]["png"] = "abc".into());
     spoilt(&|r| r["figures"][0]["pictures"][0]["reference"]["state"] = "same".into());
-    spoilt(&|r| r["figures"][0]["pictures"][0]["reference"]["comparison"]["changed_share"] = 2.0.into());
+    spoilt(&|r| {
+        r["figures"][0]["pictures"][0]["reference"]["comparison"]["changed_share"] = 2.0.into()
+    });
     spoilt(&|r| r["figures"][0]["pictures"][0]["panels"][0]["statistics"]["steps"] = (-1).into());
     spoilt(&|r| r["figures"][0]["pictures"][0]["verdicts"][0]["agrees"] = "yes".into());
 }
@@ -498,7 +579,9 @@ fn the_archive_metadata_describe_the_folder_as_it_is() {
     fn references<'a>(value: &'a Value, into: &mut Vec<&'a str>) {
         match value {
             Value::Array(items) => items.iter().for_each(|v| references(v, into)),
-            Value::Object(map) if map.len() == 1 && map.contains_key("@id") => into.push(map["@id"].as_str().unwrap()),
+            Value::Object(map) if map.len() == 1 && map.contains_key("@id") => {
+                into.push(map["@id"].as_str().unwrap())
+            }
             Value::Object(map) => map.values().for_each(|v| references(v, into)),
             _ => {}
         }

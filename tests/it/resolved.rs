@@ -1,5 +1,5 @@
-//! The census by methods that resolve the layer: docs/resolved.md says what figures/resolved says. `TWOFOLD_UPDATE=1 cargo test --test it resolved::` writes
-//! the texts anew.
+//! The census by methods that resolve the layer: docs/resolved.md says what figures/resolved says.
+//! `TWOFOLD_UPDATE=1 cargo test --test it resolved::` writes the texts anew.
 
 use twofold::job::table::{Entry, Table};
 use twofold::paper::census::PANELS;
@@ -33,20 +33,26 @@ fn the_page_says_what_the_runs_say() {
         .into_iter()
         .map(|reading| {
             let alpha = || vec![("params.alpha", Entry::Number(reading.caricature().alpha))];
-            let tight = census::runs(&table(&format!("capture/taylor-{}", reading.word())), &alpha());
+            let tight =
+                census::runs(&table(&format!("capture/taylor-{}", reading.word())), &alpha());
             (reading, PANELS[2].runs(&taylor[0], alpha()), tight)
         })
         .collect();
     let texts = [
         resolved::outcomes_text(&against_lsoda, rules),
         resolved::kinds_text(&against_lsoda, ["LSODA", "Taylor 10⁻¹³"], rules),
-        resolved::kinds_text(&compared(&taylor, &layered), ["Taylor 10⁻¹³", "layered 10⁻¹³"], rules),
+        resolved::kinds_text(
+            &compared(&taylor, &layered),
+            ["Taylor 10⁻¹³", "layered 10⁻¹³"],
+            rules,
+        ),
         resolved::tolerance_text(&tolerances, rules),
     ];
     page_says("docs/resolved.md", resolved::BEGIN, resolved::END, &texts);
 }
 
-/// No start is shared with LSODA or between methods, as the rules have it; fig. 7 and 8 share none either.
+/// No start is shared with LSODA or between methods, as the rules have it; fig. 7 and 8 share none
+/// either.
 #[test]
 fn no_two_samples_share_a_start() {
     share_no_start(&["census/fig7", "resolved/taylor7", "resolved/taylor8", "resolved/layered7"]);
@@ -55,21 +61,33 @@ fn no_two_samples_share_a_start() {
 /// Rows that are quick, computed anew: the same to the last bit.
 #[test]
 fn committed_rows_come_out_the_same() {
-    come_out_the_same(&[("resolved/taylor7", 2), ("resolved/taylor8", 2), ("resolved/layered7", 2)]);
+    come_out_the_same(&[
+        ("resolved/taylor7", 2),
+        ("resolved/taylor8", 2),
+        ("resolved/layered7", 2),
+    ]);
 }
 
-/// What the page says of whose the outcomes are, and that the two resolving methods do not agree in the printed reading, follows from the runs.
+/// What the page says of whose the outcomes are, and that the two resolving methods do not agree in
+/// the printed reading, follows from the runs.
 #[test]
 fn outcomes_belong_to_whom_the_page_says() {
     use Belongs::{Neither, OtherOdds, System};
     let rules = &claims().rules;
-    let found: Vec<Belongs> =
-        resolved::belongs(&compared(&lsoda(), &taylor()), rules).into_iter().map(|(whose, _)| whose).collect();
+    let found: Vec<Belongs> = resolved::belongs(&compared(&lsoda(), &taylor()), rules)
+        .into_iter()
+        .map(|(whose, _)| whose)
+        .collect();
     let printed = [System, Neither, Neither, Neither, System, System];
-    assert_eq!(found, [printed, [OtherOdds, System, System, System, OtherOdds, OtherOdds]].concat());
+    assert_eq!(
+        found,
+        [printed, [OtherOdds, System, System, System, OtherOdds, OtherOdds]].concat()
+    );
     let methods = compared(&taylor(), &tables(&["resolved/layered7"]));
     let ratio = |c: &resolved::Compared| {
-        let times = |runs: &[census::CensusRun]| runs.iter().map(|r| capture::time(r, rules.end)).collect::<Vec<_>>();
+        let times = |runs: &[census::CensusRun]| {
+            runs.iter().map(|r| capture::time(r, rules.end)).collect::<Vec<_>>()
+        };
         LogRank::of(&times(&c.runs), &times(&c.reference)).hazard_ratio(rules.confidence)
     };
     assert!(methods[..3].iter().all(|c| ratio(c).interval[1] < 0.5));

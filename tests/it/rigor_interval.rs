@@ -1,8 +1,8 @@
 //! Interval and ball arithmetic against exact numbers.
 //!
-//! The oracle is integer arithmetic: an `f64` is m 2^e, sums and products of such numbers are such numbers, quotients and roots are
-//! checked by multiplying out, and the elementary functions are summed as 512-bit fixed-point series. Nothing here
-//! shares a line with what it tests.
+//! The oracle is integer arithmetic: an `f64` is m 2^e, sums and products of such numbers are such
+//! numbers, quotients and roots are checked by multiplying out, and the elementary functions are
+//! summed as 512-bit fixed-point series. Nothing here shares a line with what it tests.
 #![allow(clippy::disallowed_methods)] // powi makes test arguments, not results
 
 use num_bigint::{BigInt, Sign};
@@ -72,14 +72,16 @@ fn lower_ok(lower: f64, exact: impl Fn(f64) -> Ordering, tight: bool) -> bool {
     if lower == f64::NEG_INFINITY {
         return !tight;
     }
-    exact(lower) != Ordering::Less && (!tight || lower == f64::MAX || exact(lower.next_up()) == Ordering::Less)
+    exact(lower) != Ordering::Less
+        && (!tight || lower == f64::MAX || exact(lower.next_up()) == Ordering::Less)
 }
 
 fn upper_ok(upper: f64, exact: impl Fn(f64) -> Ordering, tight: bool) -> bool {
     if upper == f64::INFINITY {
         return !tight;
     }
-    exact(upper) != Ordering::Greater && (!tight || upper == f64::MIN || exact(upper.next_down()) == Ordering::Greater)
+    exact(upper) != Ordering::Greater
+        && (!tight || upper == f64::MIN || exact(upper.next_down()) == Ordering::Greater)
 }
 
 #[track_caller]
@@ -102,7 +104,8 @@ impl Random {
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         z ^ (z >> 31)
     }
-    /// Numbers that break arithmetic: any bit pattern, few bits, neighbours of powers of two, equal exponents, ends of the range.
+    /// Numbers that break arithmetic: any bit pattern, few bits, neighbours of powers of two, equal
+    /// exponents, ends of the range.
     fn hard(&mut self) -> f64 {
         const SPECIAL: [f64; 14] = [
             0.0,
@@ -126,9 +129,13 @@ impl Random {
             0 => f64::from_bits(self.bits()),
             1 => SPECIAL[(self.bits() % SPECIAL.len() as u64) as usize],
             // A power of two, or next to one.
-            2 => f64::from_bits(((self.bits() % 2045 + 1) << 52).wrapping_add(self.bits() % 3).wrapping_sub(1)),
+            2 => f64::from_bits(
+                ((self.bits() % 2045 + 1) << 52).wrapping_add(self.bits() % 3).wrapping_sub(1),
+            ),
             // Few significant bits: exact results are frequent.
-            3 => f64::from_bits((1023 - 8 + self.bits() % 16) << 52 | (self.bits() >> 12 & 0x000f_ffff_0000_0000)),
+            3 => f64::from_bits(
+                (1023 - 8 + self.bits() % 16) << 52 | (self.bits() >> 12 & 0x000f_ffff_0000_0000),
+            ),
             // Near the ends of what Dekker's product takes.
             4 => f64::from_bits((1023 - 470 + self.bits() % 40) << 52 | self.bits() >> 12),
             5 => f64::from_bits((1023 + 480 + self.bits() % 60) << 52 | self.bits() >> 12),
@@ -176,7 +183,9 @@ fn operations_against_exact_numbers(rounds: u64, seed: u64) {
         holds(got, tight, &format!("{a:e} - {b:e}"), |v| difference.cmp(&Dyadic::of(v)));
         let product = x.times(&y);
         let got = point(a) * point(b);
-        holds(got, usual(a * b) && usual(a) && usual(b), &format!("{a:e} * {b:e}"), |v| product.cmp(&Dyadic::of(v)));
+        holds(got, usual(a * b) && usual(a) && usual(b), &format!("{a:e} * {b:e}"), |v| {
+            product.cmp(&Dyadic::of(v))
+        });
         exact_results += u64::from(got.lower() == got.upper());
         let got = point(a) / point(b);
         if b == 0.0 {
@@ -191,7 +200,9 @@ fn operations_against_exact_numbers(rounds: u64, seed: u64) {
             if v < 0.0 { Ordering::Greater } else { x.cmp(&Dyadic::of(v).times(&Dyadic::of(v))) }
         });
         let square = x.times(&x);
-        holds(point(a).squared(), usual(a * a) && usual(a), &format!("{a:e} squared"), |v| square.cmp(&Dyadic::of(v)));
+        holds(point(a).squared(), usual(a * a) && usual(a), &format!("{a:e} squared"), |v| {
+            square.cmp(&Dyadic::of(v))
+        });
     }
     // The hard numbers do reach exact results, where bounds must not move.
     assert!(exact_results > rounds / 20, "{exact_results} exact results in {rounds} rounds");
@@ -208,7 +219,8 @@ fn millions_of_operations_hold_the_exact_result() {
     operations_against_exact_numbers(4_000_000, 2);
 }
 
-/// Whether |exact - midpoint| <= radius, `exact` given by its distance from the midpoint times `by`: |distance| <= radius |by|.
+/// Whether |exact - midpoint| <= radius, `exact` given by its distance from the midpoint times
+/// `by`: |distance| <= radius |by|.
 fn within(distance: &Dyadic, radius: f64, by: &Dyadic) -> bool {
     if radius.is_infinite() {
         return true;
@@ -241,10 +253,12 @@ fn balls_against_exact_numbers(rounds: u64, seed: u64) {
         // A root lies within r of s if (s - r)^2 <= a <= (s + r)^2.
         let positive = if a.high() < 0.0 { -a } else { a };
         let root = Ball::new(positive, 0.0).sqrt();
-        let (s, r, v) = (Dyadic::of_dd(root.midpoint()), Dyadic::of(root.radius()), Dyadic::of_dd(positive));
+        let (s, r, v) =
+            (Dyadic::of_dd(root.midpoint()), Dyadic::of(root.radius()), Dyadic::of_dd(positive));
         let (low, high) = (s.plus(&r.negative()), s.plus(&r));
         assert!(
-            low.times(&low).cmp(&v) != Ordering::Greater && v.cmp(&high.times(&high)) != Ordering::Greater,
+            low.times(&low).cmp(&v) != Ordering::Greater
+                && v.cmp(&high.times(&high)) != Ordering::Greater,
             "{root:?}"
         );
         assert!(root.radius() <= 1e-30 * root.midpoint().high());
@@ -389,17 +403,30 @@ fn functions_against_series(rounds: u64, seed: u64) {
             assert!(ulps(got) <= 2.0 || x.abs() > 100.0, "sech^2 {x:e}: {got:?}");
             // Balls: about 30 digits.
             let ball = Ball::from_f64(x).tanh();
-            let distance = Dyadic { m: tanh, e: -BITS }.plus(&Dyadic::of_dd(ball.midpoint()).negative());
+            let distance =
+                Dyadic { m: tanh, e: -BITS }.plus(&Dyadic::of_dd(ball.midpoint()).negative());
             let slack = Dyadic { m: BigInt::from(1), e: -BITS + 32 };
-            assert!(distance.cmp(&Dyadic::of(ball.radius()).plus(&slack)) != Ordering::Greater, "tanh {x:e}: {ball:?}");
+            assert!(
+                distance.cmp(&Dyadic::of(ball.radius()).plus(&slack)) != Ordering::Greater,
+                "tanh {x:e}: {ball:?}"
+            );
             let lowest = Dyadic::of(-ball.radius()).plus(&slack.negative());
             assert!(distance.cmp(&lowest) != Ordering::Less, "tanh {x:e}: {ball:?}");
-            assert!(ball.radius() <= 1e-29 * ball.midpoint().high().abs() + 1e-300, "tanh {x:e}: {ball:?}");
+            assert!(
+                ball.radius() <= 1e-29 * ball.midpoint().high().abs() + 1e-300,
+                "tanh {x:e}: {ball:?}"
+            );
         }
         inverse_functions(x);
-        for (ball, want, name) in [(Ball::from_f64(x).sin(), sin, "sin"), (Ball::from_f64(x).cos(), cos, "cos")] {
-            let distance = Dyadic { m: want, e: -BITS }.plus(&Dyadic::of_dd(ball.midpoint()).negative());
-            assert!(within(&distance, ball.radius().next_up(), &Dyadic::of(1.0)), "{name} {x:e}: {ball:?}");
+        for (ball, want, name) in
+            [(Ball::from_f64(x).sin(), sin, "sin"), (Ball::from_f64(x).cos(), cos, "cos")]
+        {
+            let distance =
+                Dyadic { m: want, e: -BITS }.plus(&Dyadic::of_dd(ball.midpoint()).negative());
+            assert!(
+                within(&distance, ball.radius().next_up(), &Dyadic::of(1.0)),
+                "{name} {x:e}: {ball:?}"
+            );
             assert!(ball.radius() <= 1e-28, "{name} {x:e}: {ball:?}");
         }
     }
@@ -432,7 +459,10 @@ fn inverse_functions(x: f64) {
             let slack = BigInt::from(1) << 40usize;
             let e = Dyadic { m: if above { e + slack } else { e - slack }, e: scale - BITS };
             let side = e.cmp(&Dyadic::of(x));
-            assert!(side != if above { Ordering::Less } else { Ordering::Greater }, "ln {x:e}: {got:?}");
+            assert!(
+                side != if above { Ordering::Less } else { Ordering::Greater },
+                "ln {x:e}: {got:?}"
+            );
         }
         assert!(got.width() <= 4.0 * f64::EPSILON * (got.magnitude() + 1e-10), "ln {x:e}: {got:?}");
     }
@@ -443,7 +473,10 @@ fn inverse_functions(x: f64) {
         let slack = BigInt::from(1) << 40usize;
         let tan = ((sin << BITS as usize) / cos) + if above { slack } else { -slack };
         let side = tan.cmp(&fixed);
-        assert!(side != if above { Ordering::Less } else { Ordering::Greater }, "atan {x:e}: {got:?}");
+        assert!(
+            side != if above { Ordering::Less } else { Ordering::Greater },
+            "atan {x:e}: {got:?}"
+        );
     }
     assert!(ulps(got) <= 2.0, "atan {x:e}: {got:?}");
 }
@@ -476,7 +509,8 @@ fn decimals_are_decimals() {
         let exponent = exponent.parse::<i64>().unwrap() - point_at;
         // The decimal is digits 10^exponent = digits / ten.
         let power = BigInt::from(10).pow(exponent.unsigned_abs() as u32);
-        let (numerator, denominator) = if exponent < 0 { (digits, power) } else { (digits * power, BigInt::from(1)) };
+        let (numerator, denominator) =
+            if exponent < 0 { (digits, power) } else { (digits * power, BigInt::from(1)) };
         let (n, d) = (Dyadic { m: numerator, e: 0 }, Dyadic { m: denominator, e: 0 });
         let got = Interval::from_decimal(&x.into());
         let tight = x == 0.0 || (1e-5..1e15).contains(&x.abs());
@@ -493,7 +527,8 @@ fn decimals_are_decimals() {
 }
 
 fn any_interval() -> impl Strategy<Value = Interval> {
-    (-50.0..50.0_f64, 0.0..1.0_f64, -8..3_i32).prop_map(|(a, w, k)| Interval::between(a, a + w * 10.0_f64.powi(k)))
+    (-50.0..50.0_f64, 0.0..1.0_f64, -8..3_i32)
+        .prop_map(|(a, w, k)| Interval::between(a, a + w * 10.0_f64.powi(k)))
 }
 
 /// A part of an interval, and a member of the part.
@@ -510,7 +545,8 @@ proptest! {
     #[test]
     fn results_of_parts_are_parts_of_results(
         a in any_interval(), b in any_interval(),
-        (f, t, at) in (0.0..1.0_f64, 0.0..1.0_f64, 0.0..1.0_f64), (g, u, bt) in (0.0..1.0_f64, 0.0..1.0_f64, 0.0..1.0_f64),
+        (f, t, at) in (0.0..1.0_f64, 0.0..1.0_f64, 0.0..1.0_f64), (g, u, bt) in (0.0..1.0_f64,
+            0.0..1.0_f64, 0.0..1.0_f64),
     ) {
         let ((p, x), (q, y)) = (part(a, f, t, at), part(b, g, u, bt));
         type Unary = (&'static str, fn(Interval) -> Interval);
@@ -523,8 +559,10 @@ proptest! {
             prop_assert!(value.subset(inner), "{} {} {}", x, name, y);
         }
         let unary: [Unary; 12] = [
-            ("exp", Interval::exp), ("tanh", Interval::tanh), ("sin", Interval::sin), ("cos", Interval::cos),
-            ("sqrt", Interval::sqrt), ("squared", Interval::squared), ("neg", |a| -a), ("abs", Interval::abs),
+            ("exp", Interval::exp), ("tanh", Interval::tanh), ("sin", Interval::sin), ("cos",
+                Interval::cos),
+            ("sqrt", Interval::sqrt), ("squared", Interval::squared), ("neg", |a| -a), ("abs",
+                Interval::abs),
             ("ln", Interval::ln),
             ("atan", Interval::atan),
             ("erf", Interval::erf),

@@ -1,4 +1,5 @@
-//! The law of the passage as a theorem (proofs/inner_law.rs), against plain orbits of the inner problem, which know nothing of its proof.
+//! The law of the passage as a theorem (proofs/inner_law.rs), against plain orbits of the inner
+//! problem, which know nothing of its proof.
 #![allow(clippy::disallowed_methods)] // std functions give expected values
 
 use serde_json::Value;
@@ -34,7 +35,8 @@ impl Inner {
         std::array::from_fn(|i| y[i] + h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]))
     }
 
-    /// From a state until `done`; the last step is shortened, by secants, until `done`'s function is zero.
+    /// From a state until `done`; the last step is shortened, by secants, until `done`'s function
+    /// is zero.
     fn until(&self, mut y: [f64; 3], zero: impl Fn([f64; 3]) -> f64) -> [f64; 3] {
         loop {
             let h = (0.05 / y[2].abs()).min(2e-3);
@@ -79,7 +81,8 @@ fn the_polynomial_form_is_the_inner_problem() {
 fn plain_orbits_keep_the_law() {
     let (inner, data) = (Inner::new(), &certificate()["data"]);
     let number = |name: &str| data[name].as_str().unwrap().parse::<f64>().unwrap();
-    let (exit, growth) = (bounds(&data["exit"]), [bounds(&data["growth"][0]), bounds(&data["growth"][1])]);
+    let (exit, growth) =
+        (bounds(&data["exit"]), [bounds(&data["growth"][0]), bounds(&data["growth"][1])]);
     let (f, inverse_mu, p2) = (bounds(&data["f"]).0, bounds(&data["mu_inverse"]).0, number("p2"));
     assert!((inverse_mu - inner.strong / inner.weak).abs() < 1e-11);
     let mut constants = Vec::new();
@@ -98,14 +101,19 @@ fn plain_orbits_keep_the_law() {
         for (j, (low, high)) in growth.into_iter().enumerate() {
             // The state at s = 0 is what a disturbance is small against.
             let d = 1e-4 * zero[1];
-            let moved = |d: f64| -leave(std::array::from_fn(|i| zero[i] + if i == j { d } else { 0.0 }))[2];
+            let moved =
+                |d: f64| -leave(std::array::from_fn(|i| zero[i] + if i == j { d } else { 0.0 }))[2];
             let slope = (moved(d) - moved(-d)) / (2.0 * d);
             let k = slope.abs().ln() - common + x.ln();
-            assert!(low < k && k < high, "S = {s}, p = {p}, disturbance {j}: K = {k} not in {low}, {high}");
+            assert!(
+                low < k && k < high,
+                "S = {s}, p = {p}, disturbance {j}: K = {k} not in {low}, {high}"
+            );
         }
     }
     // The constant is one, nearly: the intervals are bounds and not spread.
-    let (least, most) = constants.iter().fold((f64::MAX, f64::MIN), |(a, b), c| (a.min(*c), b.max(*c)));
+    let (least, most) =
+        constants.iter().fold((f64::MAX, f64::MIN), |(a, b), c| (a.min(*c), b.max(*c)));
     println!("C from {least} to {most}");
     assert!(most - least < 0.25, "{constants:?}");
 }

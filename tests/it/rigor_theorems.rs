@@ -1,5 +1,7 @@
-//! The theorems' machinery, on an equation whose answers are known and on the paper's. The theorems themselves are in proofs/ (`make proofs`).
-#![allow(clippy::disallowed_methods)] // std functions give expected values, compared with tolerances
+//! The theorems' machinery, on an equation whose answers are known and on the paper's. The theorems
+//! themselves are in proofs/ (`make proofs`).
+// std functions give expected values, compared with tolerances
+#![allow(clippy::disallowed_methods)]
 
 use nalgebra::SVector;
 use twofold::num::tape::Recorded;
@@ -11,11 +13,15 @@ use twofold::system::{Caricature, Smoothed, Transition, VectorField};
 const SECTION: AxisPlane = AxisPlane { axis: 1, value: 0.0 };
 
 fn equation(alpha: f64) -> Smoothed<Caricature> {
-    Smoothed { system: Caricature::with_reinjection(alpha, 1e-5), transition: Transition::Tanh, eps: 1e-3 }
+    Smoothed {
+        system: Caricature::with_reinjection(alpha, 1e-5),
+        transition: Transition::Tanh,
+        eps: 1e-3,
+    }
 }
 
-/// r' = r (1 - r^2)/10, angle' = 1, h' = -h/10: a closed orbit r = 1, h = 0 of period 2 pi with multipliers exp(-4 pi/10) and
-/// exp(-2 pi/10). Coordinates x = r cos, y = r sin, h.
+/// r' = r (1 - r^2)/10, angle' = 1, h' = -h/10: a closed orbit r = 1, h = 0 of period 2 pi with
+/// multipliers exp(-4 pi/10) and exp(-2 pi/10). Coordinates x = r cos, y = r sin, h.
 fn hopf() -> Tape {
     Tape::record(3, |v: &[Recorded]| {
         let (x, y, h) = (v[0], v[1], v[2]);
@@ -25,7 +31,11 @@ fn hopf() -> Tape {
 }
 
 fn search_hopf(near: [f64; 2], radius: f64, crossings: usize) -> Result<Cycle, Error> {
-    prove_cycle(&hopf(), FlowOptions::PLAIN, &Search { plane: SECTION, near, radius, crossings, longest: 40.0 })
+    prove_cycle(
+        &hopf(),
+        FlowOptions::PLAIN,
+        &Search { plane: SECTION, near, radius, crossings, longest: 40.0 },
+    )
 }
 
 #[test]
@@ -38,7 +48,10 @@ fn a_known_orbit_is_proved_with_its_multipliers() {
     assert!(c.period.contains(2.0 * PI) && c.period.width() < 1e-13, "{:?}", c.period);
     let (a, b) = ((-0.4 * PI).exp(), (-0.2 * PI).exp());
     for (got, want) in [(c.trace, a + b), (c.determinant, a * b)] {
-        assert!((got + Interval::symmetric(1e-15)).contains(want) && got.width() < 1e-12, "{got:?} {want}");
+        assert!(
+            (got + Interval::symmetric(1e-15)).contains(want) && got.width() < 1e-12,
+            "{got:?} {want}"
+        );
     }
     assert_eq!(c.crossings.iter().map(|x| x.2).collect::<Vec<_>>(), [false, true]);
     assert!(c.crossings[0].0.contains(PI) && c.crossings[0].1[0].contains(-1.0));
@@ -54,8 +67,12 @@ fn what_is_not_so_is_not_proved() {
     assert!(search_hopf([1.0, 0.0], 0.9, 2).is_err());
     // Nothing crosses in so short a time.
     let mut flow = Flow::<Interval, 3>::new(&hopf(), FlowOptions::PLAIN);
-    let start =
-        Set::on_plane(SVector::from([1.0, 0.0, 0.0].map(Interval::from_f64)), SECTION.axis, SECTION.value, false);
+    let start = Set::on_plane(
+        SVector::from([1.0, 0.0, 0.0].map(Interval::from_f64)),
+        SECTION.axis,
+        SECTION.value,
+        false,
+    );
     assert!(matches!(flow.next_crossing(&start, SECTION, 3.0), Err(Error::NoCrossing(_))));
     assert!(flow.next_crossing(&start, SECTION, 3.2).is_ok());
 }
@@ -63,7 +80,8 @@ fn what_is_not_so_is_not_proved() {
 #[test]
 #[ignore = "a minute in the debug profile; `make proofs` proves it too"]
 fn the_period_one_orbit_is_proved_and_attracts() {
-    let search = Search { plane: SECTION, near: [0.8063, 0.0], radius: 1e-10, crossings: 2, longest: 40.0 };
+    let search =
+        Search { plane: SECTION, near: [0.8063, 0.0], radius: 1e-10, crossings: 2, longest: 40.0 };
     let c = prove_cycle(&equation(0.1).tape(), FlowOptions::PLAIN, &search).unwrap();
     assert!(c.attracts());
     // 2.5766e-5 per unit of time (an independent program): det = exp(-2 rate period).
@@ -89,7 +107,8 @@ fn krawczyk_tells_a_zero_from_none() {
     assert!(!at(0.375).1 && !at(0.125).1);
 }
 
-/// The first rows of a reference table, in one arithmetic: (the widest enclosure, whether every row is in its own).
+/// The first rows of a reference table, in one arithmetic: (the widest enclosure, whether every row
+/// is in its own).
 fn follow<S: Enclosure>(alpha: f64, text: &str, rows: usize, settings: FlowOptions) -> f64 {
     let tape = equation(alpha).tape();
     let mut flow = Flow::<S, 3>::new(&tape, settings);
@@ -101,7 +120,9 @@ fn follow<S: Enclosure>(alpha: f64, text: &str, rows: usize, settings: FlowOptio
         let crossing = flow.next_crossing(&set, SECTION, 1000.0).unwrap();
         set = crossing.set;
         let states = set.states();
-        for (got, want) in [(crossing.time, fields[0]), (states[0], fields[1]), (states[2], fields[2])] {
+        for (got, want) in
+            [(crossing.time, fields[0]), (states[0], fields[1]), (states[2], fields[2])]
+        {
             let want: f64 = want.parse().unwrap();
             let slack = Interval::symmetric(1e-15 + 2.0 * f64::EPSILON * want.abs());
             assert!((got.interval() + slack).contains(want), "{got:?} does not hold {want}");
@@ -135,7 +156,12 @@ fn a_set_too_wide_is_refused() {
     let tape = equation(0.1).tape();
     let mut flow = Flow::<Interval, 3>::new(&tape, FlowOptions::PLAIN);
     let wide = Interval::between(-0.5, 0.5);
-    let set = Set::on_plane(SVector::from([wide, Interval::zero(), wide]), SECTION.axis, SECTION.value, false);
+    let set = Set::on_plane(
+        SVector::from([wide, Interval::zero(), wide]),
+        SECTION.axis,
+        SECTION.value,
+        false,
+    );
     let error = flow.next_crossing(&set, SECTION, 10.0).unwrap_err();
     assert!(matches!(error, Error::NoEnclosure { .. } | Error::NotTransversal { .. }), "{error}");
 }

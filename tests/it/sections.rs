@@ -3,21 +3,28 @@
 use nalgebra::vector;
 use twofold::integrate::roots::{Crossing, CrossingFinder, brent};
 use twofold::integrate::{
-    Dopri5, DriveOptions, Flow, Lsoda, Observer, Radau5, Schedule, Step, StepCap, Stepper, Taylor, Tolerance, drive,
+    Dopri5, DriveOptions, Flow, Lsoda, Observer, Radau5, Schedule, Step, StepCap, Stepper, Taylor,
+    Tolerance, drive,
 };
 use twofold::system::{Caricature, Smoothed, Transition};
 
-/// Samples, minima and roots on every step, with nothing left out: version 0.1.0's search, and beside the step's ends, too.
+/// Samples, minima and roots on every step, with nothing left out: version 0.1.0's search, and
+/// beside the step's ends, too.
 fn whole_search(step: &Step<'_, 3>, g: impl Fn(&nalgebra::SVector<f64, 3>) -> f64) -> Vec<f64> {
     let n = step.interpolant.degree() + 2;
     let value = |theta: f64| g(&step.at(theta));
     let mut found = Vec::new();
-    let samples: Vec<(f64, f64)> = (0..=n).map(|i| i as f64 / n as f64).map(|s| (s, value(s))).collect();
+    let samples: Vec<(f64, f64)> =
+        (0..=n).map(|i| i as f64 / n as f64).map(|s| (s, value(s))).collect();
     let mut refined: Vec<(f64, f64)> = Vec::with_capacity(samples.len() + 2);
-    // A function that falls from an end towards its neighbour, and is larger there, has its least value between.
+    // A function that falls from an end towards its neighbour, and is larger there, has its least
+    // value between.
     let beside = |(s0, g0): (f64, f64), (s1, g1): (f64, f64)| {
-        let falls = (g0 > 0.0) == (g1 > 0.0) && g0.abs() <= g1.abs() && value(s0 + 1e-6 * (s1 - s0)).abs() < g0.abs();
-        let (s, v) = if falls { smallest(&value, s0.min(s1), s0.max(s1), g0.signum()) } else { (s0, g0) };
+        let falls = (g0 > 0.0) == (g1 > 0.0)
+            && g0.abs() <= g1.abs()
+            && value(s0 + 1e-6 * (s1 - s0)).abs() < g0.abs();
+        let (s, v) =
+            if falls { smallest(&value, s0.min(s1), s0.max(s1), g0.signum()) } else { (s0, g0) };
         ((v > 0.0) != (g0 > 0.0)).then_some((s, v))
     };
     refined.push(samples[0]);
@@ -98,10 +105,19 @@ impl Observer<3> for Compared {
                 continue; // the rule for a step that begins or ends on the plane is another one now
             }
             let thetas: Vec<u64> = found.iter().map(|p: &Crossing| p.theta.to_bits()).collect();
-            let all: Vec<u64> = whole_search(step, |x| x[c] - v).iter().map(|t| t.to_bits()).collect();
-            assert_eq!(thetas, all, "t {} to {}, plane {c} = {v}: {} to {}", step.t0, step.t1, step.x0, step.x1);
-            // Senses alternate, beginning from the side of the step's start and ending on that of its end.
-            assert!(found.iter().enumerate().all(|(i, p)| p.upward == ((h0 < 0.0) == (i % 2 == 0))), "{found:?}");
+            let all: Vec<u64> =
+                whole_search(step, |x| x[c] - v).iter().map(|t| t.to_bits()).collect();
+            assert_eq!(
+                thetas, all,
+                "t {} to {}, plane {c} = {v}: {} to {}",
+                step.t0, step.t1, step.x0, step.x1
+            );
+            // Senses alternate, beginning from the side of the step's start and ending on that of
+            // its end.
+            assert!(
+                found.iter().enumerate().all(|(i, p)| p.upward == ((h0 < 0.0) == (i % 2 == 0))),
+                "{found:?}"
+            );
             assert_eq!((h0 < 0.0) != (h1 < 0.0), found.len() % 2 == 1);
             // The bound holds where it was asked for.
             let reach = step.interpolant.reach(c);
@@ -123,11 +139,16 @@ impl Observer<3> for Compared {
 
 fn compare<M: Stepper<3>>(name: &str, mut stepper: M, t_end: f64) {
     for alpha in [1e-3, 1e-1] {
-        let field =
-            Smoothed { system: Caricature::with_reinjection(alpha, 1e-5), transition: Transition::Tanh, eps: 1e-3 };
-        let planes = [(1, 0.0), (0, 0.0), (2, 0.0), (0, 0.3), (1, -0.7), (2, 0.05), (0, 1e-3), (1, 1.0)]
-            .map(|(c, v)| (c, v, CrossingFinder::default()));
-        let mut compared = Compared { planes: planes.into(), steps: 0, passages: 0, several: 0, decided: 0 };
+        let field = Smoothed {
+            system: Caricature::with_reinjection(alpha, 1e-5),
+            transition: Transition::Tanh,
+            eps: 1e-3,
+        };
+        let planes =
+            [(1, 0.0), (0, 0.0), (2, 0.0), (0, 0.3), (1, -0.7), (2, 0.05), (0, 1e-3), (1, 1.0)]
+                .map(|(c, v)| (c, v, CrossingFinder::default()));
+        let mut compared =
+            Compared { planes: planes.into(), steps: 0, passages: 0, several: 0, decided: 0 };
         let options = DriveOptions {
             t_end,
             schedule: Schedule { restart_every: Some(20.0), kick: None },
@@ -135,10 +156,12 @@ fn compare<M: Stepper<3>>(name: &str, mut stepper: M, t_end: f64) {
             max_steps: u64::MAX,
             kicked_states: 3,
         };
-        let _ = drive(&field, vector![0.2, 0.0, -1.0], &options, &mut stepper, &mut compared, &()).unwrap();
+        let _ = drive(&field, vector![0.2, 0.0, -1.0], &options, &mut stepper, &mut compared, &())
+            .unwrap();
         let Compared { steps, passages, several, decided, .. } = compared;
         println!(
-            "{name} alpha {alpha}: {steps} steps, {passages} passages, {several} steps with several, {decided} of {} decided by the bound",
+            "{name} alpha {alpha}: {steps} steps, {passages} passages, {several} steps with \
+                several, {decided} of {} decided by the bound",
             8 * steps
         );
         assert!(passages > 50);

@@ -11,7 +11,8 @@ use twofold::job::spec::*;
 use twofold::job::{Executor, LargestExponent, Run};
 use twofold::system::{Caricature, Definition, Relaxation, System};
 
-/// Uncoupled oscillators x_i' = v_i, v_i' = -x_i, `n` states, switched by a coordinate of their own decay.
+/// Uncoupled oscillators x_i' = v_i, v_i' = -x_i, `n` states, switched by a coordinate of their own
+/// decay.
 fn rotors(n: usize) -> System {
     let names: Vec<String> = (0..n).map(|i| format!("x{i}")).collect();
     let rate = |i: usize, sign: &str| match i {
@@ -43,22 +44,32 @@ fn every_dimension_by_every_switch() {
         let switches = [
             SwitchSpec::tanh(1e-3),
             // phi starts where h says: below the surface.
-            SwitchSpec::Hysteretic { eps: 1e-3, eps_prime: 1e-2, relaxation: Relaxation::Single, phi0: 0.0 },
+            SwitchSpec::Hysteretic {
+                eps: 1e-3,
+                eps_prime: 1e-2,
+                relaxation: Relaxation::Single,
+                phi0: 0.0,
+            },
             SwitchSpec::delayed(1e-2),
             SwitchSpec::relay(1e-2),
             SwitchSpec::Filippov { exit: ExitRule::AtOnce { side: Side::Plus }, funnel: None },
         ];
         for switch in switches {
             let spec = question(rotors(n), switch, Observation::Path { chord: 1e-2 });
-            let answer = Executor::quiet().ask(&Run(spec.clone())).unwrap_or_else(|e| panic!("{n}: {e}"));
+            let answer =
+                Executor::quiet().ask(&Run(spec.clone())).unwrap_or_else(|e| panic!("{n}: {e}"));
             let state: Vec<f64> = answer.fact("state").unwrap();
             assert_eq!(state.len(), n);
             for i in (0..n / 2 * 2).step_by(2) {
                 let (c, s) = (6.0_f64.cos(), 6.0_f64.sin());
-                assert!((state[i] - c).abs() < 1e-8 && (state[i + 1] + s).abs() < 1e-8, "{n} {switch:?} {state:?}");
+                assert!(
+                    (state[i] - c).abs() < 1e-8 && (state[i + 1] + s).abs() < 1e-8,
+                    "{n} {switch:?} {state:?}"
+                );
             }
             if n % 2 == 1 {
-                // Below the surface at x0 = 10: the last one grows at rate 1, until it is x0 itself that is switched.
+                // Below the surface at x0 = 10: the last one grows at rate 1, until it is x0 itself
+                // that is switched.
                 let want = 7.0;
                 assert!((state[n - 1] - want).abs() < 1e-8, "{n} {switch:?} {state:?}");
             }
@@ -74,7 +85,11 @@ fn every_dimension_by_every_switch() {
 #[test]
 fn every_method_takes_data() {
     for name in Method::ALL {
-        let mut spec = question(rotors(5), SwitchSpec::tanh(1e-3), Observation::Section { coordinate: 1, value: 0.0 });
+        let mut spec = question(
+            rotors(5),
+            SwitchSpec::tanh(1e-3),
+            Observation::Section { coordinate: 1, value: 0.0 },
+        );
         spec.method.name = name;
         if name == Method::Layered {
             let refused = Executor::quiet().ask(&Run(spec)).unwrap_err().to_string();
@@ -91,7 +106,8 @@ fn every_method_takes_data() {
 
 #[test]
 fn fast_paths_give_the_bits_of_the_record() {
-    // Names decide nothing about numbers: with its states renamed, the caricature takes the recorded path.
+    // Names decide nothing about numbers: with its states renamed, the caricature takes the
+    // recorded path.
     let text = twofold::system::library::text("caricature").unwrap();
     let renamed = text
         .replace("[\"x\", \"y\", \"z\"]", "[\"x\", \"y\", \"zz\"]")
@@ -99,7 +115,8 @@ fn fast_paths_give_the_bits_of_the_record() {
         .replace("[\"z\"", "[\"zz\"")
         .replace("z^2", "zz^2")
         .replace("beta*z", "beta*zz");
-    let recorded = System::new(Definition::from_toml(&renamed, "f").unwrap_or_else(|e| panic!("{e}")));
+    let recorded =
+        System::new(Definition::from_toml(&renamed, "f").unwrap_or_else(|e| panic!("{e}")));
     assert_eq!(recorded.compiled(), None);
     let compiled = System::from(Caricature::with_reinjection(0.1, 1e-5));
     let kick = Kick { every: 0.3, size: 1e-3, law: KickLaw::Sphere, seed: 1, stream: 0 };
@@ -109,14 +126,20 @@ fn fast_paths_give_the_bits_of_the_record() {
         SwitchSpec::Filippov { exit: ExitRule::AtOnce { side: Side::Plus }, funnel: None },
     ] {
         let bits = |system: &System| {
-            let mut spec = question(system.clone(), switch, Observation::Section { coordinate: 1, value: 0.0 });
+            let mut spec = question(
+                system.clone(),
+                switch,
+                Observation::Section { coordinate: 1, value: 0.0 },
+            );
             (spec.start, spec.t_end) = (vec![0.2, 0.0, -1.0], 60.0);
             if !matches!(switch, SwitchSpec::Filippov { .. }) {
                 spec.schedule = Schedule { restart_every: Some(20.0), kick: Some(kick) };
             }
             let answer = Executor::quiet().ask(&Run(spec)).unwrap();
             let section = answer.table("section").unwrap();
-            let numbers = |i: usize| section.numbers(&section.columns[i].name).iter().map(|v| v.to_bits()).collect();
+            let numbers = |i: usize| {
+                section.numbers(&section.columns[i].name).iter().map(|v| v.to_bits()).collect()
+            };
             (0..4).map(numbers).collect::<Vec<Vec<u64>>>()
         };
         let (a, b) = (bits(&compiled), bits(&recorded));
@@ -124,10 +147,18 @@ fn fast_paths_give_the_bits_of_the_record() {
         assert_eq!(a, b, "{switch:?}");
     }
     let exponent = |system: &System| {
-        let settings =
-            twofold::analyse::lyapunov::LyapunovOptions { transient: 5.0, duration: 40.0, ..Default::default() };
+        let settings = twofold::analyse::lyapunov::LyapunovOptions {
+            transient: 5.0,
+            duration: 40.0,
+            ..Default::default()
+        };
         let start = vec![0.2, 0.0, -1.0];
-        let question = LargestExponent { system: system.clone(), switch: SwitchSpec::tanh(1e-2), start, settings };
+        let question = LargestExponent {
+            system: system.clone(),
+            switch: SwitchSpec::tanh(1e-2),
+            start,
+            settings,
+        };
         Executor::quiet().ask(&question).unwrap().facts.clone()
     };
     assert_eq!(exponent(&compiled), exponent(&recorded));
@@ -135,11 +166,17 @@ fn fast_paths_give_the_bits_of_the_record() {
 
 #[test]
 fn exponents_of_data() {
-    // Two rotors and a decay: the largest exponent of x' = -x/2 beside rotations is 0; of the decay alone -1/2.
+    // Two rotors and a decay: the largest exponent of x' = -x/2 beside rotations is 0; of the decay
+    // alone -1/2.
     let text = "states = [\"x\"]\nh = \"x - 100\"\nplus = [\"-x/2\"]\nminus = [\"-x/2\"]";
     let system = System::new(Definition::from_toml(text, "f").unwrap());
-    let settings = twofold::analyse::lyapunov::LyapunovOptions { transient: 1.0, duration: 50.0, ..Default::default() };
-    let question = LargestExponent { system, switch: SwitchSpec::tanh(1e-3), start: vec![1.0], settings };
+    let settings = twofold::analyse::lyapunov::LyapunovOptions {
+        transient: 1.0,
+        duration: 50.0,
+        ..Default::default()
+    };
+    let question =
+        LargestExponent { system, switch: SwitchSpec::tanh(1e-3), start: vec![1.0], settings };
     let exponent: twofold::analyse::lyapunov::Exponent =
         Executor::quiet().ask(&question).unwrap().fact("exponent").unwrap();
     assert!((exponent.value + 0.5).abs() < 1e-7, "{exponent:?}");
@@ -148,16 +185,24 @@ fn exponents_of_data() {
 #[test]
 fn wrong_specs_are_refused() {
     let refused = |change: &dyn Fn(&mut RunSpec)| {
-        let mut spec = question(rotors(2), SwitchSpec::tanh(1e-3), Observation::Path { chord: 1e-2 });
+        let mut spec =
+            question(rotors(2), SwitchSpec::tanh(1e-3), Observation::Path { chord: 1e-2 });
         change(&mut spec);
         spec.validate().unwrap_err().to_string()
     };
     assert!(refused(&|s| s.start = vec![1.0]).contains("one number for each"));
     assert!(refused(&|s| s.start[1] = f64::NAN).contains("finite"));
-    assert!(refused(&|s| s.observe = Observation::Section { coordinate: 2, value: 0.0 }).contains("count from 0"));
-    assert!(refused(&|s| s.system = Caricature::with_reinjection(f64::NAN, 0.0).into()).contains("start is"));
+    assert!(
+        refused(&|s| s.observe = Observation::Section { coordinate: 2, value: 0.0 })
+            .contains("count from 0")
+    );
+    assert!(
+        refused(&|s| s.system = Caricature::with_reinjection(f64::NAN, 0.0).into())
+            .contains("start is")
+    );
     let named = |state: &str| {
-        let text = format!("states = [\"{state}\"]\nh = \"{state}\"\nplus = [\"1\"]\nminus = [\"1\"]");
+        let text =
+            format!("states = [\"{state}\"]\nh = \"{state}\"\nplus = [\"1\"]\nminus = [\"1\"]");
         System::new(Definition::from_toml(&text, "f").unwrap())
     };
     let message = refused(&|s| (s.system, s.start) = (named("t"), vec![0.0]));
@@ -174,7 +219,8 @@ fn twofold(arguments: &[&str]) -> (i32, String, String) {
 fn a_file_on_the_command_line() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("my.toml");
-    let good = "states = [\"x\", \"v\"]\nstart = [1, 0]\nh = \"x + gain*v\"\nplus = [\"v\", \"-1\"]\nminus = [\"v\", \"1\"]\n[parameters]\ngain = 1\n";
+    let good = "states = [\"x\", \"v\"]\nstart = [1, 0]\nh = \"x + gain*v\"\nplus = \
+        [\"v\", \"-1\"]\nminus = [\"v\", \"1\"]\n[parameters]\ngain = 1\n";
     fs::write(&file, good).unwrap();
     let file = file.to_str().unwrap();
     let common = ["--quiet", "--switch", "filippov", "--exit", "at-once:plus", "--t-end", "5"];
@@ -184,7 +230,8 @@ fn a_file_on_the_command_line() {
     assert_eq!((code, err.as_str()), (0, ""));
     let lines: Vec<&str> = out.lines().collect();
     assert!(lines[0].starts_with("t,x,v,mode"), "{}", lines[0]);
-    let last: Vec<f64> = lines[lines.len() - 2].split(',').take(3).map(|v| v.parse().unwrap()).collect();
+    let last: Vec<f64> =
+        lines[lines.len() - 2].split(',').take(3).map(|v| v.parse().unwrap()).collect();
     assert!((last[0] - 5.0).abs() < 1e-12 && (last[1] + 2.0 * last[2]).abs() < 1e-7, "{last:?}");
     // The run's own description gives the same bytes.
     let (_, spec, _) = run(&["--set", "gain=2", "--print-spec"]);

@@ -1,4 +1,5 @@
-//! Every system that ships, against a result that is known of it: from the literature, or from the closed form that it was chosen for.
+//! Every system that ships, against a result that is known of it: from the literature, or from the
+//! closed form that it was chosen for.
 #![allow(clippy::disallowed_methods)] // compared with tolerances, not with hashes
 
 use std::f64::consts::PI;
@@ -15,7 +16,8 @@ use twofold::job::{Answer, ClosedOrbit, Executor, LargestExponent, Run};
 use twofold::num::linear::eigenvalues;
 use twofold::system::{Field, System, jacobian};
 
-const FILIPPOV: SwitchSpec = SwitchSpec::Filippov { exit: ExitRule::AtOnce { side: Side::Plus }, funnel: None };
+const FILIPPOV: SwitchSpec =
+    SwitchSpec::Filippov { exit: ExitRule::AtOnce { side: Side::Plus }, funnel: None };
 
 fn system(name: &str) -> System {
     System::builtin(name).unwrap_or_else(|| panic!("{name} does not ship"))
@@ -31,7 +33,15 @@ fn run(system: &System, switch: SwitchSpec, t_end: f64, observe: Observation) ->
         order: None,
     };
     let start = system.definition().start().unwrap().to_vec();
-    let spec = RunSpec { system: system.clone(), switch, start, t_end, method, schedule: Schedule::default(), observe };
+    let spec = RunSpec {
+        system: system.clone(),
+        switch,
+        start,
+        t_end,
+        method,
+        schedule: Schedule::default(),
+        observe,
+    };
     Executor::quiet().ask(&Run(spec)).unwrap_or_else(|e| panic!("{}: {e}", system.name()))
 }
 
@@ -40,7 +50,8 @@ fn events(answer: &Answer, system: &System, kind: &str) -> Vec<(f64, Vec<f64>)> 
     let table = answer.table("events").unwrap();
     let columns: Vec<&[f64]> = system.coordinates().iter().map(|n| table.numbers(n)).collect();
     let rows = table.words("event").enumerate().filter(|(_, word)| *word == kind);
-    rows.map(|(row, _)| (table.numbers("t")[row], columns.iter().map(|c| c[row]).collect())).collect()
+    rows.map(|(row, _)| (table.numbers("t")[row], columns.iter().map(|c| c[row]).collect()))
+        .collect()
 }
 
 fn path(answer: &Answer, name: &str) -> Vec<f64> {
@@ -80,16 +91,22 @@ fn zero(f: impl Fn(f64) -> f64, mut a: f64, mut b: f64) -> f64 {
 fn every_file_has_its_test() {
     let here = include_str!("systems_known.rs");
     for name in twofold::system::library::names() {
-        let elsewhere = ["caricature-as-printed", "wheel"].contains(&name); // tests/it/misprint.rs, tests/it/wheel.rs
-        assert!(elsewhere || here.contains(&format!("system(\"{name}\")")), "{name}: no known result is tested");
+        let elsewhere = ["caricature-as-printed", "wheel"].contains(&name);
+        // tests/it/misprint.rs, tests/it/wheel.rs
+        assert!(
+            elsewhere || here.contains(&format!("system(\"{name}\")")),
+            "{name}: no known result is tested"
+        );
     }
 }
 
-/// Jeffrey & Colombo (2009): about the two-fold the map from one upward crossing to the next is linear with trace 4 v w - 2 and determinant 1.
+/// Jeffrey & Colombo (2009): about the two-fold the map from one upward crossing to the next is
+/// linear with trace 4 v w - 2 and determinant 1.
 #[test]
 fn two_fold_crossing_map() {
     let s = system("two-fold");
-    let crossings = events(&run(&s, FILIPPOV, 500.0, Observation::Path { chord: 1.0 }), &s, "crossing");
+    let crossings =
+        events(&run(&s, FILIPPOV, 500.0, Observation::Path { chord: 1.0 }), &s, "crossing");
     let up: Vec<f64> = crossings.iter().filter(|(_, x)| x[1] < 0.0).map(|(_, x)| x[1]).collect();
     assert!(up.len() >= 3, "{crossings:?}");
     for w in up.windows(3) {
@@ -127,14 +144,16 @@ fn relay_linear_slides_exponentially() {
     assert!((state[0] - x0 * (-(12.0 - t0) / 2.0).exp()).abs() < 1e-9, "{state:?}");
 }
 
-/// Below the optimal gain each flight takes ((1 - gain)/(1 + gain))^(1/2) of the time of the one before.
+/// Below the optimal gain each flight takes ((1 - gain)/(1 + gain))^(1/2) of the time of the one
+/// before.
 #[test]
 fn relay_parabolic_chatters_geometrically() {
     let s = system("relay-parabolic");
-    let times: Vec<f64> = events(&run(&s, FILIPPOV, 5.2, Observation::Path { chord: 1e-3 }), &s, "crossing")
-        .iter()
-        .map(|e| e.0)
-        .collect();
+    let times: Vec<f64> =
+        events(&run(&s, FILIPPOV, 5.2, Observation::Path { chord: 1e-3 }), &s, "crossing")
+            .iter()
+            .map(|e| e.0)
+            .collect();
     assert!(times.len() >= 4, "{times:?}");
     for w in times.windows(3) {
         let ratio = (w[2] - w[1]) / (w[1] - w[0]);
@@ -142,8 +161,8 @@ fn relay_parabolic_chatters_geometrically() {
     }
 }
 
-/// The slip phase is a linear oscillator with negative damping, the stick phase lasts from its end to x = friction: the limit cycle's period in
-/// closed form. Sticking makes its multiplier zero.
+/// The slip phase is a linear oscillator with negative damping, the stick phase lasts from its end
+/// to x = friction: the limit cycle's period in closed form. Sticking makes its multiplier zero.
 #[test]
 fn stick_slip_period() {
     let (belt, friction, w) = (0.3, 1.0, 0.2_f64);
@@ -168,7 +187,8 @@ fn stick_slip_period() {
     assert!(modulus < 1e-6, "{modulus}");
 }
 
-/// Den Hartog (1931): the amplitude of the motion without sticking, (V^2 - (friction S)^2)^(1/2) for forcing of amplitude 1.
+/// Den Hartog (1931): the amplitude of the motion without sticking, (V^2 - (friction S)^2)^(1/2)
+/// for forcing of amplitude 1.
 #[test]
 fn dry_friction_amplitude() {
     let s = system("dry-friction");
@@ -189,7 +209,8 @@ fn dry_friction_amplitude() {
     assert!((period - 2.0 * PI / beta).abs() < 1e-8, "{period}");
 }
 
-/// Dry friction takes a fixed amount of the amplitude in each half turn: 4 friction of the difference's, here.
+/// Dry friction takes a fixed amount of the amplitude in each half turn: 4 friction of the
+/// difference's, here.
 #[test]
 fn friction_pair_loses_amplitude_linearly_and_sticks() {
     let s = system("friction-pair");
@@ -208,11 +229,14 @@ fn friction_pair_loses_amplitude_linearly_and_sticks() {
     let end: Vec<f64> = answer.fact("state").unwrap();
     let energy = |x: &[f64]| (x[0] + x[2]).powi(2) + (x[1] + x[3]).powi(2);
     assert!((energy(&end) - energy(s.definition().start().unwrap())).abs() < 1e-8);
-    assert!((end[0] - end[2] - (x[0] - x[2])).abs() < 1e-9 && (end[1] - end[3]).abs() < 1e-9, "{end:?}");
+    assert!(
+        (end[0] - end[2] - (x[0] - x[2])).abs() < 1e-9 && (end[1] - end[3]).abs() < 1e-9,
+        "{end:?}"
+    );
 }
 
-/// Where three lags are as the relay turns to -1 in a symmetric cycle of half period h, from the output: x(h) = E x + (1 - E)(-1, -1, -1) with
-/// E = e^(A h), and x(h) = -x.
+/// Where three lags are as the relay turns to -1 in a symmetric cycle of half period h, from the
+/// output: x(h) = E x + (1 - E)(-1, -1, -1) with E = e^(A h), and x(h) = -x.
 fn lags_start(h: f64) -> [f64; 3] {
     let e = (-h).exp();
     // e^(A h) of three equal lags, A = -1 + shift.
@@ -227,7 +251,8 @@ fn lags_start(h: f64) -> [f64; 3] {
     x
 }
 
-/// Tsypkin's condition for a symmetric limit cycle of half period h: the output of the lags, driven by the relay, is zero where it switches.
+/// Tsypkin's condition for a symmetric limit cycle of half period h: the output of the lags, driven
+/// by the relay, is zero where it switches.
 #[test]
 fn relay_third_order_period() {
     let half = zero(|h| lags_start(h)[0], 1.0, 3.0);
@@ -238,7 +263,10 @@ fn relay_third_order_period() {
     assert!((period - 2.0 * half).abs() < 1e-8, "{period} {}", 2.0 * half);
     // The describing function's 2 pi/3^(1/2) is near it, and not it.
     let described = 2.0 * PI / 3.0_f64.sqrt();
-    assert!((period - described).abs() > 1e-3 && (period - described).abs() < 0.1, "{period} {described}");
+    assert!(
+        (period - described).abs() > 1e-3 && (period - described).abs() < 0.1,
+        "{period} {described}"
+    );
     let modulus: f64 = found.fact("largest_modulus").unwrap();
     assert!(modulus < 0.5, "{modulus}");
 }
@@ -252,17 +280,28 @@ fn relay_third_order_with_a_band_has_its_period() {
         let half = zero(|h| lags_start(h)[0] - band, 1.0, 9.0);
         assert!(half > longer, "a wider band, a longer period");
         longer = half;
-        let answer = run(&s, SwitchSpec::relay(band), 150.0, Observation::Section { coordinate: 1, value: 0.0 });
+        let answer = run(
+            &s,
+            SwitchSpec::relay(band),
+            150.0,
+            Observation::Section { coordinate: 1, value: 0.0 },
+        );
         let table = answer.table("section").unwrap();
-        let up: Vec<f64> =
-            table.numbers("t").iter().zip(table.words("direction")).filter(|c| c.1 == "up").map(|c| *c.0).collect();
+        let up: Vec<f64> = table
+            .numbers("t")
+            .iter()
+            .zip(table.words("direction"))
+            .filter(|c| c.1 == "up")
+            .map(|c| *c.0)
+            .collect();
         let last = up[up.len() - 1] - up[up.len() - 2];
         assert!((last - 2.0 * half).abs() < 1e-9, "{band}: {last} {}", 2.0 * half);
     }
 }
 
-/// Matsumoto, Chua & Komuro (1985): eigenvalues at the rest points as printed there. Sprott (2003): the largest exponent 0.3271. (The
-/// former print 0.23 and -1.78: both less by a factor of about ln 2, with the same dimension 2.13.)
+/// Matsumoto, Chua & Komuro (1985): eigenvalues at the rest points as printed there. Sprott (2003):
+/// the largest exponent 0.3271. (The former print 0.23 and -1.78: both less by a factor of about ln
+/// 2, with the same dimension 2.13.)
 #[test]
 fn chua_eigenvalues_and_exponent() {
     let s = system("chua");
@@ -274,13 +313,17 @@ fn chua_eigenvalues_and_exponent() {
         e
     };
     let close = |found: &[[f64; 2]], want: &[[f64; 2]]| {
-        found.iter().zip(want).all(|(f, w)| (f[0] - w[0]).abs() < 0.01 && (f[1] - w[1]).abs() < 0.01)
+        found
+            .iter()
+            .zip(want)
+            .all(|(f, w)| (f[0] - w[0]).abs() < 0.01 && (f[1] - w[1]).abs() < 0.01)
     };
     let outside = at(&Field::plus(&s), [1.5, 0.0, -1.5]);
     assert!(close(&outside, &[[-3.94, 0.0], [0.19, -3.05], [0.19, 3.05]]), "{outside:?}");
     let inside = at(&Field::minus(&s), [0.0; 3]);
     assert!(close(&inside, &[[-0.97, -2.71], [-0.97, 2.71], [2.22, 0.0]]), "{inside:?}");
-    let settings = LyapunovOptions { transient: 100.0, duration: 6000.0, ..LyapunovOptions::default() };
+    let settings =
+        LyapunovOptions { transient: 100.0, duration: 6000.0, ..LyapunovOptions::default() };
     let start = s.definition().start().unwrap().to_vec();
     let question = LargestExponent { system: s, switch: SwitchSpec::tanh(1e-3), start, settings };
     let exponent: Exponent = Executor::quiet().ask(&question).unwrap().fact("exponent").unwrap();
@@ -288,7 +331,8 @@ fn chua_eigenvalues_and_exponent() {
     assert!((exponent.value - 0.3271).abs() < allowed && allowed < 0.05, "{exponent:?}");
 }
 
-/// Fossas & Olivar (1996): the orbit of the ramp's period loses its stability by period doubling at a supply of 24.516 V.
+/// Fossas & Olivar (1996): the orbit of the ramp's period loses its stability by period doubling at
+/// a supply of 24.516 V.
 #[test]
 fn buck_doubles_its_period() {
     let s = system("buck");
@@ -308,7 +352,8 @@ fn buck_doubles_its_period() {
     assert!((period - 1.0).abs() < 1e-8, "{period}");
 }
 
-/// Casey, de Jong & Gouzé (2006): the singular steady state on the threshold, from Filippov's convex combination.
+/// Casey, de Jong & Gouzé (2006): the singular steady state on the threshold, from Filippov's
+/// convex combination.
 #[test]
 fn gene_switch_settles_on_its_threshold() {
     let s = system("gene-switch");
@@ -316,20 +361,26 @@ fn gene_switch_settles_on_its_threshold() {
     let state: Vec<f64> = answer.fact("state").unwrap();
     // Share of the time above the threshold: 1 - gamma_p theta/kappa_p.
     let share = 1.0 - 1.0 / 3.0;
-    assert!((state[0] - 1.0).abs() < 1e-9 && (state[1] - 2.0 * share / 0.5).abs() < 1e-8, "{state:?}");
+    assert!(
+        (state[0] - 1.0).abs() < 1e-9 && (state[1] - 2.0 * share / 0.5).abs() < 1e-8,
+        "{state:?}"
+    );
     // The smoothed switch agrees to its width.
-    let smooth: Vec<f64> =
-        run(&s, SwitchSpec::tanh(1e-3), 60.0, Observation::Path { chord: 1e-2 }).fact("state").unwrap();
+    let smooth: Vec<f64> = run(&s, SwitchSpec::tanh(1e-3), 60.0, Observation::Path { chord: 1e-2 })
+        .fact("state")
+        .unwrap();
     assert!((smooth[1] - state[1]).abs() < 2e-2 && (smooth[0] - 1.0).abs() < 5e-3, "{smooth:?}");
 }
 
-/// Filippov (1988), sec. 19: from turn to turn 1/rho grows by -2 c/3 in the limit; with the folds apart a limit cycle of radius about
-/// (3 mu/c)^(1/2), exactly where (rho + 2 mu)^2 (...) of f+ closes.
+/// Filippov (1988), sec. 19: from turn to turn 1/rho grows by -2 c/3 in the limit; with the folds
+/// apart a limit cycle of radius about (3 mu/c)^(1/2), exactly where (rho + 2 mu)^2 (...) of f+
+/// closes.
 #[test]
 fn fused_focus_attracts_algebraically_and_bears_a_cycle() {
     let c = -0.3;
     let s = system("fused-focus");
-    let crossings = events(&run(&s, FILIPPOV, 110.0, Observation::Path { chord: 1e-2 }), &s, "crossing");
+    let crossings =
+        events(&run(&s, FILIPPOV, 110.0, Observation::Path { chord: 1e-2 }), &s, "crossing");
     let rho: Vec<f64> = crossings.iter().filter(|(_, x)| x[0] < 0.0).map(|(_, x)| -x[0]).collect();
     assert!(rho.len() > 50, "{}", rho.len());
     let n = rho.len();
@@ -353,16 +404,24 @@ fn fused_focus_attracts_algebraically_and_bears_a_cycle() {
     assert_eq!(mode.len(), 11);
 }
 
-/// A limit cycle of radius one beside a surface y = level: apart from it Newton's method finds the cycle; where it touches there is no
-/// derivative, and through a two-fold no map.
+/// A limit cycle of radius one beside a surface y = level: apart from it Newton's method finds the
+/// cycle; where it touches there is no derivative, and through a two-fold no map.
 #[test]
 fn grazing_and_set_valued_orbits_are_refused() {
-    let text = "states = ['x', 'y']\nstart = [1, 0]\nh = 'y - level'\nplus = ['g*x - y + 1', 'g*y + x - 1']\nminus = ['g*x - y', 'g*y + x']\n\
+    let text = "states = ['x', 'y']\nstart = [1, 0]\nh = 'y - level'\nplus = ['g*x - y + 1', 'g*y \
+        + x - 1']\nminus = ['g*x - y', 'g*y + x']\n\
                 [parameters]\nlevel = 1.2\n[let]\ng = '1 - x^2 - y^2'";
-    let s = System::new(twofold::system::Definition::from_toml(text, "cycle.toml").unwrap_or_else(|e| panic!("{e}")));
+    let s = System::new(
+        twofold::system::Definition::from_toml(text, "cycle.toml")
+            .unwrap_or_else(|e| panic!("{e}")),
+    );
     let found = ask(&orbit(&s, FILIPPOV, 1, 0.0));
-    let (period, m): (f64, Vec<[f64; 2]>) = (found.fact("period").unwrap(), found.fact("multipliers").unwrap());
-    assert!((period - 2.0 * PI).abs() < 1e-8 && (m[0][0] - (-4.0 * PI).exp()).abs() < 1e-6, "{period} {m:?}");
+    let (period, m): (f64, Vec<[f64; 2]>) =
+        (found.fact("period").unwrap(), found.fact("multipliers").unwrap());
+    assert!(
+        (period - 2.0 * PI).abs() < 1e-8 && (m[0][0] - (-4.0 * PI).exp()).abs() < 1e-6,
+        "{period} {m:?}"
+    );
     let refused = |s: &System, axis: usize, start: &[f64]| {
         let question = ClosedOrbit { start: start.to_vec(), ..orbit(s, FILIPPOV, axis, 0.0) };
         Executor::quiet().ask(&question).unwrap_err().to_string()
@@ -371,10 +430,14 @@ fn grazing_and_set_valued_orbits_are_refused() {
     assert!(grazing.contains("grazes"), "{grazing}");
     // From the attracting region of the two-fold, into it.
     let set_valued = refused(&system("two-fold"), 2, &[0.0, 0.1, 0.0]);
-    assert!(set_valued.contains("many futures") || set_valued.contains("did not return"), "{set_valued}");
+    assert!(
+        set_valued.contains("many futures") || set_valued.contains("did not return"),
+        "{set_valued}"
+    );
 }
 
-/// Two surfaces: squares |x| + |y| = c around the origin, each side in the time c; a surface is crossed at every corner.
+/// Two surfaces: squares |x| + |y| = c around the origin, each side in the time c; a surface is
+/// crossed at every corner.
 #[test]
 fn two_relays_run_around_a_square() {
     let system = system("relay-square");
@@ -389,8 +452,9 @@ fn two_relays_run_around_a_square() {
     assert_eq!(signs, ["0+", "-0", "0-", "+0"]);
 }
 
-/// Two surfaces, no spring between the blocks: each moves as if it were alone. The first is the system `stick-slip`, also while the second comes to
-/// rest and turns; the second, -x2 - F sign(v2), turns at atan(v/(x + F)) + k pi, and loses 2 F of its amplitude each time.
+/// Two surfaces, no spring between the blocks: each moves as if it were alone. The first is the
+/// system `stick-slip`, also while the second comes to rest and turns; the second, -x2 - F
+/// sign(v2), turns at atan(v/(x + F)) + k pi, and loses 2 F of its amplitude each time.
 #[test]
 fn two_blocks_without_a_spring_move_alone() {
     let (pair, alone) = (system("two-blocks"), system("stick-slip"));
@@ -399,7 +463,12 @@ fn two_blocks_without_a_spring_move_alone() {
     let mut sticking = 0;
     for kind in ["landing", "left-by-tangency"] {
         let (found, known) = (events(&both, &pair, kind), events(&one, &alone, kind));
-        assert!(known.len() >= 3 && found.len() == known.len(), "{kind}: {} of {}", found.len(), known.len());
+        assert!(
+            known.len() >= 3 && found.len() == known.len(),
+            "{kind}: {} of {}",
+            found.len(),
+            known.len()
+        );
         for ((t, x), (u, y)) in found.iter().zip(&known) {
             assert!(
                 (t - u).abs() < 1e-8 && (x[0] - y[0]).abs() < 1e-8 && (x[1] - y[1]).abs() < 1e-8,
@@ -416,14 +485,26 @@ fn two_blocks_without_a_spring_move_alone() {
     for (k, row) in turns.into_iter().enumerate() {
         let t = (0.5f64).atan2(10.0 + friction) + k as f64 * PI;
         let x = if k % 2 == 0 { 1.0 } else { -1.0 } * (amplitude - 2.0 * friction * k as f64);
-        assert!((table.numbers("t")[row] - t).abs() < 1e-8, "turn {k}: {} instead of {t}", table.numbers("t")[row]);
-        assert!((table.numbers("x2")[row] - x).abs() < 1e-8, "turn {k}: {} instead of {x}", table.numbers("x2")[row]);
+        assert!(
+            (table.numbers("t")[row] - t).abs() < 1e-8,
+            "turn {k}: {} instead of {t}",
+            table.numbers("t")[row]
+        );
+        assert!(
+            (table.numbers("x2")[row] - x).abs() < 1e-8,
+            "turn {k}: {} instead of {x}",
+            table.numbers("x2")[row]
+        );
         sticking += usize::from(signs[row] == "00");
     }
-    assert!(sticking >= 2, "the second block never turns while the first sticks: the test would prove less");
+    assert!(
+        sticking >= 2,
+        "the second block never turns while the first sticks: the test would prove less"
+    );
 }
 
-/// Without a spring between them two blocks that stick at once go on, each on its own belt, as they do smoothed.
+/// Without a spring between them two blocks that stick at once go on, each on its own belt, as they
+/// do smoothed.
 #[test]
 fn two_blocks_that_stick_at_once_go_on() {
     let pair = system("two-blocks");
@@ -447,7 +528,9 @@ fn two_blocks_that_stick_at_once_go_on() {
     };
     let sharp = Executor::quiet().ask(&Run(of(FILIPPOV))).unwrap();
     let smoothed = Executor::quiet().ask(&Run(of(SwitchSpec::tanh(1e-3)))).unwrap();
-    let last = |answer: &Answer, table: &str, of: &str| *answer.table(table).unwrap().numbers(of).last().unwrap();
+    let last = |answer: &Answer, table: &str, of: &str| {
+        *answer.table(table).unwrap().numbers(of).last().unwrap()
+    };
     assert!((last(&smoothed, "path", "t") - 20.0).abs() < 1e-12);
     assert!((last(&sharp, "motion", "x2") - 0.046_148_351_9).abs() < 1e-8);
     // A layer of width eps shifts a block by a few eps.
@@ -457,18 +540,23 @@ fn two_blocks_that_stick_at_once_go_on() {
     assert!(refused.contains("one switching surface"), "{refused}");
 }
 
-/// The smoothed pair is the product of the two smoothings: without a spring the first block moves as the smoothed system `stick-slip`.
+/// The smoothed pair is the product of the two smoothings: without a spring the first block moves
+/// as the smoothed system `stick-slip`.
 #[test]
 fn two_smoothed_switches_do_not_mix() {
     let (pair, alone) = (system("two-blocks"), system("stick-slip"));
     let at = |x: [f64; 4]| {
-        let both = Field::smoothed(&pair, twofold::system::Transition::Tanh, 0.1).bind::<4>().unwrap();
-        let one = Field::smoothed(&alone, twofold::system::Transition::Tanh, 0.1).bind::<2>().unwrap();
+        let both =
+            Field::smoothed(&pair, twofold::system::Transition::Tanh, 0.1).bind::<4>().unwrap();
+        let one =
+            Field::smoothed(&alone, twofold::system::Transition::Tanh, 0.1).bind::<2>().unwrap();
         use twofold::system::VectorField;
         let (f, g) = (both.eval(&SVector::from(x)), one.eval(&SVector::from([x[0], x[1]])));
         assert!((f[0] - g[0]).abs() < 1e-14 && (f[1] - g[1]).abs() < 1e-14, "{f} {g}");
         let phi = 0.5 * (1.0 + (x[3] / 0.1).tanh());
         assert!((f[3] - (-x[2] - 0.1 * (2.0 * phi - 1.0))).abs() < 1e-14);
     };
-    [[0.2, 0.3, 1.0, 0.05], [0.2, 0.25, -1.0, -0.15], [0.2, 0.4, 0.0, 0.0]].into_iter().for_each(at);
+    [[0.2, 0.3, 1.0, 0.05], [0.2, 0.25, -1.0, -0.15], [0.2, 0.4, 0.0, 0.0]]
+        .into_iter()
+        .for_each(at);
 }

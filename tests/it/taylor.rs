@@ -1,5 +1,5 @@
-//! The project's own ground truth: Taylor series in double-double arithmetic, against crossings computed in 113-bit
-//! arithmetic outside this project (crates/verify/data/crossings-*.csv).
+//! The project's own ground truth: Taylor series in double-double arithmetic, against crossings
+//! computed in 113-bit arithmetic outside this project (crates/verify/data/crossings-*.csv).
 
 use nalgebra::{SVector, vector};
 use twofold::analyse::Direction;
@@ -7,7 +7,9 @@ use twofold::analyse::digits::{Agreement, agreement};
 use twofold::analyse::reference::{ExtendedCrossing, SectionPlane, reference};
 use twofold::integrate::*;
 use twofold::num::{Arithmetic, DoubleDouble, Scalar};
-use twofold::system::{Caricature, Hysteretic, Relaxation, Smoothed, Transition, VectorField, Wheel};
+use twofold::system::{
+    Caricature, Hysteretic, Relaxation, Smoothed, Transition, VectorField, Wheel,
+};
 
 struct Row {
     t: f64,
@@ -29,22 +31,34 @@ fn rows(text: &str) -> Vec<Row> {
 }
 
 const PRINTED: (f64, &str) = (1e-3, include_str!("../../crates/verify/data/crossings-printed.csv"));
-const RECONSTRUCTED: (f64, &str) = (1e-1, include_str!("../../crates/verify/data/crossings-reconstructed.csv"));
+const RECONSTRUCTED: (f64, &str) =
+    (1e-1, include_str!("../../crates/verify/data/crossings-reconstructed.csv"));
 const START: [f64; 3] = [0.2, 0.0, -1.0];
 const SECTION: SectionPlane = SectionPlane { coordinate: 1, value: 0.0 };
 
 fn smoothed(alpha: f64, eps: f64) -> Smoothed<Caricature> {
-    Smoothed { system: Caricature::with_reinjection(alpha, 1e-5), transition: Transition::Tanh, eps }
+    Smoothed {
+        system: Caricature::with_reinjection(alpha, 1e-5),
+        transition: Transition::Tanh,
+        eps,
+    }
 }
 
-/// The double-double orbit with every constant and the start read as decimal numbers, as the reference reads them, or as
-/// `f64`.
+/// The double-double orbit with every constant and the start read as decimal numbers, as the
+/// reference reads them, or as `f64`.
 fn orbit(alpha: f64, rows: &[Row], decimal: bool) -> Vec<ExtendedCrossing> {
     let read = if decimal { DoubleDouble::from_decimal } else { DoubleDouble::from_f64 };
     let t_end = rows.last().unwrap().t + 1.0;
-    reference(&smoothed(alpha, 1e-3), SVector::from(START.map(read)), SECTION, rows.len(), t_end, decimal)
-        .unwrap()
-        .crossings
+    reference(
+        &smoothed(alpha, 1e-3),
+        SVector::from(START.map(read)),
+        SECTION,
+        rows.len(),
+        t_end,
+        decimal,
+    )
+    .unwrap()
+    .crossings
 }
 
 /// Largest difference in a component of the state, and the difference in time.
@@ -61,7 +75,10 @@ fn follows_every_row((alpha, text): (f64, &str)) {
     assert_eq!(got.len(), want.len());
     for (g, w) in got.iter().zip(&want) {
         let (state, time) = errors(g, w);
-        println!("t {:20} error {state:8.1e} in t {time:8.1e} uncertainty {:8.1e}", w.t, w.uncertainty);
+        println!(
+            "t {:20} error {state:8.1e} in t {time:8.1e} uncertainty {:8.1e}",
+            w.t, w.uncertainty
+        );
         let extent = w.x.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
         assert!(state <= w.uncertainty + f64::EPSILON * extent, "t = {}: {state:e}", w.t);
         assert!(time <= w.uncertainty + f64::EPSILON * w.t, "t = {}: {time:e} in time", w.t);
@@ -91,18 +108,28 @@ fn the_reference_reads_its_constants_as_decimals() {
     }
 }
 
-/// The rows of f64 Taylor at the rounding limit against double-double with the same (f64) constants.
+/// The rows of f64 Taylor at the rounding limit against double-double with the same (f64)
+/// constants.
 fn plain(alpha: f64, text: &str) -> Vec<Agreement> {
     let exact = orbit(alpha, &rows(text), false);
     let mut taylor = Taylor::new(Tolerance { rtol: 1e-16, atol: 1e-16 });
-    agreement(&smoothed(alpha, 1e-3), SVector::from(START), SECTION, &exact, &mut taylor, StepCap::None, 1_000_000)
-        .unwrap()
+    agreement(
+        &smoothed(alpha, 1e-3),
+        SVector::from(START),
+        SECTION,
+        &exact,
+        &mut taylor,
+        StepCap::None,
+        1_000_000,
+    )
+    .unwrap()
 }
 
 #[test]
 fn f64_keeps_a_few_digits_beyond_the_first_visit() {
-    // Measured: 1.4e-6 at the first exit of the reconstructed reading, 6e-3 of the printed. Rounding alone, at 1e-16, must
-    // cost at least three digits more than that: a smaller error would mean that the visit amplifies nothing.
+    // Measured: 1.4e-6 at the first exit of the reconstructed reading, 6e-3 of the printed.
+    // Rounding alone, at 1e-16, must cost at least three digits more than that: a smaller error
+    // would mean that the visit amplifies nothing.
     for ((alpha, text), visit, most) in [(RECONSTRUCTED, 3, 1e-4), (PRINTED, 5, 1e-1)] {
         let rows = plain(alpha, text);
         for r in &rows {
@@ -117,16 +144,29 @@ fn f64_keeps_a_few_digits_beyond_the_first_visit() {
 
 #[test]
 fn no_tolerance_jumps_over_the_layer() {
-    // SCIENCE.md section 5: a Taylor method that does not know the layer gets t = 2.18..2.76 at every tolerance.
+    // SCIENCE.md section 5: a Taylor method that does not know the layer gets t = 2.18..2.76 at
+    // every tolerance.
     let want = rows(PRINTED.1);
     let exact = orbit(PRINTED.0, &want[..1], false);
     for tolerance in [1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14, 1e-16] {
         let mut taylor = Taylor::new(Tolerance { rtol: tolerance, atol: tolerance });
         let x0 = SVector::from(START);
-        let got =
-            agreement(&smoothed(PRINTED.0, 1e-3), x0, SECTION, &exact, &mut taylor, StepCap::None, 1_000_000).unwrap();
+        let got = agreement(
+            &smoothed(PRINTED.0, 1e-3),
+            x0,
+            SECTION,
+            &exact,
+            &mut taylor,
+            StepCap::None,
+            1_000_000,
+        )
+        .unwrap();
         println!("{tolerance:e}: {:e}", got[0].error);
-        assert!(got[0].error < 30.0 * tolerance + 2e-15, "tolerance {tolerance:e}: {:e}", got[0].error);
+        assert!(
+            got[0].error < 30.0 * tolerance + 2e-15,
+            "tolerance {tolerance:e}: {:e}",
+            got[0].error
+        );
     }
 }
 
@@ -142,7 +182,12 @@ fn end<const N: usize, F: VectorField<N>, M: Stepper<N>>(
 
 /// f64 Taylor, double-double Taylor and Dormand-Prince, all at 1e-12, meet.
 #[track_caller]
-fn methods_meet<const N: usize, F: VectorField<N>>(field: &F, x0: SVector<f64, N>, t_end: f64, within: f64) {
+fn methods_meet<const N: usize, F: VectorField<N>>(
+    field: &F,
+    x0: SVector<f64, N>,
+    t_end: f64,
+    within: f64,
+) {
     let tolerance = Tolerance { rtol: 1e-12, atol: 1e-12 };
     let a = end(field, x0, t_end, Taylor::new(tolerance));
     let b = end(field, x0, t_end, Taylor::extended(tolerance));
@@ -155,13 +200,23 @@ fn methods_meet<const N: usize, F: VectorField<N>>(field: &F, x0: SVector<f64, N
 
 #[test]
 fn equations_with_other_layers_need_no_telling() {
-    // The wheel has a second tanh (the tyre's trail); the hysteretic system's argument contains phi.
+    // The wheel has a second tanh (the tyre's trail); the hysteretic system's argument contains
+    // phi.
     let wheel = Smoothed { system: Wheel::default(), transition: Transition::Tanh, eps: 1e-3 };
     methods_meet(&wheel, vector![0.69267, 0.0, 0.0], 1.0, 1e-7);
     let caricature = Caricature::with_reinjection(1e-1, 1e-5);
-    let hysteretic = Hysteretic { system: caricature, eps: 1e-2, eps_prime: 1e-1, relaxation: Relaxation::Literal };
+    let hysteretic = Hysteretic {
+        system: caricature,
+        eps: 1e-2,
+        eps_prime: 1e-1,
+        relaxation: Relaxation::Literal,
+    };
     methods_meet(&hysteretic, vector![0.2, 0.0, -1.0, 1.0], 3.0, 1e-7);
-    let perturbed = Smoothed { system: caricature, transition: Transition::PerturbedTanh { sigma: 1.0 }, eps: 1e-3 };
+    let perturbed = Smoothed {
+        system: caricature,
+        transition: Transition::PerturbedTanh { sigma: 1.0 },
+        eps: 1e-3,
+    };
     methods_meet(&perturbed, vector![0.2, 0.0, -1.0], 4.0, 1e-7);
 }
 
@@ -169,7 +224,8 @@ fn equations_with_other_layers_need_no_telling() {
 fn a_run_by_name_is_the_reference() {
     use twofold::job::spec::{Method, MethodSpec, Observation, RunSpec, SwitchSpec};
     use twofold::job::{Executor, Run};
-    // Through the first visit, which multiplies by 1e12 whatever the default tolerance or 0.1 as a binary number leave out.
+    // Through the first visit, which multiplies by 1e12 whatever the default tolerance or 0.1 as a
+    // binary number leave out.
     let run = RunSpec {
         system: Caricature::with_reinjection(1e-1, 1e-5).into(),
         switch: SwitchSpec::tanh(1e-3),

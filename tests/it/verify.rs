@@ -1,8 +1,10 @@
 //! The checker of certificates: the committed ones pass, forged ones do not.
 //!
-//! A forged number is *certainly false* if what it claims contradicts the committed certificate, which is true: an enclosure that has no number in common with the
-//! committed one, bounds in the wrong order, a radius that is not positive, another direction or another equation. All of these must be refused. Other alterations may be
-//! true: a wider enclosure, or one that is narrower and still holds the value.
+//! A forged number is *certainly false* if what it claims contradicts the committed certificate,
+//! which is true: an enclosure that has no number in common with the committed one, bounds in the
+//! wrong order, a radius that is not positive, another direction or another equation. All of these
+//! must be refused. Other alterations may be true: a wider enclosure, or one that is narrower and
+//! still holds the value.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -12,13 +14,23 @@ use assert_cmd::Command;
 use serde_json::{Value, json};
 use twofold::verify::{Checker, Refused, verify};
 
-const NAMES: [&str; 8] =
-    ["printed-cycle", "coexistence", "saddles", "inner-law", "sensitivity", "contraction", "crossings", "horseshoe"];
+const NAMES: [&str; 8] = [
+    "printed-cycle",
+    "coexistence",
+    "saddles",
+    "inner-law",
+    "sensitivity",
+    "contraction",
+    "crossings",
+    "horseshoe",
+];
 /// What the debug profile verifies in seconds: the orbits are short.
 const QUICK: [&str; 1] = ["sensitivity"];
 
 fn text(name: &str) -> String {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("proofs/certificates").join(format!("{name}.json"));
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("proofs/certificates")
+        .join(format!("{name}.json"));
     fs::read_to_string(path).unwrap()
 }
 
@@ -50,7 +62,9 @@ fn committed_certificates_are_verified() {
 fn leaves(value: &Value, at: &str, found: &mut Vec<String>) {
     match value {
         Value::Object(map) => map.iter().for_each(|(k, v)| leaves(v, &format!("{at}/{k}"), found)),
-        Value::Array(list) => list.iter().enumerate().for_each(|(i, v)| leaves(v, &format!("{at}/{i}"), found)),
+        Value::Array(list) => {
+            list.iter().enumerate().for_each(|(i, v)| leaves(v, &format!("{at}/{i}"), found))
+        }
         _ => found.push(at.to_owned()),
     }
 }
@@ -65,13 +79,18 @@ fn enclosures(value: &Value, at: &str, found: &mut Vec<String>) {
             let others = map.iter().filter(|(k, _)| !NO_BOUNDS.contains(&k.as_str()));
             others.for_each(|(k, v)| enclosures(v, &format!("{at}/{k}"), found));
         }
-        Value::Array(list) if list.len() == 2 && list.iter().all(Value::is_f64) => found.push(at.to_owned()),
-        Value::Array(list) => list.iter().enumerate().for_each(|(i, v)| enclosures(v, &format!("{at}/{i}"), found)),
+        Value::Array(list) if list.len() == 2 && list.iter().all(Value::is_f64) => {
+            found.push(at.to_owned())
+        }
+        Value::Array(list) => {
+            list.iter().enumerate().for_each(|(i, v)| enclosures(v, &format!("{at}/{i}"), found))
+        }
         _ => {}
     }
 }
 
-/// The middle and the radius of an enclosure; middles of balls relative to `origin`, because their second parts are below the first's last digit.
+/// The middle and the radius of an enclosure; middles of balls relative to `origin`, because their
+/// second parts are below the first's last digit.
 fn middle_and_radius(enclosure: &Value, origin: f64) -> (f64, f64) {
     let at = |x: &Value| x.as_f64().unwrap();
     match enclosure {
@@ -134,7 +153,8 @@ struct Count {
     accepted: BTreeMap<String, usize>,
 }
 
-/// Forges every leaf alone and every enclosure as a whole; certainly false ones must all be refused.
+/// Forges every leaf alone and every enclosure as a whole; certainly false ones must all be
+/// refused.
 fn forge(name: &str) -> Count {
     let checker = Checker::default();
     let accepts = |document: &Value| checker.verify(&document.to_string()).is_ok();
@@ -152,10 +172,12 @@ fn forge(name: &str) -> Count {
             let altered = forged(&document, at, by.clone());
             let is_false = match of {
                 Some(e) => contradicts(altered.pointer(e).unwrap(), document.pointer(e).unwrap()),
-                // All else is certain: directions, equations, starts, indices, parts. A preconditioner, a set's
-                // shape and a cone's slopes are the prover's choice, and a larger least S is a weaker claim.
+                // All else is certain: directions, equations, starts, indices, parts. A
+                // preconditioner, a set's shape and a cone's slopes are the prover's choice, and a
+                // larger least S is a weaker claim.
                 None => {
-                    let witness = ["preconditioner", "centre", "unstable", "stable", "least_s", "cones"];
+                    let witness =
+                        ["preconditioner", "centre", "unstable", "stable", "least_s", "cones"];
                     !witness.iter().any(|w| at.contains(w))
                 }
             };
@@ -173,7 +195,8 @@ fn forge(name: &str) -> Count {
             }
         }
     }
-    // Each enclosure as a whole: moved beyond itself, both ways, and shrunk to a number that is not in it.
+    // Each enclosure as a whole: moved beyond itself, both ways, and shrunk to a number that is not
+    // in it.
     for at in &at_enclosures {
         let enclosure = document.pointer(at).unwrap();
         for way in [-3.0, 3.0] {
@@ -187,7 +210,8 @@ fn forge(name: &str) -> Count {
                     }
                 }
                 ball => {
-                    let (high, low) = (ball["high"].as_f64().unwrap(), ball["low"].as_f64().unwrap());
+                    let (high, low) =
+                        (ball["high"].as_f64().unwrap(), ball["low"].as_f64().unwrap());
                     let key = if r > f64::EPSILON * high.abs() { "high" } else { "low" };
                     let x = if key == "high" { high } else { low };
                     ball[key] = json!(x + way * r.max(f64::EPSILON * x.abs()));
@@ -232,7 +256,8 @@ fn forge(name: &str) -> Count {
 }
 
 const HEAD: &str = "\
-| certificate | leaves | tried | refused | accepted | of the refused: certainly false, alone | in groups | may be true | where accepted (number) |
+| certificate | leaves | tried | refused | accepted | of the refused: certainly false, alone | in \
+groups | may be true | where accepted (number) |
 |---|---|---|---|---|---|---|---|---|";
 
 /// A row of proofs/forgeries.md.
@@ -320,13 +345,21 @@ mod coordinated {
     #[test]
     fn a_key_stands_once() {
         for (name, key) in [("printed-cycle", "determinant"), ("sensitivity", "states")] {
-            let twice = text(name).replacen(&format!("\"{key}\":"), &format!("\"{key}\": [0.0, 0.0],\n\"{key}\":"), 1);
+            let twice = text(name).replacen(
+                &format!("\"{key}\":"),
+                &format!("\"{key}\": [0.0, 0.0],\n\"{key}\":"),
+                1,
+            );
             let Err(Refused::Unreadable(why)) = verify(&twice) else { panic!("{name}") };
-            assert!(why.contains(&format!("the key {key:?} stands twice")) && why.contains("line"), "{why}");
+            assert!(
+                why.contains(&format!("the key {key:?} stands twice")) && why.contains("line"),
+                "{why}"
+            );
         }
     }
 
-    /// A closed orbit whose derivative is claimed to be diag(a, b), and all that is derived from it.
+    /// A closed orbit whose derivative is claimed to be diag(a, b), and all that is derived from
+    /// it.
     fn of_other_stability(cycle: &mut Value, [a, b]: [f64; 2]) {
         let zero = json!([0.0, 0.0]);
         let derivative = json!([[[a, a], zero], [zero, [b, b]]]);
@@ -354,7 +387,9 @@ mod coordinated {
     #[ignore = "encloses orbits of four certificates, minutes in debug: make forge"]
     fn orbits_of_other_stability_or_that_do_not_close_or_that_meet_are_refused() {
         let checker = Checker::default();
-        for (to, from, derivative) in [("coexistence", "saddles", [0.5, 0.5]), ("saddles", "coexistence", [2.0, 0.5])] {
+        for (to, from, derivative) in
+            [("coexistence", "saddles", [0.5, 0.5]), ("saddles", "coexistence", [2.0, 0.5])]
+        {
             let mut document = certificate(to);
             let cycle = &mut document["data"]["period three"];
             *cycle = certificate(from)["data"]["period three"].clone();
@@ -369,7 +404,11 @@ mod coordinated {
                 *bound = json!(bound.as_f64().unwrap() + 1.0 / 1_048_576.0);
             }
         }
-        is_refused(&checker, &document, "an independent Krawczyk operator maps the candidate into itself");
+        is_refused(
+            &checker,
+            &document,
+            "an independent Krawczyk operator maps the candidate into itself",
+        );
 
         // Two orbits that meet at their fourth crossing.
         let mut document = certificate("contraction");
@@ -389,10 +428,15 @@ fn missing_and_added_parts_are_refused_with_their_place() {
         let data = without["data"].as_object_mut().unwrap();
         let key = data.keys().next().unwrap().clone();
         data.remove(&key);
-        assert!(matches!(verify(&without.to_string()), Err(Refused::Unreadable(_))), "{name} without {key}");
+        assert!(
+            matches!(verify(&without.to_string()), Err(Refused::Unreadable(_))),
+            "{name} without {key}"
+        );
         let mut with = document.clone();
         with["data"]["more"] = json!(1);
-        let Err(Refused::Unreadable(why)) = verify(&with.to_string()) else { panic!("{name} with more") };
+        let Err(Refused::Unreadable(why)) = verify(&with.to_string()) else {
+            panic!("{name} with more")
+        };
         assert!(why.contains("more") && why.contains("column"), "{why}");
     }
     // A certificate under another's name.
@@ -414,7 +458,8 @@ fn exit_codes() {
     let at = folder.path().join("cert.json");
     let run = |text: &str| {
         fs::write(&at, text).unwrap();
-        let output = Command::cargo_bin("twofold").unwrap().arg("verify").arg(&at).output().unwrap();
+        let output =
+            Command::cargo_bin("twofold").unwrap().arg("verify").arg(&at).output().unwrap();
         (output.status.code().unwrap(), String::from_utf8_lossy(&output.stdout).into_owned())
     };
     let document = certificate("sensitivity");

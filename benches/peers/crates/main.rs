@@ -1,8 +1,11 @@
-//! Units of work W0 and W1 (benches/README.md) with the `differential-equations` crate: crates-units W0|W1 A radau5|dopri5 5
+//! Units of work W0 and W1 (benches/README.md) with the `differential-equations` crate:
+//! crates-units W0|W1 A radau5|dopri5 5
 //!
-//! Prints: peer, unit, set, the least seconds of processor time of the given number of runs, steps, crossings, final state.
+//! Prints: peer, unit, set, the least seconds of processor time of the given number of runs, steps,
+//! crossings, final state.
 //!
-//! Its Radau IIA does what Hairer & Wanner's program does: a tolerance r that is asked for is replaced by 0.1 r^(2/3), here 4.8e-7.
+//! Its Radau IIA does what Hairer & Wanner's program does: a tolerance r that is asked for is
+//! replaced by 0.1 r^(2/3), here 4.8e-7.
 
 use differential_equations::prelude::*;
 
@@ -35,8 +38,16 @@ impl ODE<f64, [f64; 3]> for Caricature {
         let (by_y, by_z) = (self.alpha - self.beta * y, self.alpha - self.beta * z);
         let rows = [
             [(-y - z) * slope, -phi, 1.0 - phi],
-            [(1.0 - V_MINUS) * slope + by_y * 2.0 * x, by_y * 2.0 * y - self.beta * r2, by_y * 2.0 * z],
-            [(V_PLUS - 1.0) * slope + by_z * 2.0 * x, by_z * 2.0 * y, by_z * 2.0 * z - self.beta * r2],
+            [
+                (1.0 - V_MINUS) * slope + by_y * 2.0 * x,
+                by_y * 2.0 * y - self.beta * r2,
+                by_y * 2.0 * z,
+            ],
+            [
+                (V_PLUS - 1.0) * slope + by_z * 2.0 * x,
+                by_z * 2.0 * y,
+                by_z * 2.0 * z - self.beta * r2,
+            ],
         ];
         for (i, row) in rows.iter().enumerate() {
             for (k, entry) in row.iter().enumerate() {
@@ -110,13 +121,19 @@ fn run(system: &Caricature, method: &str, segments: u32, length: f64) -> Option<
             let (t, x) = (section.t, section.end);
             let done = match method {
                 "radau5" => {
-                    let method =
-                        ImplicitRungeKutta::radau5().rtol(TOLERANCE).atol(TOLERANCE).h_max(10.0).max_steps(1_000_000);
+                    let method = ImplicitRungeKutta::radau5()
+                        .rtol(TOLERANCE)
+                        .atol(TOLERANCE)
+                        .h_max(10.0)
+                        .max_steps(1_000_000);
                     IVP::ode(system, t, end, x).solout(&mut section).method(method).solve().is_ok()
                 }
                 "dopri5" => {
-                    let method =
-                        ExplicitRungeKutta::dopri5().rtol(TOLERANCE).atol(TOLERANCE).h_max(10.0).max_steps(1_000_000);
+                    let method = ExplicitRungeKutta::dopri5()
+                        .rtol(TOLERANCE)
+                        .atol(TOLERANCE)
+                        .h_max(10.0)
+                        .max_steps(1_000_000);
                     IVP::ode(system, t, end, x).solout(&mut section).method(method).solve().is_ok()
                 }
                 _ => return None,
@@ -142,17 +159,25 @@ fn seconds() -> f64 {
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).collect();
-    let [unit, set, method, repeats] = words.iter().map(String::as_str).collect::<Vec<_>>()[..] else {
+    let [unit, set, method, repeats] = words.iter().map(String::as_str).collect::<Vec<_>>()[..]
+    else {
         eprintln!("usage: crates-units W0|W1 A|B radau5|dopri5 REPEATS");
         std::process::exit(2);
     };
-    let system =
-        if set == "A" { Caricature { alpha: 1e-3, beta: 1e-5 } } else { Caricature { alpha: 1e-1, beta: 1e-4 } };
+    let system = if set == "A" {
+        Caricature { alpha: 1e-3, beta: 1e-5 }
+    } else {
+        Caricature { alpha: 1e-1, beta: 1e-4 }
+    };
     let mut best = f64::INFINITY;
     let mut last = None;
     for _ in 0..repeats.parse().unwrap_or(1) {
         let start = seconds();
-        last = if unit == "W0" { run(&system, method, 1, 10.0) } else { run(&system, method, 2000, 100.0) };
+        last = if unit == "W0" {
+            run(&system, method, 1, 10.0)
+        } else {
+            run(&system, method, 2000, 100.0)
+        };
         best = best.min(seconds() - start);
     }
     let Some(Section { steps, crossings, end: [x, y, z], given_up, .. }) = last else {
@@ -160,7 +185,11 @@ fn main() {
         std::process::exit(1);
     };
     if given_up > 0 {
-        eprintln!("gave up {given_up} times (\"step size became too small\") and was started again");
+        eprintln!(
+            "gave up {given_up} times (\"step size became too small\") and was started again"
+        );
     }
-    println!("differential-equations-{method} {unit} {set} {best:.6} {steps} {crossings} {x} {y} {z}");
+    println!(
+        "differential-equations-{method} {unit} {set} {best:.6} {steps} {crossings} {x} {y} {z}"
+    );
 }

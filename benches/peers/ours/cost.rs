@@ -1,8 +1,11 @@
-//! What a run costs against how long it is, how thin the layer is and how small the tolerance: `make bench-cost`.
+//! What a run costs against how long it is, how thin the layer is and how small the tolerance:
+//! `make bench-cost`.
 //!
-//! Prints a CSV: what is varied, its value, method, threads, processor seconds of one run (wall-clock seconds with two threads), steps,
-//! evaluations, crossings. A short run is repeated until a quarter of a second has gone, and the mean is told: what a system counts as a
-//! thread's time may come in steps of four milliseconds. A run of more than `MOST` steps is given up and says so.
+//! Prints a CSV: what is varied, its value, method, threads, processor seconds of one run
+//! (wall-clock seconds with two threads), steps, evaluations, crossings. A short run is repeated
+//! until a quarter of a second has gone, and the mean is told: what a system counts as a thread's
+//! time may come in steps of four milliseconds. A run of more than `MOST` steps is given up and
+//! says so.
 
 use std::time::Instant;
 
@@ -10,7 +13,8 @@ use nalgebra::vector;
 use twofold::analyse::SectionRecorder;
 use twofold::integrate::ensemble::{EnsembleRun, SectionPlane, ensemble};
 use twofold::integrate::{
-    Dopri5, DriveOptions, Layered, Lsoda, Radau5, Schedule, StepCap, Stepper, StopReason, Taylor, Tolerance, drive,
+    Dopri5, DriveOptions, Layered, Lsoda, Radau5, Schedule, StepCap, Stepper, StopReason, Taylor,
+    Tolerance, drive,
 };
 use twofold::system::{Caricature, Smoothed, Transition};
 
@@ -34,20 +38,35 @@ fn options(t_end: f64) -> DriveOptions {
     }
 }
 
-/// Seconds that this thread has computed; where the system does not tell, seconds of the clock since `since`.
+/// Seconds that this thread has computed; where the system does not tell, seconds of the clock
+/// since `since`.
 fn seconds(since: Instant) -> f64 {
     let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
     let nanoseconds = told.and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok());
     nanoseconds.map_or_else(|| since.elapsed().as_secs_f64(), |n| n * 1e-9)
 }
 
-fn one<M: Stepper<3>>(varied: &str, value: f64, method: &str, eps: f64, t_end: f64, stepper: impl Fn() -> M) {
+fn one<M: Stepper<3>>(
+    varied: &str,
+    value: f64,
+    method: &str,
+    eps: f64,
+    t_end: f64,
+    stepper: impl Fn() -> M,
+) {
     let start = Instant::now();
     let before = seconds(start);
     let mut runs = 0.0;
     loop {
         let mut section = SectionRecorder::<3>::new(1, 0.0);
-        let end = drive(&field(eps), vector![0.2, 0.0, -1.0], &options(t_end), &mut stepper(), &mut section, &());
+        let end = drive(
+            &field(eps),
+            vector![0.2, 0.0, -1.0],
+            &options(t_end),
+            &mut stepper(),
+            &mut section,
+            &(),
+        );
         let took = seconds(start) - before;
         runs += 1.0;
         match end {
@@ -87,9 +106,13 @@ fn main() {
     for tolerance in [1e-4, 1e-6, 1e-8, 1e-10, 1e-12] {
         each("tolerance", tolerance, 1e-3, 2e3, tolerance);
     }
-    // 512 runs in lanes, sections recorded, on one thread and on two: of the clock, so an idle machine is needed.
+    // 512 runs in lanes, sections recorded, on one thread and on two: of the clock, so an idle
+    // machine is needed.
     let runs: Vec<_> = (0..512)
-        .map(|k| EnsembleRun { start: vector![0.1 + 0.2 * f64::from(k) / 512.0, 0.0, -1.0], options: options(2e3) })
+        .map(|k| EnsembleRun {
+            start: vector![0.1 + 0.2 * f64::from(k) / 512.0, 0.0, -1.0],
+            options: options(2e3),
+        })
         .collect();
     let plane = Some(SectionPlane { coordinate: 1, value: 0.0 });
     let tolerance = Tolerance { rtol: TOLERANCE, atol: TOLERANCE };
@@ -98,8 +121,12 @@ fn main() {
         let done = std::thread::scope(|scope| {
             let part = |runs| {
                 scope.spawn(move || {
-                    let ends = ensemble(&field(1e-3), runs, tolerance, plane, |_| SectionRecorder::<3>::new(1, 0.0));
-                    ends.iter().filter_map(|end| end.summary.as_ref().ok().map(|s| s.statistics.steps)).sum::<u64>()
+                    let ends = ensemble(&field(1e-3), runs, tolerance, plane, |_| {
+                        SectionRecorder::<3>::new(1, 0.0)
+                    });
+                    ends.iter()
+                        .filter_map(|end| end.summary.as_ref().ok().map(|s| s.statistics.steps))
+                        .sum::<u64>()
                 })
             };
             let parts: Vec<_> = runs.chunks(runs.len() / threads).map(part).collect();

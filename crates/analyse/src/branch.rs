@@ -1,7 +1,8 @@
 //! Closed orbits of any return map, and their continuation in a parameter.
 //!
-//! A closed orbit is a zero of P(u, p) - u. It is followed through the (u, p) plane by pseudo-arclength (Keller 1977; Seydel 2010,
-//! Practical Bifurcation and Stability Analysis, ch. 4), so that folds, where the branch turns back in p, are passed.
+//! A closed orbit is a zero of P(u, p) - u. It is followed through the (u, p) plane by
+//! pseudo-arclength (Keller 1977; Seydel 2010, Practical Bifurcation and Stability Analysis, ch.
+//! 4), so that folds, where the branch turns back in p, are passed.
 
 use serde::{Deserialize, Serialize};
 
@@ -15,13 +16,14 @@ pub trait ReturnMap {
     fn states(&self) -> usize;
     /// The coordinate of the plane, which stays what it is.
     fn axis(&self) -> usize;
-    /// The return from `u` at the parameter's value `p`, with the derivative in u if it is asked for.
+    /// The return from `u` at the parameter's value `p`, with the derivative in u if it is asked
+    /// for.
     ///
     /// # Errors
     /// Why there is no return or no derivative.
     fn returned(&self, u: &[f64], p: f64, derivative: bool) -> Result<Returned, Trouble>;
-    /// The same, computed less accurately, with the derivative: the difference is at least the error of [`ReturnMap::returned`]. A map
-    /// that is computed exactly needs none.
+    /// The same, computed less accurately, with the derivative: the difference is at least the
+    /// error of [`ReturnMap::returned`]. A map that is computed exactly needs none.
     ///
     /// # Errors
     /// Why there is no return or no derivative.
@@ -50,7 +52,8 @@ pub enum Obstacle {
     Grazing,
     /// It comes to where its future is a set.
     SetValued,
-    /// The search comes to a point from which there is no loop, or one that is not told from a rest.
+    /// The search comes to a point from which there is no loop, or one that is not told from a
+    /// rest.
     Point(Vec<f64>),
     /// The search comes to an orbit that passes the plane in the other direction there.
     Reversed,
@@ -89,7 +92,8 @@ pub struct Orbit {
     pub extent: f64,
     /// Largest error of a multiplier.
     pub multiplier_error: f64,
-    /// Events on the way (crossings of the switching surface, landings, departures), if the system is discontinuous.
+    /// Events on the way (crossings of the switching surface, landings, departures), if the system
+    /// is discontinuous.
     pub events: usize,
     /// Its passages through the plane in the counted direction, the point first.
     pub same: Vec<Vec<f64>>,
@@ -118,8 +122,8 @@ impl Orbit {
         }
     }
 
-    /// The rate per unit time at which neighbours approach it in the end, negative if they leave; none where they arrive in finite time
-    /// (all multipliers zero).
+    /// The rate per unit time at which neighbours approach it in the end, negative if they leave;
+    /// none where they arrive in finite time (all multipliers zero).
     pub fn rate(&self) -> Option<f64> {
         let largest = self.largest_modulus();
         (largest > 0.0).then(|| -ln(largest) / self.period)
@@ -134,7 +138,8 @@ pub enum Stability {
     Stable,
     /// One is beyond it: some leave.
     Unstable,
-    /// One is 1 within its error, and none beyond the circle: other closed orbits are beside it, or it is at a fold.
+    /// One is 1 within its error, and none beyond the circle: other closed orbits are beside it, or
+    /// it is at a fold.
     NotIsolated,
     /// One is on the circle within its error: linear terms do not tell.
     Neutral,
@@ -167,8 +172,8 @@ pub struct Newton {
 
 /// Pivots below this share of the largest entry are rounding.
 const SINGULAR: f64 = 1e-13;
-/// An orbit that misses itself by up to so many times what counts as closed is taken for closed where Newton's method gets no further: what is
-/// left is the error of the integration.
+/// An orbit that misses itself by up to so many times what counts as closed is taken for closed
+/// where Newton's method gets no further: what is left is the error of the integration.
 const STALLED: f64 = 100.0;
 
 /// Trials to locate a change.
@@ -179,7 +184,8 @@ const ROUNDING: f64 = 1e-13;
 const NEAR_ONE: f64 = 1e-3;
 /// A loop of at most so many times the integration's error is not told from a point.
 const POINT: f64 = 1e3;
-/// Whether Newton's method is done with this residual, having had that one before, `closed` being what counts as closed.
+/// Whether Newton's method is done with this residual, having had that one before, `closed` being
+/// what counts as closed.
 fn settled(residual: f64, before: f64, closed: f64) -> bool {
     residual <= closed || residual <= STALLED * closed && residual >= 0.5 * before
 }
@@ -211,7 +217,12 @@ fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
 ///
 /// # Errors
 /// A message that says what to do.
-pub fn closed_orbit(map: &dyn ReturnMap, guess: &[f64], p: f64, newton: Newton) -> Result<Orbit, Trouble> {
+pub fn closed_orbit(
+    map: &dyn ReturnMap,
+    guess: &[f64],
+    p: f64,
+    newton: Newton,
+) -> Result<Orbit, Trouble> {
     let (n, axis) = (map.states(), map.axis());
     let mut u = guess.to_vec();
     let (mut best, mut before) = (f64::INFINITY, f64::INFINITY);
@@ -228,12 +239,18 @@ pub fn closed_orbit(map: &dyn ReturnMap, guess: &[f64], p: f64, newton: Newton) 
         matrix[axis * n + axis] = 1.0;
         let right: Vec<f64> = difference.iter().map(|d| -d).collect();
         let step = solve_any(&matrix, &right, SINGULAR * largest(&matrix)).ok_or(
-            "the closed orbit is not isolated here: the return map has the multiplier 1 (a fold, or a conserved quantity)",
+            "the closed orbit is not isolated here: the return map has the multiplier 1 (a fold, \
+                or a conserved quantity)",
         )?;
-        u.iter_mut().zip(&step).enumerate().filter(|(i, _)| *i != axis).for_each(|(_, (x, s))| *x += s);
+        u.iter_mut()
+            .zip(&step)
+            .enumerate()
+            .filter(|(i, _)| *i != axis)
+            .for_each(|(_, (x, s))| *x += s);
     }
     Err(format!(
-        "Newton's method found no closed orbit near the start: after {} iterations the orbit misses itself by {best:e} at best; start \
+        "Newton's method found no closed orbit near the start: after {} iterations the orbit \
+            misses itself by {best:e} at best; start \
          nearer, let the motion settle for longer, or check the number of returns",
         newton.iterations
     )
@@ -249,15 +266,16 @@ fn orbit(
     iterations: usize,
 ) -> Result<Orbit, Trouble> {
     if !r.passes {
-        let said =
-            "the orbit that the search comes to passes the plane in the other direction: choose another plane or start";
+        let said = "the orbit that the search comes to passes the plane in the other direction: \
+            choose another plane or start";
         return Err(Trouble { obstacle: Obstacle::Reversed, said: said.into() });
     }
     let multipliers = multipliers_of(&r.derivative, map.states(), map.axis());
     // The start is the orbit's first passage; the last return is the start again.
     let returns = r.same.len().saturating_sub(1);
     let same = std::iter::once(u.clone()).chain(r.same.into_iter().take(returns)).collect();
-    let multiplier_error = multiplier_error(map, &u, p, &multipliers, residual / r.extent, r.derivative_error);
+    let multiplier_error =
+        multiplier_error(map, &u, p, &multipliers, residual / r.extent, r.derivative_error);
     Ok(Orbit {
         parameter: p,
         point: u,
@@ -273,9 +291,10 @@ fn orbit(
     })
 }
 
-/// The error of multipliers: by how much those of a less accurate map differ, and by how much they change over the distance by which
-/// the orbit's point is off (the residual over the distance of the nearest multiplier from 1), ten times as fast as they change over
-/// the orbit. Where a multiplier is 1 within the first part, the points beside are as good.
+/// The error of multipliers: by how much those of a less accurate map differ, and by how much they
+/// change over the distance by which the orbit's point is off (the residual over the distance of
+/// the nearest multiplier from 1), ten times as fast as they change over the orbit. Where a
+/// multiplier is 1 within the first part, the points beside are as good.
 fn multiplier_error(
     map: &dyn ReturnMap,
     u: &[f64],
@@ -286,9 +305,14 @@ fn multiplier_error(
 ) -> f64 {
     let Ok(rough) = map.roughly(u, p) else { return f64::INFINITY };
     let rough = multipliers_of(&rough.derivative, map.states(), map.axis());
-    let differences = multipliers.iter().zip(&rough).map(|(a, b)| distance(*a, *b)).fold(ROUNDING + least, f64::max);
+    let differences = multipliers
+        .iter()
+        .zip(&rough)
+        .map(|(a, b)| distance(*a, *b))
+        .fold(ROUNDING + least, f64::max);
     let from_one = multipliers.iter().map(|m| distance(*m, [1.0, 0.0])).fold(1.0, f64::min);
-    let misplaced = if from_one > differences { (10.0 * residual / from_one).min(1.0) } else { 0.0 };
+    let misplaced =
+        if from_one > differences { (10.0 * residual / from_one).min(1.0) } else { 0.0 };
     differences + misplaced
 }
 
@@ -312,13 +336,17 @@ pub enum Change {
     Branching,
     /// A pair of complex multipliers leaves or enters the unit circle: a torus (Neimark-Sacker).
     Torus,
-    /// The orbit shrinks to an equilibrium whose eigenvalues are imaginary: a Hopf point, the branch's end.
+    /// The orbit shrinks to an equilibrium whose eigenvalues are imaginary: a Hopf point, the
+    /// branch's end.
     Hopf,
-    /// The orbit shrinks to a point that is no Hopf point, as at a boundary equilibrium: the branch's end.
+    /// The orbit shrinks to a point that is no Hopf point, as at a boundary equilibrium: the
+    /// branch's end.
     Vanishing,
-    /// The orbit comes to graze the switching surface: what follows is another return map (di Bernardo et al. 2008, ch. 6 to 8).
+    /// The orbit comes to graze the switching surface: what follows is another return map (di
+    /// Bernardo et al. 2008, ch. 6 to 8).
     Grazing,
-    /// The orbits on both sides have other events: crossings, landings or departures (di Bernardo et al. 2008, ch. 7 and 8).
+    /// The orbits on both sides have other events: crossings, landings or departures (di Bernardo
+    /// et al. 2008, ch. 7 and 8).
     DiscontinuityInduced,
     /// The orbit comes to where its future is a set.
     SetValued,
@@ -348,8 +376,8 @@ pub struct Bifurcation {
     pub change: Change,
     /// The parameter's value.
     pub parameter: f64,
-    /// Half of the interval around it in which the change lies: what is left of the bracket, and the errors of the integration and of Newton's
-    /// method.
+    /// Half of the interval around it in which the change lies: what is left of the bracket, and
+    /// the errors of the integration and of Newton's method.
     pub uncertainty: f64,
 }
 
@@ -399,7 +427,8 @@ pub struct BranchOptions {
 
 /// Shortest step as a share of the longest.
 const SHORTEST: f64 = 1.0 / 16_384.0;
-/// Steps grow after at most so many Newton iterations, and shrink when more than [`MANY`] are needed.
+/// Steps grow after at most so many Newton iterations, and shrink when more than [`MANY`] are
+/// needed.
 const FEW: usize = 3;
 const MANY: usize = 8;
 /// A step along which multipliers change by more than this is halved.
@@ -473,19 +502,22 @@ pub fn follow(
         let last = &branch.orbits[branch.orbits.len() - 1];
         let n = last.point.len();
         let (du, dp) = direction.clone().unwrap_or((vec![0.0; n], towards));
-        // An orbit that shrinks to a point is not stepped over: behind it the same orbits come again, seen from their other side.
+        // An orbit that shrinks to a point is not stepped over: behind it the same orbits come
+        // again, seen from their other side.
         let way = scales.state * sqrt(du.iter().map(|d| d * d).sum());
         if step * way > REACH * last.extent {
             step = REACH * last.extent / way;
         }
-        let guess: Vec<f64> = last.point.iter().zip(&du).map(|(u, d)| u + step * scales.state * d).collect();
+        let guess: Vec<f64> =
+            last.point.iter().zip(&du).map(|(u, d)| u + step * scales.state * d).collect();
         let p = last.parameter + step * scales.parameter * dp;
         let beyond = (p - options.to) * towards >= 0.0;
         let behind = (p - options.from) * towards < 0.0;
         let next = if beyond {
             // On the range's end exactly.
             let share = (options.to - last.parameter) / (p - last.parameter);
-            let guess: Vec<f64> = last.point.iter().zip(&guess).map(|(a, b)| a + share * (b - a)).collect();
+            let guess: Vec<f64> =
+                last.point.iter().zip(&guess).map(|(a, b)| a + share * (b - a)).collect();
             closed_orbit(map, &guess, options.to, options.newton)
         } else {
             arclength(map, &guess, p, (&du, dp), &scales, options.newton)
@@ -493,7 +525,9 @@ pub fn follow(
         let next = match next {
             Ok(next)
                 if !beyond
-                    && (next.iterations > MANY || jumps(last, &next) || next.events != last.events)
+                    && (next.iterations > MANY
+                        || jumps(last, &next)
+                        || next.events != last.events)
                     && 0.5 * step >= SHORTEST * options.longest =>
             {
                 Err("too long a step".into())
@@ -506,9 +540,16 @@ pub fn follow(
                 step *= 0.5;
                 if step < SHORTEST * options.longest {
                     if trouble.obstacle == Obstacle::Grazing
-                        && let Some((next, hop)) = behind_grazing(map, last, (&du, dp), &scales, options)
+                        && let Some((next, hop)) =
+                            behind_grazing(map, last, (&du, dp), &scales, options)
                     {
-                        branch.bifurcations.extend(changes(map, last, &next, &scales, options.newton));
+                        branch.bifurcations.extend(changes(
+                            map,
+                            last,
+                            &next,
+                            &scales,
+                            options.newton,
+                        ));
                         let stop = !go_on(&next);
                         branch.orbits.push(next);
                         step = hop;
@@ -527,7 +568,10 @@ pub fn follow(
         };
         let widest = branch.orbits.iter().map(|o| o.extent).fold(0.0, f64::max);
         if next.extent <= GONE * widest {
-            let (missed, said) = ((next.parameter - last.parameter).abs(), "the orbit shrinks to a point".to_owned());
+            let (missed, said) = (
+                (next.parameter - last.parameter).abs(),
+                "the orbit shrinks to a point".to_owned(),
+            );
             let trouble = Trouble { obstacle: Obstacle::Point(next.point.clone()), said };
             go_on(&next);
             branch.orbits.push(next);
@@ -535,7 +579,11 @@ pub fn follow(
             return branch;
         }
         let (su, sp) = (
-            next.point.iter().zip(&last.point).map(|(a, b)| (a - b) / scales.state).collect::<Vec<f64>>(),
+            next.point
+                .iter()
+                .zip(&last.point)
+                .map(|(a, b)| (a - b) / scales.state)
+                .collect::<Vec<f64>>(),
             (next.parameter - last.parameter) / scales.parameter,
         );
         let length = sqrt(su.iter().map(|s| s * s).sum::<f64>() + sp * sp);
@@ -563,8 +611,9 @@ pub fn follow(
 /// Steps over a grazing are at most so many shortest steps.
 const HOP: f64 = 64.0;
 
-/// The branch's next orbit, with the step to it, where the last lies so near to a grazing that its return map has no derivative: one with other
-/// events, behind the grazing, that is not farther from the guess than the step is long. None if there the branch ends.
+/// The branch's next orbit, with the step to it, where the last lies so near to a grazing that its
+/// return map has no derivative: one with other events, behind the grazing, that is not farther
+/// from the guess than the step is long. None if there the branch ends.
 fn behind_grazing(
     map: &dyn ReturnMap,
     last: &Orbit,
@@ -573,13 +622,18 @@ fn behind_grazing(
     options: &BranchOptions,
 ) -> Option<(Orbit, f64)> {
     let shortest = SHORTEST * options.longest;
-    let hops = std::iter::successors(Some(2.0 * shortest), |s| Some(2.0 * s)).take_while(|s| *s <= HOP * shortest);
+    let hops = std::iter::successors(Some(2.0 * shortest), |s| Some(2.0 * s))
+        .take_while(|s| *s <= HOP * shortest);
     for hop in hops {
-        let guess: Vec<f64> = last.point.iter().zip(du).map(|(u, d)| u + hop * scales.state * d).collect();
+        let guess: Vec<f64> =
+            last.point.iter().zip(du).map(|(u, d)| u + hop * scales.state * d).collect();
         let p = last.parameter + hop * scales.parameter * dp;
         let inside = (p - options.from) * (options.to - p) >= 0.0;
-        let Ok(next) = arclength(map, &guess, p, (du, dp), scales, options.newton) else { continue };
-        let apart: f64 = next.point.iter().zip(&guess).map(|(a, b)| (a - b) / scales.state).map(|d| d * d).sum();
+        let Ok(next) = arclength(map, &guess, p, (du, dp), scales, options.newton) else {
+            continue;
+        };
+        let apart: f64 =
+            next.point.iter().zip(&guess).map(|(a, b)| (a - b) / scales.state).map(|d| d * d).sum();
         let off = (next.parameter - p) / scales.parameter;
         if inside && next.events != last.events && sqrt(apart + off * off) <= hop {
             return Some((next, hop));
@@ -589,48 +643,69 @@ fn behind_grazing(
 }
 
 /// Ends a branch where it cannot be followed.
-fn finish(map: &dyn ReturnMap, branch: &mut Branch, trouble: Trouble, missed: f64, scales: &Scales) {
+fn finish(
+    map: &dyn ReturnMap,
+    branch: &mut Branch,
+    trouble: Trouble,
+    missed: f64,
+    scales: &Scales,
+) {
     let (change, end) = ended(map, &branch.orbits, trouble, missed);
     if let (End::Vanished, Some(last)) = (&end, &change) {
         // Where orbits shrink to a point a multiplier is 1, which is no change of its own.
         let near = |b: &Bifurcation| {
-            (b.parameter - last.parameter).abs() <= b.uncertainty + last.uncertainty + 1e-6 * scales.parameter
+            (b.parameter - last.parameter).abs()
+                <= b.uncertainty + last.uncertainty + 1e-6 * scales.parameter
         };
-        branch.bifurcations.retain(|b| !(matches!(b.change, Change::Fold | Change::Branching) && near(b)));
+        branch
+            .bifurcations
+            .retain(|b| !(matches!(b.change, Change::Fold | Change::Branching) && near(b)));
     }
     branch.bifurcations.extend(change);
     branch.end = end;
 }
 
-/// An orbit of at most this share of the branch's largest extent is about to vanish, if there is none beyond it.
+/// An orbit of at most this share of the branch's largest extent is about to vanish, if there is
+/// none beyond it.
 const VANISHING: f64 = 0.1;
 
-/// What happens where the branch cannot be followed, and how it ends; the next member was looked for over `missed` of the parameter.
-fn ended(map: &dyn ReturnMap, orbits: &[Orbit], trouble: Trouble, missed: f64) -> (Option<Bifurcation>, End) {
+/// What happens where the branch cannot be followed, and how it ends; the next member was looked
+/// for over `missed` of the parameter.
+fn ended(
+    map: &dyn ReturnMap,
+    orbits: &[Orbit],
+    trouble: Trouble,
+    missed: f64,
+) -> (Option<Bifurcation>, End) {
     let last = &orbits[orbits.len() - 1];
-    let here = |change| Some(Bifurcation { change, parameter: last.parameter, uncertainty: missed });
+    let here =
+        |change| Some(Bifurcation { change, parameter: last.parameter, uncertainty: missed });
     let largest = orbits.iter().map(|o| o.extent).fold(0.0, f64::max);
     match trouble.obstacle {
         Obstacle::Grazing => (here(Change::Grazing), End::Lost(trouble.said)),
         Obstacle::SetValued => (here(Change::SetValued), End::Lost(trouble.said)),
-        _ if last.extent <= VANISHING * largest => (Some(vanishing(map, orbits, missed)), End::Vanished),
+        _ if last.extent <= VANISHING * largest => {
+            (Some(vanishing(map, orbits, missed)), End::Vanished)
+        }
         Obstacle::Reversed => {
-            let said = "the orbit comes to touch the plane and no longer passes it: choose another plane";
+            let said =
+                "the orbit comes to touch the plane and no longer passes it: choose another plane";
             (None, End::Lost(said.into()))
         }
         _ => (None, End::Lost(trouble.said)),
     }
 }
 
-/// Where a branch of shrinking orbits ends: at a Hopf point, if the rest within has a pair of imaginary eigenvalues there, with the
-/// frequency of the orbits (Kuznetsov 2004, sec. 3.4).
+/// Where a branch of shrinking orbits ends: at a Hopf point, if the rest within has a pair of
+/// imaginary eigenvalues there, with the frequency of the orbits (Kuznetsov 2004, sec. 3.4).
 fn vanishing(map: &dyn ReturnMap, orbits: &[Orbit], missed: f64) -> Bifurcation {
     let last = &orbits[orbits.len() - 1];
     let before = orbits.iter().rev().find(|o| o.extent > 1.5 * last.extent).unwrap_or(last);
-    // The extent grows like the root of the parameter's distance at a Hopf point, and in proportion to it where fields are
-    // discontinuous: the one end is a little nearer than the other.
+    // The extent grows like the root of the parameter's distance at a Hopf point, and in proportion
+    // to it where fields are discontinuous: the one end is a little nearer than the other.
     let ratio = last.extent / before.extent;
-    let way = if ratio < 1.0 { (last.parameter - before.parameter) * ratio / (1.0 - ratio) } else { 0.0 };
+    let way =
+        if ratio < 1.0 { (last.parameter - before.parameter) * ratio / (1.0 - ratio) } else { 0.0 };
     let frequency = std::f64::consts::TAU / last.period;
     let pair = |p: f64| -> Option<[f64; 2]> {
         let (_, eigenvalues) = map.rest(&last.point, p)?;
@@ -639,7 +714,10 @@ fn vanishing(map: &dyn ReturnMap, orbits: &[Orbit], missed: f64) -> Bifurcation 
     };
     let reach = 2.0 * way.abs() + missed;
     let hopf = || {
-        let (mut a, mut b) = (last.parameter, last.parameter + if way == 0.0 { missed } else { reach.copysign(way) });
+        let (mut a, mut b) = (
+            last.parameter,
+            last.parameter + if way == 0.0 { missed } else { reach.copysign(way) },
+        );
         let (mut ga, mut gb) = (pair(a)?, pair(b)?);
         // The secant method: the real part is smooth in the parameter.
         for _ in 0..ITERATIONS {
@@ -653,10 +731,16 @@ fn vanishing(map: &dyn ReturnMap, orbits: &[Orbit], missed: f64) -> Bifurcation 
             }
         }
         let small = gb[0].abs() <= 1e-9 * gb[1];
-        let near = (b - last.parameter).abs() <= 4.0 * reach && (gb[1] - frequency).abs() <= 0.1 * frequency;
+        let near = (b - last.parameter).abs() <= 4.0 * reach
+            && (gb[1] - frequency).abs() <= 0.1 * frequency;
         let slope = (ga[0] - gb[0]) / (a - b);
-        let rounding = if slope.is_finite() && slope != 0.0 { 1e-12 * gb[1] / slope.abs() } else { 0.0 };
-        let off = if slope.is_finite() && slope != 0.0 { gb[0].abs() / slope.abs() } else { (b - a).abs() };
+        let rounding =
+            if slope.is_finite() && slope != 0.0 { 1e-12 * gb[1] / slope.abs() } else { 0.0 };
+        let off = if slope.is_finite() && slope != 0.0 {
+            gb[0].abs() / slope.abs()
+        } else {
+            (b - a).abs()
+        };
         let uncertainty = off + rounding + 1e-14 * b.abs();
         (small && near).then_some(Bifurcation { change: Change::Hopf, parameter: b, uncertainty })
     };
@@ -692,17 +776,19 @@ fn arclength(
         let r = map.returned(&u, q, true)?;
         let difference: Vec<f64> = r.point.iter().zip(&u).map(|(a, b)| a - b).collect();
         let residual = sqrt(difference.iter().map(|d| d * d).sum());
-        let along: f64 =
-            (0..n).map(|i| du[i] * (u[i] - guess[i]) / scales.state).sum::<f64>() + dp * (q - p) / scales.parameter;
+        let along: f64 = (0..n).map(|i| du[i] * (u[i] - guess[i]) / scales.state).sum::<f64>()
+            + dp * (q - p) / scales.parameter;
         let done = settled(residual, before, newton.closed(&u, &r)?) && along.abs() < 1e-6;
-        // With a multiplier near 1 a small residual may still be far from an orbit: Newton's method goes on as long as it helps.
+        // With a multiplier near 1 a small residual may still be far from an orbit: Newton's method
+        // goes on as long as it helps.
         let near_one = |m: &[f64; 2]| distance(*m, [1.0, 0.0]) < NEAR_ONE;
         let helps = residual > 0.0 && residual < 0.5 * before;
         if done && !(helps && multipliers_of(&r.derivative, n, axis).iter().any(near_one)) {
             return orbit(map, u, q, r, residual, iterations);
         }
         before = residual;
-        // The derivative in the parameter by differences; its error only slows Newton's method down.
+        // The derivative in the parameter by differences; its error only slows Newton's method
+        // down.
         let delta = 1e-6 * scales.parameter;
         let (up, down) = (map.returned(&u, q + delta, false)?, map.returned(&u, q - delta, false)?);
         let size = n + 1;
@@ -722,14 +808,24 @@ fn arclength(
         right.push(-along);
         let step = solve_any(&matrix, &right, SINGULAR * largest(&matrix))
             .ok_or("branches meet here: the branch's direction is not determined")?;
-        u.iter_mut().zip(&step).enumerate().filter(|(i, _)| *i != axis).for_each(|(_, (x, s))| *x += s);
+        u.iter_mut()
+            .zip(&step)
+            .enumerate()
+            .filter(|(i, _)| *i != axis)
+            .for_each(|(_, (x, s))| *x += s);
         q += step[n] * scales.parameter;
     }
     Err("Newton's method did not converge along the branch".into())
 }
 
 /// Changes of stability between neighbours on a branch.
-fn changes(map: &dyn ReturnMap, a: &Orbit, b: &Orbit, scales: &Scales, newton: Newton) -> Vec<Bifurcation> {
+fn changes(
+    map: &dyn ReturnMap,
+    a: &Orbit,
+    b: &Orbit,
+    scales: &Scales,
+    newton: Newton,
+) -> Vec<Bifurcation> {
     let between = |change| Bifurcation {
         change,
         parameter: 0.5 * (a.parameter + b.parameter),
@@ -738,22 +834,34 @@ fn changes(map: &dyn ReturnMap, a: &Orbit, b: &Orbit, scales: &Scales, newton: N
     if a.events != b.events {
         return vec![between(Change::DiscontinuityInduced)];
     }
-    let count = |o: &Orbit, test: &dyn Fn(&[f64; 2]) -> bool| o.multipliers.iter().filter(|m| test(m)).count();
+    let count = |o: &Orbit, test: &dyn Fn(&[f64; 2]) -> bool| {
+        o.multipliers.iter().filter(|m| test(m)).count()
+    };
     let below: &dyn Fn(&[f64; 2]) -> bool = &|m| m[1] == 0.0 && m[0] < -1.0;
     let above: &dyn Fn(&[f64; 2]) -> bool = &|m| m[1] == 0.0 && m[0] > 1.0;
     let outside: &dyn Fn(&[f64; 2]) -> bool = &|m| m[1] != 0.0 && m[0] * m[0] + m[1] * m[1] > 1.0;
     let mut found = Vec::new();
     if count(a, below) != count(b, below) {
         let at = locate(map, a, b, scales, newton, &|o| product(o, -1.0));
-        found.push(at.map_or_else(|| between(Change::PeriodDoubling), |at| at.transversal(Change::PeriodDoubling)));
+        found.push(at.map_or_else(
+            || between(Change::PeriodDoubling),
+            |at| at.transversal(Change::PeriodDoubling),
+        ));
     }
     if count(a, above) != count(b, above) {
         let at = locate(map, a, b, scales, newton, &|o| product(o, 1.0));
-        found.push(at.map_or_else(|| between(Change::Branching), |at| at.fold_or_branching(map, a, b, scales, newton)));
+        found.push(at.map_or_else(
+            || between(Change::Branching),
+            |at| at.fold_or_branching(map, a, b, scales, newton),
+        ));
     }
     if count(a, outside) != count(b, outside) {
         let modulus = |o: &Orbit| {
-            let squares = o.multipliers.iter().filter(|m| m[1] != 0.0).map(|m| m[0] * m[0] + m[1] * m[1] - 1.0);
+            let squares = o
+                .multipliers
+                .iter()
+                .filter(|m| m[1] != 0.0)
+                .map(|m| m[0] * m[0] + m[1] * m[1] - 1.0);
             squares.min_by(|x, y| x.abs().total_cmp(&y.abs())).unwrap_or(f64::NAN)
         };
         let at = locate(map, a, b, scales, newton, &modulus);
@@ -762,9 +870,13 @@ fn changes(map: &dyn ReturnMap, a: &Orbit, b: &Orbit, scales: &Scales, newton: N
     found
 }
 
-/// The product of all multipliers less `value`: it changes sign where one passes it, and stays smooth where others meet.
+/// The product of all multipliers less `value`: it changes sign where one passes it, and stays
+/// smooth where others meet.
 fn product(o: &Orbit, value: f64) -> f64 {
-    let factors = o.multipliers.iter().map(|m| if m[1] == 0.0 { [m[0] - value, 0.0] } else { [m[0] - value, m[1]] });
+    let factors = o
+        .multipliers
+        .iter()
+        .map(|m| if m[1] == 0.0 { [m[0] - value, 0.0] } else { [m[0] - value, m[1]] });
     // Complex factors come in pairs, beside each other.
     factors.fold([1.0, 0.0], |p, f| [p[0] * f[0] - p[1] * f[1], p[0] * f[1] + p[1] * f[0]])[0]
 }
@@ -781,7 +893,8 @@ struct Located {
     error: f64,
 }
 
-/// Where a test function is zero between two members: by regula falsi (the Illinois variant, Dowell & Jarratt 1971) along the chord.
+/// Where a test function is zero between two members: by regula falsi (the Illinois variant, Dowell
+/// & Jarratt 1971) along the chord.
 fn locate(
     map: &dyn ReturnMap,
     a: &Orbit,
@@ -826,7 +939,8 @@ fn locate(
 
 /// By how much a product of multipliers, or a modulus, may be off.
 fn sensitivity(orbit: &Orbit) -> f64 {
-    let others = orbit.multipliers.iter().map(|m| 1.0 + sqrt(m[0] * m[0] + m[1] * m[1])).product::<f64>();
+    let others =
+        orbit.multipliers.iter().map(|m| 1.0 + sqrt(m[0] * m[0] + m[1] * m[1])).product::<f64>();
     orbit.multiplier_error * others * orbit.multipliers.len() as f64
 }
 
@@ -840,7 +954,8 @@ fn member(
     newton: Newton,
 ) -> Result<Orbit, Trouble> {
     let guess: Vec<f64> = a.point.iter().zip(&b.point).map(|(a, b)| a + share * (b - a)).collect();
-    let chord: Vec<f64> = a.point.iter().zip(&b.point).map(|(a, b)| (b - a) / scales.state).collect();
+    let chord: Vec<f64> =
+        a.point.iter().zip(&b.point).map(|(a, b)| (b - a) / scales.state).collect();
     let along = (b.parameter - a.parameter) / scales.parameter;
     let length = sqrt(chord.iter().map(|c| c * c).sum::<f64>() + along * along);
     let chord: Vec<f64> = chord.iter().map(|c| c / length).collect();
@@ -867,27 +982,36 @@ impl Located {
         newton: Newton,
     ) -> Bifurcation {
         let p = self.orbit.parameter;
-        let beside = |by: f64| member(map, a, b, self.share + by, scales, newton).map(|o| o.parameter - p);
+        let beside =
+            |by: f64| member(map, a, b, self.share + by, scales, newton).map(|o| o.parameter - p);
         let (Ok(before), Ok(after)) = (beside(-0.5), beside(0.5)) else {
             return self.transversal(Change::Branching);
         };
         if before * after <= 0.0 {
             return self.transversal(Change::Branching);
         }
-        // The parameter is largest or smallest: what it is off by over half of the way, in proportion to the square of the share that is
-        // left of it; and by how much it moves with the error of the return.
+        // The parameter is largest or smallest: what it is off by over half of the way, in
+        // proportion to the square of the share that is left of it; and by how much it moves with
+        // the error of the return.
         let size = 0.5 * (before.abs() + after.abs());
         let left = self.error / (2.0 * self.error + self.sway(a, b));
         let delta = 1e-6 * scales.parameter;
         let moved = |q: f64| map.returned(&self.orbit.point, q, false).map(|r| r.point);
-        let off = match (moved(p + delta), moved(p - delta), map.roughly(&self.orbit.point, p), moved(p)) {
-            (Ok(up), Ok(down), Ok(rough), Ok(fine)) => {
-                let gap = |a: &[f64], b: &[f64]| sqrt(a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum());
-                let moves = gap(&up, &down) / (2.0 * delta);
-                (self.orbit.residual + gap(&rough.point, &fine) + newton.error(&self.orbit.point)) / moves
-            }
-            _ => f64::INFINITY,
-        };
+        let off =
+            match (moved(p + delta), moved(p - delta), map.roughly(&self.orbit.point, p), moved(p))
+            {
+                (Ok(up), Ok(down), Ok(rough), Ok(fine)) => {
+                    let gap = |a: &[f64], b: &[f64]| {
+                        sqrt(a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum())
+                    };
+                    let moves = gap(&up, &down) / (2.0 * delta);
+                    (self.orbit.residual
+                        + gap(&rough.point, &fine)
+                        + newton.error(&self.orbit.point))
+                        / moves
+                }
+                _ => f64::INFINITY,
+            };
         let uncertainty = 4.0 * size * left * left + 4.0 * off + 4.0 * f64::EPSILON * p.abs();
         Bifurcation {
             change: Change::Fold,
@@ -920,7 +1044,8 @@ mod tests {
         }
     }
 
-    /// The logistic map x -> p x (1 - x), as if it were a return map of the plane where the second state is zero.
+    /// The logistic map x -> p x (1 - x), as if it were a return map of the plane where the second
+    /// state is zero.
     struct Logistic;
     impl ReturnMap for Logistic {
         fn states(&self) -> usize {
@@ -961,9 +1086,16 @@ mod tests {
         let branch = follow(&Logistic, first, &options, &mut |_| true);
         assert_eq!(branch.end, End::Reached);
         let last = branch.orbits.last().unwrap();
-        assert!((last.parameter - 3.5).abs() < 1e-12 && (last.point[0] - (1.0 - 1.0 / 3.5)).abs() < 1e-12, "{last:?}");
+        assert!(
+            (last.parameter - 3.5).abs() < 1e-12
+                && (last.point[0] - (1.0 - 1.0 / 3.5)).abs() < 1e-12,
+            "{last:?}"
+        );
         let [doubling] = &branch.bifurcations[..] else { panic!("{:?}", branch.bifurcations) };
-        assert!(doubling.change == Change::PeriodDoubling && (doubling.parameter - 3.0).abs() < 1e-7, "{doubling:?}");
+        assert!(
+            doubling.change == Change::PeriodDoubling && (doubling.parameter - 3.0).abs() < 1e-7,
+            "{doubling:?}"
+        );
         for o in &branch.orbits {
             assert_eq!(o.stability() == Stability::Stable, o.parameter < 3.0);
         }
@@ -972,11 +1104,15 @@ mod tests {
     #[test]
     fn a_fold_is_passed() {
         let first = closed_orbit(&FoldMap, &[1.1, 0.0], 1.0, NEWTON).unwrap();
-        let options = BranchOptions { from: 1.0, to: -1.0, longest: 0.05, most: 400, newton: NEWTON };
+        let options =
+            BranchOptions { from: 1.0, to: -1.0, longest: 0.05, most: 400, newton: NEWTON };
         let branch = follow(&FoldMap, first, &options, &mut |_| true);
         assert_eq!(branch.end, End::TurnedBack, "{:?}", branch.orbits.len());
         let last = branch.orbits.last().unwrap();
-        assert!(last.point[0] < -0.9 && (last.point[0] * last.point[0] - last.parameter).abs() < 1e-9, "{last:?}");
+        assert!(
+            last.point[0] < -0.9 && (last.point[0] * last.point[0] - last.parameter).abs() < 1e-9,
+            "{last:?}"
+        );
         let fold = branch.bifurcations.iter().find(|b| b.change == Change::Fold).unwrap();
         assert!(fold.parameter.abs() <= fold.uncertainty + 2e-2, "{fold:?}");
     }
@@ -988,7 +1124,8 @@ mod tests {
         assert!(error.said.contains("start"), "{error:?}");
     }
 
-    /// Zeros of a function f(x, p), given with its slope in x, as closed orbits; not defined where it is `None`.
+    /// Zeros of a function f(x, p), given with its slope in x, as closed orbits; not defined where
+    /// it is `None`.
     struct Zeros<F>(F);
     impl<F: Fn(f64, f64) -> Option<[f64; 2]>> ReturnMap for Zeros<F> {
         fn states(&self) -> usize {
@@ -1025,7 +1162,9 @@ mod tests {
     #[test]
     fn a_rate_is_the_logarithm_of_the_largest_multiplier_over_the_period() {
         let rate = |m: &[[f64; 2]]| with(0.0, m).rate();
-        assert!((rate(&[[-0.25, 0.0], [0.1, 0.0]]).unwrap() - std::f64::consts::LN_2).abs() < 1e-15);
+        assert!(
+            (rate(&[[-0.25, 0.0], [0.1, 0.0]]).unwrap() - std::f64::consts::LN_2).abs() < 1e-15
+        );
         assert!((rate(&[[2.4, 3.2], [2.4, -3.2]]).unwrap() + std::f64::consts::LN_2).abs() < 1e-15);
         // Neighbours that arrive in finite time have none.
         assert_eq!((rate(&[[0.0; 2]; 2]), rate(&[])), (None, None));
@@ -1050,7 +1189,8 @@ mod tests {
 
     #[test]
     fn a_multiplier_that_differs_from_one_by_rounding_is_one() {
-        /// Its derivative less one has the rows 1e8 (1, 1) and 1e8 (1, 1) but for the last bit: of rank one, as far as can be told.
+        /// Its derivative less one has the rows 1e8 (1, 1) and 1e8 (1, 1) but for the last bit: of
+        /// rank one, as far as can be told.
         struct Rounded;
         impl ReturnMap for Rounded {
             fn states(&self) -> usize {
@@ -1061,7 +1201,8 @@ mod tests {
             }
             fn returned(&self, u: &[f64], _: f64, _: bool) -> Result<Returned, Trouble> {
                 let point = vec![u[0] + 1.0, u[1] + 2.0, 0.0];
-                let derivative = vec![1e8 + 1.0, 1e8, 0.0, 1e8, 1e8 + 1.0 + 1.5e-8, 0.0, 0.0, 0.0, 0.0];
+                let derivative =
+                    vec![1e8 + 1.0, 1e8, 0.0, 1e8, 1e8 + 1.0 + 1.5e-8, 0.0, 0.0, 0.0, 0.0];
                 Ok(once(point, derivative))
             }
         }
@@ -1090,7 +1231,8 @@ mod tests {
         }
         let p = 3.2;
         let orbit = closed_orbit(&Twice, &[0.5, 0.0], p, NEWTON).unwrap();
-        // The cycle of two: x = (p + 1 -+ sqrt((p - 3)(p + 1)))/(2 p), with the multiplier 4 + 2 p - p^2.
+        // The cycle of two: x = (p + 1 -+ sqrt((p - 3)(p + 1)))/(2 p), with the multiplier 4 + 2 p
+        // - p^2.
         let root = sqrt((p - 3.0) * (p + 1.0));
         let ends = [-root, root].map(|r| (p + 1.0 + r) / (2.0 * p));
         assert_eq!(orbit.same.len(), 2);
@@ -1113,16 +1255,26 @@ mod tests {
         let n = branch.orbits.len();
         let mut want = 0.025;
         for (k, pair) in branch.orbits.windows(2).enumerate() {
-            let (dx, dp) = ((pair[1].point[0] - pair[0].point[0]) / 2.0, (pair[1].parameter - pair[0].parameter) / 4.0);
+            let (dx, dp) = (
+                (pair[1].point[0] - pair[0].point[0]) / 2.0,
+                (pair[1].parameter - pair[0].parameter) / 4.0,
+            );
             let length = sqrt(dx * dx + dp * dp);
             match k {
-                // The first is a step in the parameter; the orbit is not where it was, and is found.
+                // The first is a step in the parameter; the orbit is not where it was, and is
+                // found.
                 0 => assert!((dp - want).abs() < 1e-12 && pair[1].iterations == 1, "{pair:?}"),
                 // What follows a straight line needs no search.
                 _ if k + 2 < n => {
-                    assert!((length - want).abs() < 1e-9 && pair[1].iterations == 0, "{k}: {length} {want}")
+                    assert!(
+                        (length - want).abs() < 1e-9 && pair[1].iterations == 0,
+                        "{k}: {length} {want}"
+                    )
                 }
-                _ => assert!(length <= 0.1 && pair[1].iterations == 0 && pair[1].parameter == 5.0, "{pair:?}"),
+                _ => assert!(
+                    length <= 0.1 && pair[1].iterations == 0 && pair[1].parameter == 5.0,
+                    "{pair:?}"
+                ),
             }
             want = (1.5 * want).min(0.1);
         }
@@ -1134,8 +1286,10 @@ mod tests {
     fn a_circle_of_orbits_is_gone_around_by_quick_newton_iterations() {
         // x^2 + p^2 = 25 from (5, 0) by the fold at p = 5 to (-5, 0).
         let circle = Zeros(|x: f64, p: f64| Some([0.1 * (25.0 - x * x - p * p), -0.2 * x]));
-        let first = Orbit { extent: 6.0, ..closed_orbit(&circle, &[4.9, 0.0], 0.0, NEWTON).unwrap() };
-        let options = BranchOptions { from: 0.0, to: 6.0, longest: 0.05, most: 400, newton: NEWTON };
+        let first =
+            Orbit { extent: 6.0, ..closed_orbit(&circle, &[4.9, 0.0], 0.0, NEWTON).unwrap() };
+        let options =
+            BranchOptions { from: 0.0, to: 6.0, longest: 0.05, most: 400, newton: NEWTON };
         let branch = follow(&circle, first, &options, &mut |_| true);
         assert_eq!(branch.end, End::TurnedBack);
         for (k, pair) in branch.orbits.windows(2).enumerate() {
@@ -1150,7 +1304,9 @@ mod tests {
         assert!(last.parameter < 0.0 && last.parameter > -0.31 && last.point[0] < -4.9, "{last:?}");
         let [fold] = &branch.bifurcations[..] else { panic!("{:?}", branch.bifurcations) };
         assert!(
-            fold.change == Change::Fold && (fold.parameter - 5.0).abs() < 0.05 && fold.uncertainty < 0.05,
+            fold.change == Change::Fold
+                && (fold.parameter - 5.0).abs() < 0.05
+                && fold.uncertainty < 0.05,
             "{fold:?}"
         );
     }
@@ -1180,19 +1336,29 @@ mod tests {
     #[test]
     fn steps_are_short_where_multipliers_change_fast() {
         for steepness in [40.0, 4000.0] {
-            let steep = Zeros(|x: f64, p: f64| Some([(steepness * p - 1.0) * x, steepness * p - 1.0]));
+            let steep =
+                Zeros(|x: f64, p: f64| Some([(steepness * p - 1.0) * x, steepness * p - 1.0]));
             let first = closed_orbit(&steep, &[0.0, 0.0], -1.0, NEWTON).unwrap();
-            let options = BranchOptions { from: -1.0, to: 1.0, longest: 0.1, most: 200, newton: NEWTON };
+            let options =
+                BranchOptions { from: -1.0, to: 1.0, longest: 0.1, most: 200, newton: NEWTON };
             let branch = follow(&steep, first, &options, &mut |_| true);
             assert_eq!(branch.end, End::Reached);
             let within = &branch.orbits[..branch.orbits.len() - 1];
             assert!(within.windows(2).all(|pair| !jumps(&pair[0], &pair[1])));
             // The multiplier passes -1 and then 1.
-            let [doubling, branching] = &branch.bifurcations[..] else { panic!("{:?}", branch.bifurcations) };
-            assert_eq!((doubling.change, branching.change), (Change::PeriodDoubling, Change::Branching));
+            let [doubling, branching] = &branch.bifurcations[..] else {
+                panic!("{:?}", branch.bifurcations)
+            };
+            assert_eq!(
+                (doubling.change, branching.change),
+                (Change::PeriodDoubling, Change::Branching)
+            );
             assert!((doubling.parameter * steepness + 1.0).abs() < 1e-7, "{doubling:?}");
             let off = (branching.parameter - 1.0 / steepness).abs();
-            assert!(off <= branching.uncertainty && branching.uncertainty < 0.5 / steepness, "{branching:?}");
+            assert!(
+                off <= branching.uncertainty && branching.uncertainty < 0.5 / steepness,
+                "{branching:?}"
+            );
         }
     }
 
@@ -1235,16 +1401,23 @@ mod tests {
         assert_eq!(of(&pair(0.1, 0.9), &pair(0.1, 1.1)), one(Change::Torus));
         assert_eq!(of(&pair(0.7, 0.6), &pair(0.8, 0.7)), one(Change::Torus));
         assert_eq!(of(&pair(0.7, -0.6), &pair(0.7, -0.7)), []);
-        // A complex pair beyond the circle is neither below -1 nor above 1, and real multipliers make no torus.
+        // A complex pair beyond the circle is neither below -1 nor above 1, and real multipliers
+        // make no torus.
         assert_eq!(of(&pair(1.2, 0.1), &pair(-1.2, 0.1)), []);
         assert_eq!(of(&[[0.9, 0.0], [0.5, 0.0]], &[[0.7, 0.0], [0.6, 0.0]]), []);
         let both = of(&[[-0.9, 0.0], [0.9, 0.0]], &[[-1.1, 0.0], [1.1, 0.0]]);
-        assert_eq!(both.iter().map(|b| b.0).collect::<Vec<_>>(), [Change::PeriodDoubling, Change::Branching]);
+        assert_eq!(
+            both.iter().map(|b| b.0).collect::<Vec<_>>(),
+            [Change::PeriodDoubling, Change::Branching]
+        );
         // Orbits with other events are told, whatever their multipliers.
         let other = Orbit { events: 2, ..with(8.0, &[[-1.1, 0.0]]) };
         let nothing = Zeros(|_: f64, _: f64| None);
         let found = changes(&nothing, &with(3.0, &[[-0.9, 0.0]]), &other, &scales, NEWTON);
-        assert_eq!(found.iter().map(|b| b.change).collect::<Vec<_>>(), [Change::DiscontinuityInduced]);
+        assert_eq!(
+            found.iter().map(|b| b.change).collect::<Vec<_>>(),
+            [Change::DiscontinuityInduced]
+        );
     }
 
     /// A return map x -> x + f of loops as large as x, with a rest at 0 of the eigenvalues p +- i.
@@ -1271,19 +1444,27 @@ mod tests {
     #[test]
     fn a_branch_ends_where_its_orbits_shrink_to_a_hopf_point() {
         let first = closed_orbit(&Shrinking, &[0.7, 0.0], 0.5, NEWTON).unwrap();
-        // With long steps too, which could pass the point and find the same orbits from their other side.
+        // With long steps too, which could pass the point and find the same orbits from their other
+        // side.
         for (to, longest) in [(-0.5, 0.1), (-3.0, 0.1), (-0.5, 1.0), (-3.0, 5.0)] {
             let options = BranchOptions { from: 0.5, to, longest, most: 200, newton: NEWTON };
             let branch = follow(&Shrinking, first.clone(), &options, &mut |_| true);
             assert_eq!(branch.end, End::Vanished);
-            assert!(branch.orbits.iter().all(|o| o.parameter > -1e-12 && o.point[0] > 0.0), "{branch:?}");
+            assert!(
+                branch.orbits.iter().all(|o| o.parameter > -1e-12 && o.point[0] > 0.0),
+                "{branch:?}"
+            );
             let [hopf] = &branch.bifurcations[..] else { panic!("{:?}", branch.bifurcations) };
-            assert!(hopf.change == Change::Hopf && hopf.parameter.abs() <= hopf.uncertainty, "{hopf:?}");
+            assert!(
+                hopf.change == Change::Hopf && hopf.parameter.abs() <= hopf.uncertainty,
+                "{hopf:?}"
+            );
             assert!(hopf.uncertainty < 1e-10, "{hopf:?}");
         }
     }
 
-    /// A fixed point x = p/2 whose loop grazes a surface at p = 1/2: within 1e-6 there is no derivative, and behind it is another event, or nothing.
+    /// A fixed point x = p/2 whose loop grazes a surface at p = 1/2: within 1e-6 there is no
+    /// derivative, and behind it is another event, or nothing.
     struct Graze {
         goes_on: bool,
     }
@@ -1312,7 +1493,9 @@ mod tests {
                 let map = Graze { goes_on };
                 let first = closed_orbit(&map, &[0.5 * from, 0.0], from, NEWTON).unwrap();
                 let branch = follow(&map, first, &options, &mut |_| true);
-                let [change] = &branch.bifurcations[..] else { panic!("{:?}", branch.bifurcations) };
+                let [change] = &branch.bifurcations[..] else {
+                    panic!("{:?}", branch.bifurcations)
+                };
                 assert!((change.parameter - 0.5).abs() <= change.uncertainty + 2e-6, "{change:?}");
                 let (kind, reached) = (change.change, branch.end == End::Reached);
                 let wanted = if goes_on { Change::DiscontinuityInduced } else { Change::Grazing };
@@ -1323,7 +1506,8 @@ mod tests {
 
     #[test]
     fn a_doubling_is_found_on_a_curved_way_through_minus_one() {
-        // The multiplier is -p^9: regula falsi without the Illinois variant's halving would take hundreds of trials.
+        // The multiplier is -p^9: regula falsi without the Illinois variant's halving would take
+        // hundreds of trials.
         let ninth = |p: f64| p * p * p * (p * p * p) * (p * p * p);
         let curved = Zeros(|x: f64, p: f64| Some([(-ninth(p) - 1.0) * x, -ninth(p) - 1.0]));
         let scales = Scales { state: 1.0, parameter: 1.0 };
@@ -1334,7 +1518,10 @@ mod tests {
         let at = |p: f64| closed_orbit(&curved, &[0.0, 0.0], p, NEWTON).unwrap();
         for (a, b) in [(0.5, 3.0), (3.0, 0.5)] {
             let found = doubling(&at(a), &at(b)).unwrap();
-            assert!((found.parameter - 1.0).abs() <= found.uncertainty && found.uncertainty < 1e-8, "{found:?}");
+            assert!(
+                (found.parameter - 1.0).abs() <= found.uncertainty && found.uncertainty < 1e-8,
+                "{found:?}"
+            );
         }
         // Both on one side: what another multiplier did is not this one's doing.
         assert_eq!(doubling(&at(0.5), &at(0.9)), None);

@@ -1,4 +1,5 @@
-//! Counts of outcomes: shares with intervals, and whether several rows of counts come from one distribution.
+//! Counts of outcomes: shares with intervals, and whether several rows of counts come from one
+//! distribution.
 //!
 //! ```
 //! use twofold_analyse::counts::{homogeneity, wilson};
@@ -13,7 +14,8 @@ use serde::{Deserialize, Serialize};
 use twofold_num::elementary::{erf, exp, ln, sqrt};
 use twofold_num::random::RandomStream;
 
-/// The standard normal distribution's quantile: z with P(Z <= z) = p, found by halving on the error function; not-a-number outside (0, 1).
+/// The standard normal distribution's quantile: z with P(Z <= z) = p, found by halving on the error
+/// function; not-a-number outside (0, 1).
 pub fn normal_quantile(p: f64) -> f64 {
     if !(p > 0.0 && p < 1.0) {
         return f64::NAN;
@@ -21,13 +23,17 @@ pub fn normal_quantile(p: f64) -> f64 {
     let (mut low, mut high) = (-40.0, 40.0);
     for _ in 0..200 {
         let middle = 0.5 * (low + high);
-        if 0.5 * (1.0 + erf(middle / std::f64::consts::SQRT_2)) < p { low = middle } else { high = middle }
+        if 0.5 * (1.0 + erf(middle / std::f64::consts::SQRT_2)) < p {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     0.5 * (low + high)
 }
 
-/// Wilson's (1927, J. Am. Stat. Assoc. 22, 209) score interval for a share, `hits` of `of`, at the given confidence. Without
-/// any count it is [0, 1].
+/// Wilson's (1927, J. Am. Stat. Assoc. 22, 209) score interval for a share, `hits` of `of`, at the
+/// given confidence. Without any count it is [0, 1].
 ///
 /// ```
 /// use twofold_analyse::counts::wilson;
@@ -38,8 +44,8 @@ pub fn wilson(hits: u64, of: u64, confidence: f64) -> [f64; 2] {
     score(hits, of, normal_quantile(0.5 * (1.0 + confidence)))
 }
 
-/// Goodman's (1965, Technometrics 7, 247) simultaneous intervals for the shares of a multinomial: each holds, and with the given confidence
-/// all hold at once (Bonferroni over the categories).
+/// Goodman's (1965, Technometrics 7, 247) simultaneous intervals for the shares of a multinomial:
+/// each holds, and with the given confidence all hold at once (Bonferroni over the categories).
 pub fn goodman(counts: &[u64], confidence: f64) -> Vec<[f64; 2]> {
     let of = counts.iter().sum();
     let categories = counts.len().max(1) as f64;
@@ -69,16 +75,19 @@ pub struct Homogeneity {
     pub chi_square: f64,
     /// Degrees of freedom: (rows - 1) (columns - 1), without empty rows and columns.
     pub freedom: usize,
-    /// Probability of so large a value under homogeneity, from the chi-square distribution: good where expected counts are 5 or more.
+    /// Probability of so large a value under homogeneity, from the chi-square distribution: good
+    /// where expected counts are 5 or more.
     pub p_asymptotic: f64,
-    /// The same, from random permutations of the outcomes over the rows: good for any counts. (hits + 1)/(permutations + 1).
+    /// The same, from random permutations of the outcomes over the rows: good for any counts. (hits
+    /// + 1)/(permutations + 1).
     pub p_permutation: f64,
     /// Permutations drawn.
     pub permutations: u64,
 }
 
-/// Tests rows of counts (one row a group, one column an outcome) for homogeneity. `permutations` are drawn from the generator of
-/// [`num::random`](twofold_num::random) with `seed`: the same answer everywhere.
+/// Tests rows of counts (one row a group, one column an outcome) for homogeneity. `permutations`
+/// are drawn from the generator of [`num::random`](twofold_num::random) with `seed`: the same
+/// answer everywhere.
 pub fn homogeneity(rows: &[Vec<u64>], permutations: u64, seed: u64) -> Homogeneity {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let at = |row: &Vec<u64>, c: usize| row.get(c).copied().unwrap_or(0);
@@ -147,15 +156,17 @@ fn chi_square(table: &[Vec<u64>]) -> f64 {
     sum
 }
 
-/// P(X > x) for the chi-square distribution: the regularised incomplete gamma function Q(freedom/2, x/2) by its finite sums (Abramowitz &
-/// Stegun 1964, 26.4.4 and 26.4.5), exact for whole degrees of freedom.
+/// P(X > x) for the chi-square distribution: the regularised incomplete gamma function Q(freedom/2,
+/// x/2) by its finite sums (Abramowitz & Stegun 1964, 26.4.4 and 26.4.5), exact for whole degrees
+/// of freedom.
 pub fn chi_square_above(x: f64, freedom: usize) -> f64 {
     if x <= 0.0 || freedom == 0 {
         return 1.0;
     }
     let half = 0.5 * x;
     let term = |power: f64, log_gamma: f64| exp(power * ln(half) - half - log_gamma);
-    // Q(a + 1, z) = Q(a, z) + z^a e^-z / Gamma(a + 1), from Q(1/2, z) = erfc(sqrt z) or Q(1, z) = e^-z.
+    // Q(a + 1, z) = Q(a, z) + z^a e^-z / Gamma(a + 1), from Q(1/2, z) = erfc(sqrt z) or Q(1, z) =
+    // e^-z.
     let (mut a, mut log_gamma, mut sum) = if freedom % 2 == 1 {
         // ln Gamma(3/2)
         (0.5, 0.5 * ln(std::f64::consts::PI) - ln(2.0), (1.0 - erf(sqrt(half))).max(0.0))
@@ -189,7 +200,8 @@ mod tests {
 
     #[test]
     fn score_intervals() {
-        // R: prop.test(15, 40, correct = FALSE): 0.2422, 0.5297; binom::binom.wilson(0, 20): 0, 0.1611252.
+        // R: prop.test(15, 40, correct = FALSE): 0.2422, 0.5297; binom::binom.wilson(0, 20): 0,
+        // 0.1611252.
         let [low, high] = wilson(15, 40, 0.95);
         assert!((low - 0.2422).abs() < 1e-4 && (high - 0.5297).abs() < 1e-4, "{low} {high}");
         let [low, high] = wilson(0, 20, 0.95);
@@ -226,15 +238,23 @@ mod tests {
             (20.0, 5, 0.001_249_730_6),
             (2.0, 7, 0.959_840_4),
         ] {
-            assert!((chi_square_above(x, df) - p).abs() < 1e-7, "{x} {df}: {}", chi_square_above(x, df));
+            assert!(
+                (chi_square_above(x, df) - p).abs() < 1e-7,
+                "{x} {df}: {}",
+                chi_square_above(x, df)
+            );
         }
         // Nothing is below zero; without freedom there is nothing to test.
-        assert_eq!((chi_square_above(0.0, 3), chi_square_above(-1.0, 3), chi_square_above(3.0, 0)), (1.0, 1.0, 1.0));
+        assert_eq!(
+            (chi_square_above(0.0, 3), chi_square_above(-1.0, 3), chi_square_above(3.0, 0)),
+            (1.0, 1.0, 1.0)
+        );
     }
 
     #[test]
     fn homogeneity_of_known_tables() {
-        // R: chisq.test(matrix(c(10, 20, 30, 40), 2, byrow = TRUE), correct = FALSE): 0.7937, p = 0.373.
+        // R: chisq.test(matrix(c(10, 20, 30, 40), 2, byrow = TRUE), correct = FALSE): 0.7937, p =
+        // 0.373.
         let h = homogeneity(&[vec![10, 20], vec![30, 40]], 5000, 3);
         assert!((h.chi_square - 0.793_650_79).abs() < 1e-6 && h.freedom == 1);
         assert!((h.p_asymptotic - 0.372_998).abs() < 1e-4);
@@ -266,13 +286,17 @@ mod tests {
 
     #[test]
     fn permutations_tend_to_the_exact_probability() {
-        // Of the 20 ways to deal three and three outcomes over two rows of three, two are as far apart as this one.
+        // Of the 20 ways to deal three and three outcomes over two rows of three, two are as far
+        // apart as this one.
         let h = homogeneity(&[vec![3, 0], vec![0, 3]], 20_000, 5);
         assert!((h.chi_square - 6.0).abs() < 1e-12 && h.freedom == 1 && h.permutations == 20_000);
         assert!((h.p_permutation - 0.1).abs() < 0.009, "{h:?}");
         // Rows of two and four: one way of fifteen, and chi-square is 6 again.
         let h = homogeneity(&[vec![2, 0], vec![0, 4]], 20_000, 5);
-        assert!((h.chi_square - 6.0).abs() < 1e-12 && (h.p_permutation - 1.0 / 15.0).abs() < 0.007, "{h:?}");
+        assert!(
+            (h.chi_square - 6.0).abs() < 1e-12 && (h.p_permutation - 1.0 / 15.0).abs() < 0.007,
+            "{h:?}"
+        );
         // R: pchisq(6, 1, lower.tail = FALSE).
         assert!((h.p_asymptotic - 0.014_305_878).abs() < 1e-8, "{h:?}");
     }
@@ -282,10 +306,20 @@ mod tests {
         let full = homogeneity(&[vec![5, 5], vec![2, 8]], 500, 1);
         assert_eq!(homogeneity(&[vec![5, 0, 5], vec![0, 0, 0], vec![2, 0, 8]], 500, 1), full);
         // 5, 5 and 2, 8 of expected 3.5 and 6.5: 2 (2.25/3.5 + 2.25/6.5).
-        assert!((full.chi_square - 4.5 * (1.0 / 3.5 + 1.0 / 6.5)).abs() < 1e-12 && full.freedom == 1, "{full:?}");
-        assert_eq!(homogeneity(&[vec![1, 2, 3], vec![3, 2, 1], vec![1, 1, 1], vec![2, 2, 2]], 1, 1).freedom, 6);
+        assert!(
+            (full.chi_square - 4.5 * (1.0 / 3.5 + 1.0 / 6.5)).abs() < 1e-12 && full.freedom == 1,
+            "{full:?}"
+        );
+        assert_eq!(
+            homogeneity(&[vec![1, 2, 3], vec![3, 2, 1], vec![1, 1, 1], vec![2, 2, 2]], 1, 1)
+                .freedom,
+            6
+        );
         // A row that ends early has nothing in the columns after.
-        assert_eq!(homogeneity(&[vec![5], vec![2, 8]], 1, 1), homogeneity(&[vec![5, 0], vec![2, 8]], 1, 1));
+        assert_eq!(
+            homogeneity(&[vec![5], vec![2, 8]], 1, 1),
+            homogeneity(&[vec![5, 0], vec![2, 8]], 1, 1)
+        );
     }
 
     #[test]
@@ -294,12 +328,19 @@ mod tests {
         let one = goodman(&[10, 20, 30], 0.95);
         for (interval, hits) in one.iter().zip([10, 20, 30]) {
             let alone = wilson(hits, 60, 1.0 - 0.05 / 3.0);
-            assert!((0..2).all(|k| (interval[k] - alone[k]).abs() < 1e-12), "{interval:?} {alone:?}");
+            assert!(
+                (0..2).all(|k| (interval[k] - alone[k]).abs() < 1e-12),
+                "{interval:?} {alone:?}"
+            );
         }
-        // Wilson's interval ends where the share is z standard errors away: (p - h)^2 = z^2 p (1 - p)/n.
+        // Wilson's interval ends where the share is z standard errors away: (p - h)^2 = z^2 p (1 -
+        // p)/n.
         let z = normal_quantile(0.975);
         for p in wilson(15, 40, 0.95) {
-            assert!(((p - 0.375) * (p - 0.375) - z * z * p * (1.0 - p) / 40.0).abs() < 1e-12, "{p}");
+            assert!(
+                ((p - 0.375) * (p - 0.375) - z * z * p * (1.0 - p) / 40.0).abs() < 1e-12,
+                "{p}"
+            );
         }
         assert!(goodman(&[], 0.95).is_empty() && normal_quantile(0.0).is_nan());
         let [low, high] = wilson(20, 20, 0.95);

@@ -1,8 +1,9 @@
 //! Growth of disturbances while an orbit passes a two-fold, for a delayed switch or a relay.
 //!
-//! A delay of d makes the scales x ~ d^2 across the surface and (y, z, t) ~ d along it: with them the equation near the two-fold has no d to
-//! leading order. A band of half-width b (f+ until h falls to -b, f- until it rises to b) makes them b and sqrt(b). Growth is then a number of order 1 in
-//! these units, which depends on the chatter's phase, times what the phase makes of the past.
+//! A delay of d makes the scales x ~ d^2 across the surface and (y, z, t) ~ d along it: with them
+//! the equation near the two-fold has no d to leading order. A band of half-width b (f+ until h
+//! falls to -b, f- until it rises to b) makes them b and sqrt(b). Growth is then a number of order
+//! 1 in these units, which depends on the chatter's phase, times what the phase makes of the past.
 
 use nalgebra::SVector;
 
@@ -55,8 +56,9 @@ pub struct LatePassageQuestion {
     pub start: [f64; 3],
     /// The two-fold.
     pub two_fold: [f64; 3],
-    /// The exit is the first passage at so many inner scales from the two-fold: through the surface, or under a smooth rule, whose orbits
-    /// leave along one side of it, through the plane in which the second component is the two-fold's.
+    /// The exit is the first passage at so many inner scales from the two-fold: through the
+    /// surface, or under a smooth rule, whose orbits leave along one side of it, through the plane
+    /// in which the second component is the two-fold's.
     pub beyond: f64,
     /// Everything must have happened before this time.
     pub by: f64,
@@ -75,13 +77,15 @@ pub struct LateGrowth {
     pub exit: [f64; 3],
 }
 
-/// Disturbances in the units of their direction: small enough to be linear to a per mille or so, if they do not grow in these units.
+/// Disturbances in the units of their direction: small enough to be linear to a per mille or so, if
+/// they do not grow in these units.
 const SIZE: f64 = 1e-4;
 /// A response is linear up to here, in inner scales.
 const LINEAR: f64 = 1e-2;
 /// A disturbance that grows beyond that is made so many times smaller than would do.
 const SMALLER: f64 = 10.0;
-/// No disturbance is smaller than this: it must stay above the rounding of numbers of the size of the two-fold's neighbourhood.
+/// No disturbance is smaller than this: it must stay above the rounding of numbers of the size of
+/// the two-fold's neighbourhood.
 const LEAST: f64 = 1e-15;
 /// Of a step's local error, for f64 series.
 const TOLERANCE: Tolerance = Tolerance { rtol: 1e-16, atol: 1e-18 };
@@ -91,7 +95,8 @@ const SMOOTH_TOLERANCE: Tolerance = Tolerance { rtol: 1e-13, atol: 1e-15 };
 /// Measures a passage. A growth that f64 cannot resolve is NaN.
 ///
 /// # Errors
-/// If the orbit cannot be followed, or does not pass the two-fold in time (then [`Failure::NotApplicable`]).
+/// If the orbit cannot be followed, or does not pass the two-fold in time (then
+/// [`Failure::NotApplicable`]).
 pub fn late_growth<P: PiecewiseSmooth<3> + Clone>(
     system: &P,
     data: &System,
@@ -113,7 +118,8 @@ pub fn late_growth<P: PiecewiseSmooth<3> + Clone>(
         let mut size = SIZE * unit;
         loop {
             let kick = direction * size;
-            let response = (if late { exit(none, kick)? } else { exit(kick, none)? } - plain).norm();
+            let response =
+                (if late { exit(none, kick)? } else { exit(kick, none)? } - plain).norm();
             if response <= LINEAR * wide {
                 return Ok(response / size);
             }
@@ -141,7 +147,8 @@ pub fn late_growth<P: PiecewiseSmooth<3> + Clone>(
     Ok(growth)
 }
 
-/// The exit of the orbit that is displaced by `at_start` at the start, and by `at_kick` where sliding stops to attract.
+/// The exit of the orbit that is displaced by `at_start` at the start, and by `at_kick` where
+/// sliding stops to attract.
 ///
 /// # Errors
 ///
@@ -161,10 +168,14 @@ pub fn late_exit<P: PiecewiseSmooth<3> + Clone>(
         LateRule::Smooth { delay, eps } => {
             (delayed(delay, Some((Transition::Tanh, eps))), Method::Dopri5, SMOOTH_TOLERANCE)
         }
-        LateRule::Relay { band } => (LateSwitch::Relay { band, inside: Inside::Sign }, Method::Taylor, TOLERANCE),
+        LateRule::Relay { band } => {
+            (LateSwitch::Relay { band, inside: Inside::Sign }, Method::Taylor, TOLERANCE)
+        }
     };
     let delayed = Delayed { sides: Sides::new(system, data), switch, x0 };
-    delayed.with_stepper(method, None, tolerance, follow).unwrap_or_else(|error| Err(refused(&error)))
+    delayed
+        .with_stepper(method, None, tolerance, follow)
+        .unwrap_or_else(|error| Err(refused(&error)))
 }
 
 fn refused(error: &DelayError) -> Failure {
@@ -201,7 +212,8 @@ impl<P: PiecewiseSmooth<3>> Follow<'_, P> {
 impl<P: PiecewiseSmooth<3>> WithStepper<3> for Follow<'_, P> {
     type Answer = Result<SVector<f64, 3>, Failure>;
     fn with<M: Stepper<3>>(self, mut stepper: M) -> Self::Answer {
-        let Self { system, question: LatePassageQuestion { rule, two_fold, by, .. }, x0, kick } = self;
+        let Self { system, question: LatePassageQuestion { rule, two_fold, by, .. }, x0, kick } =
+            self;
         let (mut passages, mut passed) = (CrossingFinder::default(), false);
         stepper.restart(&Own, 0.0, x0, *by, f64::INFINITY)?;
         loop {

@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 use super::reference::{ExtendedCrossing, SectionPlane, reference};
 use super::section::SectionRecorder;
 use twofold_integrate::{
-    DriveOptions, Failure, Flow, Method, Observer, Statistics, Step, StepCap, Stepper, Tolerance, WithStepper, drive,
+    DriveOptions, Failure, Flow, Method, Observer, Statistics, Step, StepCap, Stepper, Tolerance,
+    WithStepper, drive,
 };
 use twofold_num::elementary::log10;
 use twofold_num::{Arithmetic, DoubleDouble, Scalar};
@@ -87,9 +88,11 @@ const MOST_CROSSINGS: usize = 1000;
 /// # Errors
 /// [`Failure`] of the reference orbit or of a method, among them a step budget used up.
 pub fn digits<F: VectorField<3>>(field: &F, question: &DigitsQuestion) -> Result<Digits, Failure> {
-    let DigitsQuestion { start, section, t_end, near, ref methods, step_cap, max_steps } = *question;
+    let DigitsQuestion { start, section, t_end, near, ref methods, step_cap, max_steps } =
+        *question;
     let x0 = SVector::from(start);
-    let exact = reference(field, x0.map(DoubleDouble::from_f64), section, MOST_CROSSINGS, t_end, false)?;
+    let exact =
+        reference(field, x0.map(DoubleDouble::from_f64), section, MOST_CROSSINGS, t_end, false)?;
     let visits = exact.crossings.iter().filter(|c| c.extent() < near);
     let visits = visits.map(|c| NearCrossing { t: c.t.to_f64(), distance: c.extent() }).collect();
     let mut answer = Digits { rows: Vec::new(), visits, statistics: exact.statistics };
@@ -154,8 +157,9 @@ impl Observer<3> for Until {
     }
 }
 
-/// Runs `stepper` from `x0` and compares its n-th crossing of `plane` with the n-th of `reference`. Fewer rows come back
-/// if the method has made fewer crossings when twice the reference's time is over.
+/// Runs `stepper` from `x0` and compares its n-th crossing of `plane` with the n-th of `reference`.
+/// Fewer rows come back if the method has made fewer crossings when twice the reference's time is
+/// over.
 ///
 /// # Errors
 ///
@@ -170,7 +174,10 @@ pub fn agreement<F: VectorField<3>, M: Stepper<3>>(
     max_steps: u64,
 ) -> Result<Vec<Agreement>, Failure> {
     let Some(last) = reference.last() else { return Ok(Vec::new()) };
-    let mut until = Until { section: SectionRecorder::new(plane.coordinate, plane.value), crossings: reference.len() };
+    let mut until = Until {
+        section: SectionRecorder::new(plane.coordinate, plane.value),
+        crossings: reference.len(),
+    };
     let t_end = 2.0 * last.t.to_f64();
     let options = DriveOptions { step_cap: cap, max_steps, ..DriveOptions::to(t_end) };
     let _ = drive(field, x0, &options, stepper, &mut until, &())?.within_budget()?;
@@ -179,7 +186,12 @@ pub fn agreement<F: VectorField<3>, M: Stepper<3>>(
         .map(|(i, (want, got))| {
             let gap = |c: usize| (DoubleDouble::from_f64(got.x[c]) - want.x[c]).to_f64().abs();
             let error = (0..3).map(gap).fold(0.0, f64::max);
-            Agreement { crossing: i + 1, t: want.t.to_f64(), error, log10_error: log10(error).max(Agreement::FLOOR) }
+            Agreement {
+                crossing: i + 1,
+                t: want.t.to_f64(),
+                error,
+                log10_error: log10(error).max(Agreement::FLOOR),
+            }
         })
         .collect())
 }
@@ -218,14 +230,20 @@ mod tests {
         let away = |k: usize| 0.05 * exp(GROWTH * moment(k));
         assert_eq!(found.visits.len(), 2);
         for (v, k) in found.visits.iter().zip(1..) {
-            assert!((v.t - moment(k)).abs() < 1e-14 && (v.distance - away(k)).abs() < 1e-15, "{v:?}");
+            assert!(
+                (v.t - moment(k)).abs() < 1e-14 && (v.distance - away(k)).abs() < 1e-15,
+                "{v:?}"
+            );
         }
         assert_eq!(found.rows.len(), 12);
         for (r, i) in found.rows.iter().zip(0..) {
             let a = r.agreement;
             assert!(r.contender == question.methods[i / 4] && a.crossing == i % 4 + 1, "{r:?}");
             assert!((a.t - moment(a.crossing)).abs() < 1e-13, "{r:?}");
-            assert!((a.log10_error - log10(a.error).max(-17.0)).abs() < 1e-15 && a.log10_error >= -17.0, "{r:?}");
+            assert!(
+                (a.log10_error - log10(a.error).max(-17.0)).abs() < 1e-15 && a.log10_error >= -17.0,
+                "{r:?}"
+            );
             // Loose, tight, and as good as a double can be.
             let [low, high] = [[1e-7, 1e-2], [1e-14, 1e-9], [0.0, 1e-15]][i / 4];
             assert!((low..=high).contains(&a.error), "{r:?}");
@@ -234,17 +252,20 @@ mod tests {
 
     #[test]
     fn a_method_has_twice_the_references_time() {
-        // Of five passages that a reference claims to have made by t = 6, the method makes those before 12: pi/2, 3
-        // pi/2, 5 pi/2 and 7 pi/2.
+        // Of five passages that a reference claims to have made by t = 6, the method makes those
+        // before 12: pi/2, 3 pi/2, 5 pi/2 and 7 pi/2.
         let claimed = |k: usize| ExtendedCrossing {
             t: DoubleDouble::from_f64(6.0 - (4 - k) as f64),
             x: SVector::from([0.0; 3].map(DoubleDouble::from_f64)),
             direction: crate::Direction::Up,
         };
         let reference: Vec<_> = (0..5).map(claimed).collect();
-        let mut method = twofold_integrate::Dopri5::<3>::new(Tolerance { rtol: 1e-10, atol: 1e-10 });
-        let (start, plane) = (SVector::from([0.0, 0.05, 0.0]), SectionPlane { coordinate: 1, value: 0.0 });
-        let rows = agreement(&Spiral, start, plane, &reference, &mut method, StepCap::None, 10_000).unwrap();
+        let mut method =
+            twofold_integrate::Dopri5::<3>::new(Tolerance { rtol: 1e-10, atol: 1e-10 });
+        let (start, plane) =
+            (SVector::from([0.0, 0.05, 0.0]), SectionPlane { coordinate: 1, value: 0.0 });
+        let rows = agreement(&Spiral, start, plane, &reference, &mut method, StepCap::None, 10_000)
+            .unwrap();
         assert_eq!(rows.iter().map(|r| r.t).collect::<Vec<_>>(), [2.0, 3.0, 4.0, 5.0]);
     }
 }

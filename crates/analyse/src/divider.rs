@@ -13,7 +13,8 @@ use serde::{Deserialize, Serialize};
 
 use super::Sample;
 
-/// Strides across the diagonal of the common box: the eye separates windings about a fortieth of a panel apart.
+/// Strides across the diagonal of the common box: the eye separates windings about a fortieth of a
+/// panel apart.
 pub const STRIDES: f64 = 40.0;
 /// The last strides are no sign of coming back: the path is still leaving them.
 const STILL_LEAVING: usize = 4;
@@ -38,14 +39,17 @@ pub fn common_box<'a>(paths: impl IntoIterator<Item = &'a [Sample]>) -> [(f64, f
 }
 
 impl DividerWalk {
-    /// Walks `path`; lengths are measured in the box `range`, each coordinate relative to its extent, as a picture shows it.
+    /// Walks `path`; lengths are measured in the box `range`, each coordinate relative to its
+    /// extent, as a picture shows it.
     pub fn new(path: &[Sample], range: &[(f64, f64); 3]) -> Self {
         let scale = range.map(|(low, high)| STRIDES / (high - low).max(f64::MIN_POSITIVE));
-        let place = |s: &Sample| -> [f64; 3] { std::array::from_fn(|i| (s.x[i] - range[i].0) * scale[i]) };
+        let place =
+            |s: &Sample| -> [f64; 3] { std::array::from_fn(|i| (s.x[i] - range[i].0) * scale[i]) };
         let mut ends: Vec<[f64; 3]> = path.first().map(place).into_iter().collect();
         for pair in path.windows(2) {
             let (a, b) = (place(&pair[0]), place(&pair[1]));
-            // Long chords are walked in quarters of a stride; the end of a stride is then exact to that.
+            // Long chords are walked in quarters of a stride; the end of a stride is then exact to
+            // that.
             let parts = (4.0 * squared(a, b).sqrt()).ceil().clamp(1.0, 1e6) as usize;
             for k in 1..=parts {
                 let s = k as f64 / parts as f64;
@@ -65,27 +69,37 @@ impl DividerWalk {
     /// Whether an end of a stride numbered below `before` lies within one width of `place`.
     fn visited(&self, place: [f64; 3], before: usize) -> bool {
         let [i, j, k] = place.map(|x| x.floor() as i64);
-        (-1..=1).flat_map(|a| (-1..=1).flat_map(move |b| (-1..=1).map(move |c| [i + a, j + b, k + c]))).any(|cell| {
-            self.cells
-                .get(&cell)
-                .is_some_and(|ends| ends.iter().any(|e| *e < before && squared(self.ends[*e], place) < 1.0))
-        })
+        (-1..=1)
+            .flat_map(|a| (-1..=1).flat_map(move |b| (-1..=1).map(move |c| [i + a, j + b, k + c])))
+            .any(|cell| {
+                self.cells.get(&cell).is_some_and(|ends| {
+                    ends.iter().any(|e| *e < before && squared(self.ends[*e], place) < 1.0)
+                })
+            })
     }
 
-    /// Share of strides that end where the path has not been before: 1 for a path that never comes back to a place, 1/n for
-    /// one that runs n times around a loop. The larger, the less organised.
+    /// Share of strides that end where the path has not been before: 1 for a path that never comes
+    /// back to a place, 1/n for one that runs n times around a loop. The larger, the less
+    /// organised.
     pub fn freshness(&self) -> f64 {
-        let fresh =
-            (0..self.ends.len()).filter(|k| !self.visited(self.ends[*k], k.saturating_sub(STILL_LEAVING))).count();
+        let fresh = (0..self.ends.len())
+            .filter(|k| !self.visited(self.ends[*k], k.saturating_sub(STILL_LEAVING)))
+            .count();
         fresh as f64 / self.ends.len().max(1) as f64
     }
 
     /// Comparison with another path in the same box.
     pub fn compare(&self, other: &DividerWalk) -> Shared {
-        let common = |a: &DividerWalk, b: &DividerWalk| a.ends.iter().filter(|e| b.visited(**e, usize::MAX)).count();
+        let common = |a: &DividerWalk, b: &DividerWalk| {
+            a.ends.iter().filter(|e| b.visited(**e, usize::MAX)).count()
+        };
         let strides = [self.ends.len(), other.ends.len()];
         let both = [common(self, other), common(other, self)];
-        Shared { strides, both, overlap: (both[0] + both[1]) as f64 / (strides[0] + strides[1]).max(1) as f64 }
+        Shared {
+            strides,
+            both,
+            overlap: (both[0] + both[1]) as f64 / (strides[0] + strides[1]).max(1) as f64,
+        }
     }
 }
 
@@ -135,7 +149,12 @@ mod tests {
         let (quiet, chatter) = (loops(5.0, 0.1, 0.0), loops(5.0, 0.1, 0.02));
         let range = common_box([&quiet[..], &chatter[..]]);
         let (q, c) = (DividerWalk::new(&quiet, &range), DividerWalk::new(&chatter, &range));
-        assert!((q.freshness() - c.freshness()).abs() < 0.05, "{} {}", q.freshness(), c.freshness());
+        assert!(
+            (q.freshness() - c.freshness()).abs() < 0.05,
+            "{} {}",
+            q.freshness(),
+            c.freshness()
+        );
     }
 
     fn straight(from: [f64; 3], to: [f64; 3]) -> [Sample; 2] {
@@ -144,7 +163,10 @@ mod tests {
 
     #[test]
     fn a_box_is_around_all_paths() {
-        let (a, b) = (straight([1.0, -2.0, 0.5], [3.0, -5.0, 0.5]), straight([2.0, 7.0, 0.5], [-4.0, 0.0, 0.5]));
+        let (a, b) = (
+            straight([1.0, -2.0, 0.5], [3.0, -5.0, 0.5]),
+            straight([2.0, 7.0, 0.5], [-4.0, 0.0, 0.5]),
+        );
         assert_eq!(common_box([&a[..], &b[..]]), [(-4.0, 3.0), (-5.0, 7.0), (0.5, 0.5)]);
     }
 
@@ -160,7 +182,8 @@ mod tests {
             assert!((1.0..1.5626).contains(&squared(pair[0], pair[1])), "{pair:?}");
         }
         assert_eq!(walk.freshness(), 1.0);
-        let there_and_back = DividerWalk::new(&[path.clone(), path.into_iter().rev().collect()].concat(), &range);
+        let there_and_back =
+            DividerWalk::new(&[path.clone(), path.into_iter().rev().collect()].concat(), &range);
         assert!((there_and_back.freshness() - 0.5).abs() < 0.04, "{}", there_and_back.freshness());
     }
 
@@ -168,7 +191,8 @@ mod tests {
     fn a_place_is_visited_if_an_earlier_stride_ended_near() {
         // Against all ends one by one; a hundred in a box of six strides, on both sides of zero.
         let mut random = twofold_num::random::RandomStream::new(7, 0);
-        let ends: Vec<[f64; 3]> = (0..100).map(|_| [(); 3].map(|()| random.uniform_in(-3.0, 3.0))).collect();
+        let ends: Vec<[f64; 3]> =
+            (0..100).map(|_| [(); 3].map(|()| random.uniform_in(-3.0, 3.0))).collect();
         let mut cells: BTreeMap<[i64; 3], Vec<usize>> = BTreeMap::new();
         for (k, end) in ends.iter().enumerate() {
             cells.entry(end.map(|x| x.floor() as i64)).or_default().push(k);
@@ -196,8 +220,12 @@ mod tests {
         // Half as long: all of it, and half of the other.
         let half = DividerWalk::new(&straight([0.01, 0.5, 0.5], [0.5, 0.5, 0.5]), &range);
         let shared = a.compare(&half);
-        assert!(shared.both[1] == shared.strides[1] && shared.both[0].abs_diff(shared.strides[1]) <= 1, "{shared:?}");
-        let want = (shared.both[0] + shared.both[1]) as f64 / (shared.strides[0] + shared.strides[1]) as f64;
+        assert!(
+            shared.both[1] == shared.strides[1] && shared.both[0].abs_diff(shared.strides[1]) <= 1,
+            "{shared:?}"
+        );
+        let want = (shared.both[0] + shared.both[1]) as f64
+            / (shared.strides[0] + shared.strides[1]) as f64;
         assert_eq!(shared.overlap, want);
     }
 }

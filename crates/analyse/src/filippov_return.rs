@@ -1,9 +1,12 @@
-//! Return maps of discontinuous systems: closed orbits that cross the switching surface, or slide on it.
+//! Return maps of discontinuous systems: closed orbits that cross the switching surface, or slide
+//! on it.
 //!
-//! The map is as smooth as the fields as long as neighbouring orbits have the same events in the same order (crossings, landings, departures
-//! by tangency; di Bernardo, Budd, Champneys & Kowalczyk 2008, ch. 2.5 and 8): its derivative is then taken by central differences, and a
-//! sliding stretch shows as multipliers that are zero. Where neighbours have other events, as at a grazing orbit, there is no derivative, and
-//! where the orbit comes to a repelling stretch or a two-fold there is no map: both are told.
+//! The map is as smooth as the fields as long as neighbouring orbits have the same events in the
+//! same order (crossings, landings, departures by tangency; di Bernardo, Budd, Champneys &
+//! Kowalczyk 2008, ch. 2.5 and 8): its derivative is then taken by central differences, and a
+//! sliding stretch shows as multipliers that are zero. Where neighbours have other events, as at a
+//! grazing orbit, there is no derivative, and where the orbit comes to a repelling stretch or a
+//! two-fold there is no map: both are told.
 
 use nalgebra::SVector;
 
@@ -24,7 +27,8 @@ pub enum Error {
     Filippov(#[from] FilippovError),
     /// The orbit does not come back.
     #[error(
-        "the orbit from {from:?} did not return to the plane within t = {within}: start nearer to the closed orbit, or choose another plane"
+        "the orbit from {from:?} did not return to the plane within t = {within}: start nearer to \
+            the closed orbit, or choose another plane"
     )]
     NoReturn {
         /// Start on the plane.
@@ -34,7 +38,8 @@ pub enum Error {
     },
     /// The future is a set.
     #[error(
-        "the orbit comes to a place from which it has many futures (t = {t}, state {state:?}): there is no return map through it"
+        "the orbit comes to a place from which it has many futures (t = {t}, state {state:?}): \
+            there is no return map through it"
     )]
     SetValued {
         /// When.
@@ -44,12 +49,14 @@ pub enum Error {
     },
     /// The section lies where the orbit slides.
     #[error(
-        "the orbit slides on the switching surface where it meets the plane: choose a plane that it meets in flight"
+        "the orbit slides on the switching surface where it meets the plane: choose a plane that \
+            it meets in flight"
     )]
     SlidesThere,
     /// The orbit touches the surface.
     #[error(
-        "the orbit grazes the switching surface: orbits within {distance:e} of it have other events, and the return map has no derivative there"
+        "the orbit grazes the switching surface: orbits within {distance:e} of it have other \
+            events, and the return map has no derivative there"
     )]
     Grazing {
         /// How near its neighbours were looked at.
@@ -85,7 +92,11 @@ impl<const N: usize> FilippovObserver<N> for ReturnObserver<N> {
                 self.same.push((t, x, mode));
             }
         }
-        if self.same.len() >= self.returns || self.set_valued.is_some() { Flow::Stop } else { Flow::Continue }
+        if self.same.len() >= self.returns || self.set_valued.is_some() {
+            Flow::Stop
+        } else {
+            Flow::Continue
+        }
     }
 
     fn event(&mut self, event: &ModeEvent<N>) -> Flow {
@@ -119,11 +130,13 @@ struct Plain<const N: usize> {
     passes: bool,
 }
 
-/// Differences are taken over this share of the orbit's extent, and over a tenth and a hundredth of it where neighbours have other events.
+/// Differences are taken over this share of the orbit's extent, and over a tenth and a hundredth of
+/// it where neighbours have other events.
 const DIFFERENCE: f64 = 1e-5;
 const SHARES: [f64; 3] = [1.0, 0.1, 0.01];
 
-/// The return from `u`, a point of `plane`, after `returns` crossings in its direction, with the derivative of the return map if it is asked for.
+/// The return from `u`, a point of `plane`, after `returns` crossings in its direction, with the
+/// derivative of the return map if it is asked for.
 ///
 /// # Errors
 /// [`enum@Error`].
@@ -142,14 +155,14 @@ where
     let base = plain(system, plane, returns, u, settings)?;
     let (mut rows, mut derivative_error) = (Vec::new(), 0.0);
     if derivative {
-        let grazes = base
-            .itinerary
-            .iter()
-            .any(|(kind, ..)| *kind == std::mem::discriminant(&EventKind::Grazing { side: Side::Plus }));
+        let grazes = base.itinerary.iter().any(|(kind, ..)| {
+            *kind == std::mem::discriminant(&EventKind::Grazing { side: Side::Plus })
+        });
         let size = DIFFERENCE * base.extent;
         let columns = SHARES.iter().find_map(|share| {
             let delta = share * size;
-            // Some roundings of every component, over the difference; and what central differences leave out.
+            // Some roundings of every component, over the difference; and what central differences
+            // leave out.
             let left_out = DIFFERENCE * share * (DIFFERENCE * share);
             derivative_error = 16.0 * f64::EPSILON * base.largest / delta + 10.0 * left_out;
             columns(system, plane, returns, u, settings, &base, delta).transpose()
@@ -218,8 +231,11 @@ where
 {
     // The rule is never used: a run stops where it would be.
     let rule = ExitRule::AtOnce { side: Side::Plus };
-    let engine =
-        filippov::FilippovOptions { tolerance: settings.tolerance, max_step: settings.max_step, ..Default::default() };
+    let engine = filippov::FilippovOptions {
+        tolerance: settings.tolerance,
+        max_step: settings.max_step,
+        ..Default::default()
+    };
     let watch = || ReturnObserver {
         plane,
         returns,
@@ -231,7 +247,8 @@ where
         extent: None,
     };
     let mut seen = watch();
-    let end = filippov::run(system, *u, settings.longest_return, &engine, rule, &mut seen)?.within_budget()?;
+    let end = filippov::run(system, *u, settings.longest_return, &engine, rule, &mut seen)?
+        .within_budget()?;
     if let Some((t, state)) = seen.set_valued {
         return Err(Error::SetValued { t, state });
     }
@@ -274,8 +291,9 @@ mod tests {
     use twofold_integrate::Tolerance;
     use twofold_num::Elementary;
 
-    /// s' = 1, y' = q'(s) with q(s) = s (s^2 - 1)(s^2 - 4), on both sides of an edge at a value of s or y: a system that is discontinuous in name only. y - q(s) stays what
-    /// it is, so a return of a plane of y is a root of a polynomial.
+    /// s' = 1, y' = q'(s) with q(s) = s (s^2 - 1)(s^2 - 4), on both sides of an edge at a value of
+    /// s or y: a system that is discontinuous in name only. y - q(s) stays what it is, so a return
+    /// of a plane of y is a root of a polynomial.
     struct Quintic {
         edge: f64,
         of: usize,
@@ -300,32 +318,58 @@ mod tests {
 
     #[test]
     fn returns_of_a_polynomial_are_its_roots() {
-        // Before the edge and after it the method is exact and its dense output, by which crossings are found, is not: the crossing is landed on. Where the edge
-        // is crossed, the dense output says.
-        for (edge, value, tolerance) in [(9.0, 0.0, 1e-5), (9.0, 0.7, 1e-5), (-9.0, -3.0, 1e-5), (-0.3, 0.7, 1e-12)] {
+        // Before the edge and after it the method is exact and its dense output, by which crossings
+        // are found, is not: the crossing is landed on. Where the edge is crossed, the dense output
+        // says.
+        for (edge, value, tolerance) in
+            [(9.0, 0.0, 1e-5), (9.0, 0.7, 1e-5), (-9.0, -3.0, 1e-5), (-0.3, 0.7, 1e-12)]
+        {
             let plane = ReturnPlane { axis: 1, value, upward: true };
             let start = SVector::from([-2.0, value]);
-            // Upwards at -2, 0, 2 with the slopes 24, 4, 24; the derivative is the slope at the start over that at the end.
+            // Upwards at -2, 0, 2 with the slopes 24, 4, 24; the derivative is the slope at the
+            // start over that at the end.
             for (returns, s, derivative) in [(1, 0.0, 6.0), (2, 2.0, 1.0)] {
-                let r =
-                    return_map(&Quintic { edge, of: 0 }, plane, returns, &start, &settings(tolerance), true).unwrap();
+                let r = return_map(
+                    &Quintic { edge, of: 0 },
+                    plane,
+                    returns,
+                    &start,
+                    &settings(tolerance),
+                    true,
+                )
+                .unwrap();
                 assert!((r.point[0] - s).abs() < 1e-9 && r.point[1] == value, "{r:?}");
                 assert!((r.time - (s + 2.0)).abs() < 1e-9, "{r:?}");
-                assert!((r.derivative[0] - derivative).abs() < 1e-5 && r.derivative[1..] == [0.0; 3], "{r:?}");
+                assert!(
+                    (r.derivative[0] - derivative).abs() < 1e-5 && r.derivative[1..] == [0.0; 3],
+                    "{r:?}"
+                );
                 assert_eq!((r.same.len(), r.opposite.len()), (returns, returns));
-                assert!(r.opposite.iter().zip([-1.0, 1.0]).all(|(x, s)| (x[0] - s).abs() < 1e-3), "{r:?}");
-                let plain =
-                    return_map(&Quintic { edge, of: 0 }, plane, returns, &start, &settings(tolerance), false).unwrap();
+                assert!(
+                    r.opposite.iter().zip([-1.0, 1.0]).all(|(x, s)| (x[0] - s).abs() < 1e-3),
+                    "{r:?}"
+                );
+                let plain = return_map(
+                    &Quintic { edge, of: 0 },
+                    plane,
+                    returns,
+                    &start,
+                    &settings(tolerance),
+                    false,
+                )
+                .unwrap();
                 assert!(plain.derivative.is_empty() && plain.point == r.point);
             }
-            let none = return_map(&Quintic { edge, of: 0 }, plane, 3, &start, &settings(tolerance), false);
+            let none =
+                return_map(&Quintic { edge, of: 0 }, plane, 3, &start, &settings(tolerance), false);
             assert_eq!(none, Err(Error::NoReturn { from: vec![-2.0, value], within: 6.0 }));
         }
     }
 
     #[test]
     fn an_orbit_that_almost_touches_the_surface_has_no_derivative() {
-        // Between -1 and 0 the orbit from (-2, 0) is lowest where q' = 0, at s^2 = (15 - sqrt 145)/10.
+        // Between -1 and 0 the orbit from (-2, 0) is lowest where q' = 0, at s^2 = (15 - sqrt
+        // 145)/10.
         let s2 = 0.1 * (15.0 - twofold_num::elementary::sqrt(145.0));
         let lowest = -twofold_num::elementary::sqrt(s2) * (s2 - 1.0) * (s2 - 4.0);
         let of = |below: f64, derivative| {
@@ -333,9 +377,11 @@ mod tests {
             let system = Quintic { edge: lowest - below, of: 1 };
             return_map(&system, plane, 1, &SVector::from([-2.0, 0.0]), &settings(1e-12), derivative)
         };
-        // Neighbours at 5e-5, 5e-6 and 5e-7 come 24 times as much lower, and all cross the surface; the map itself is there.
+        // Neighbours at 5e-5, 5e-6 and 5e-7 come 24 times as much lower, and all cross the surface;
+        // the map itself is there.
         let Err(Error::Grazing { distance }) = of(1e-7, true) else { panic!("it grazes") };
-        // Two wide, and as high as from the lowest point to the highest, at s^2 = (15 + sqrt 145)/10.
+        // Two wide, and as high as from the lowest point to the highest, at s^2 = (15 + sqrt
+        // 145)/10.
         let s2 = 0.1 * (15.0 + twofold_num::elementary::sqrt(145.0));
         let highest = -twofold_num::elementary::sqrt(s2) * (s2 - 1.0) * (s2 - 4.0);
         let extent = twofold_num::elementary::sqrt(4.0 + (highest - lowest) * (highest - lowest));
@@ -363,7 +409,14 @@ mod tests {
         }
         let of = |towards, y, value| {
             let plane = ReturnPlane { axis: 0, value, upward: true };
-            return_map(&Channel(towards), plane, 1, &SVector::from([0.0, y]), &settings(1e-9), false)
+            return_map(
+                &Channel(towards),
+                plane,
+                1,
+                &SVector::from([0.0, y]),
+                &settings(1e-9),
+                false,
+            )
         };
         // It lands at 1, and flies before.
         assert_eq!(of(1.0, 1.0, 2.0), Err(Error::SlidesThere));

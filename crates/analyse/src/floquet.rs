@@ -1,9 +1,10 @@
 //! Closed orbits and their multipliers.
 //!
-//! A closed orbit is a fixed point of the return map of a plane, found by Newton's method with the map's exact derivative from the
-//! variational equation; the eigenvalues of that derivative are the orbit's Floquet multipliers without the trivial one (Guckenheimer &
-//! Holmes 1983, sec. 1.5; Parker & Chua 1989, ch. 5). |multiplier| < 1 for all: the orbit attracts, at the rate -ln|multiplier|
-//! / period.
+//! A closed orbit is a fixed point of the return map of a plane, found by Newton's method with the
+//! map's exact derivative from the variational equation; the eigenvalues of that derivative are the
+//! orbit's Floquet multipliers without the trivial one (Guckenheimer & Holmes 1983, sec. 1.5;
+//! Parker & Chua 1989, ch. 5). |multiplier| < 1 for all: the orbit attracts, at the rate
+//! -ln|multiplier| / period.
 
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
@@ -56,7 +57,8 @@ impl Default for FloquetOptions {
 /// A closed orbit with its stability.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ClosedOrbit {
-    /// Where it crosses the plane in the counted direction, in the order of the motion; full states.
+    /// Where it crosses the plane in the counted direction, in the order of the motion; full
+    /// states.
     pub points: Vec<Vec<f64>>,
     /// Where it crosses in the other direction.
     pub opposite: Vec<Vec<f64>>,
@@ -64,8 +66,8 @@ pub struct ClosedOrbit {
     pub period: f64,
     /// Multipliers as (real, imaginary), by falling modulus.
     pub multipliers: Vec<[f64; 2]>,
-    /// Rate at which nearby orbits approach it in the end, per unit time: -ln(largest modulus)/period. Negative: it
-    /// repels.
+    /// Rate at which nearby orbits approach it in the end, per unit time: -ln(largest
+    /// modulus)/period. Negative: it repels.
     pub rate: f64,
     /// |P(u) - u| at the end.
     pub residual: f64,
@@ -81,7 +83,8 @@ pub enum Error {
     Integration(#[from] Failure),
     /// The orbit does not come back.
     #[error(
-        "the orbit from {from:?} did not return to the plane within t = {within}: start nearer to the closed orbit"
+        "the orbit from {from:?} did not return to the plane within t = {within}: start nearer to \
+            the closed orbit"
     )]
     NoReturn {
         /// Start on the plane.
@@ -91,7 +94,8 @@ pub enum Error {
     },
     /// Newton's method did not converge.
     #[error(
-        "no closed orbit found near the start: return error {residual:e} after {iterations} Newton iterations; start nearer or check the number of returns"
+        "no closed orbit found near the start: return error {residual:e} after {iterations} Newton \
+            iterations; start nearer or check the number of returns"
     )]
     NotConverged {
         /// Return error reached.
@@ -148,8 +152,9 @@ impl<const N: usize> Extent<N> {
     }
 }
 
-/// The closed orbit that crosses `plane` `returns` times per turn in its direction, by Newton's method from `guess` (its component
-/// `plane.axis` is set to `plane.value`). `M` is `N` (`N` + 1): `closed_orbit::<3, 12, _>(...)`.
+/// The closed orbit that crosses `plane` `returns` times per turn in its direction, by Newton's
+/// method from `guess` (its component `plane.axis` is set to `plane.value`). `M` is `N` (`N` + 1):
+/// `closed_orbit::<3, 12, _>(...)`.
 ///
 /// ```
 /// use nalgebra::{SVector, vector};
@@ -167,7 +172,8 @@ impl<const N: usize> Extent<N> {
 /// }
 ///
 /// let plane = ReturnPlane { axis: 1, value: 0.0, upward: true };
-/// let orbit = closed_orbit::<2, 6, _>(&Circle, plane, 1, vector![1.2, 0.0], &FloquetOptions::default())?;
+/// let options = FloquetOptions::default();
+/// let orbit = closed_orbit::<2, 6, _>(&Circle, plane, 1, vector![1.2, 0.0], &options)?;
 /// assert!((orbit.period - 2.0 * std::f64::consts::PI).abs() < 1e-8);
 /// # Ok::<(), Error>(())
 /// ```
@@ -212,7 +218,8 @@ where
                 iterations: iteration,
             });
         }
-        // (DP - 1) du = -(P(u) - u) in the plane; the row and column of the axis become the identity's.
+        // (DP - 1) du = -(P(u) - u) in the plane; the row and column of the axis become the
+        // identity's.
         let mut matrix = r.derivative - SMatrix::identity();
         matrix[(plane.axis, plane.axis)] = 1.0;
         let scale = matrix.amax();
@@ -230,8 +237,8 @@ pub struct Returned {
     pub point: Vec<f64>,
     /// The time it took.
     pub time: f64,
-    /// The derivative of the return map, row by row; the row and the column of the plane's coordinate are zero. Empty where none was
-    /// asked for.
+    /// The derivative of the return map, row by row; the row and the column of the plane's
+    /// coordinate are zero. Empty where none was asked for.
     pub derivative: Vec<f64>,
     /// Crossings in the plane's direction, the last of them `point` as the dense output has it.
     pub same: Vec<Vec<f64>>,
@@ -247,8 +254,9 @@ pub struct Returned {
     pub events: usize,
 }
 
-/// The return from `u`, a point of `plane`, after `returns` crossings in its direction, with the derivative of the return map: `tangent` is an
-/// equation with its variational equation for `N` vectors, in `M` = `N` (`N` + 1) dimensions.
+/// The return from `u`, a point of `plane`, after `returns` crossings in its direction, with the
+/// derivative of the return map: `tangent` is an equation with its variational equation for `N`
+/// vectors, in `M` = `N` (`N` + 1) dimensions.
 ///
 /// # Errors
 /// If the orbit cannot be followed, or does not return.
@@ -267,7 +275,17 @@ pub fn return_map<const N: usize, const M: usize, T: VectorField<M>>(
         returned::<N, M, T>(tangent, plane, returns, *u, settings)?;
     let derivative = (0..N * N).map(|k| derivative[(k / N, k % N)]).collect();
     let point = Failure::state(&point);
-    Ok(Returned { point, time, derivative, same, opposite, extent, passes, derivative_error: 0.0, events: 0 })
+    Ok(Returned {
+        point,
+        time,
+        derivative,
+        same,
+        opposite,
+        extent,
+        passes,
+        derivative_error: 0.0,
+        events: 0,
+    })
 }
 
 fn returned<const N: usize, const M: usize, T: VectorField<M>>(
@@ -279,8 +297,9 @@ fn returned<const N: usize, const M: usize, T: VectorField<M>>(
 ) -> Result<Return<N>, Error> {
     let mut stepper = Dopri5::<M>::new(settings.tolerance);
     // x, then the columns of the identity.
-    let mut state =
-        SVector::<f64, M>::from_fn(|i, _| if i < N { u[i] } else { f64::from(u8::from((i - N) / N == (i - N) % N)) });
+    let mut state = SVector::<f64, M>::from_fn(|i, _| {
+        if i < N { u[i] } else { f64::from(u8::from((i - N) / N == (i - N) % N)) }
+    });
     let mut t = 0.0;
     let (mut same, mut opposite) = (Vec::new(), Vec::new());
     let mut passages = CrossingFinder::default();
@@ -291,7 +310,8 @@ fn returned<const N: usize, const M: usize, T: VectorField<M>>(
         let step = stepper.step(tangent)?;
         let (t0, state0) = (step.t0, step.x0);
         let found = passages.through_plane(&step, plane.axis, plane.value);
-        let found: Vec<_> = found.iter().map(|p| (step.time(p.theta), step.at(p.theta), p.upward)).collect();
+        let found: Vec<_> =
+            found.iter().map(|p| (step.time(p.theta), step.at(p.theta), p.upward)).collect();
         (t, state) = (step.t1, step.x1);
         found.iter().for_each(|(_, x, _)| extent.add(|i| x[i]));
         if found.is_empty() {
@@ -323,7 +343,10 @@ fn returned<const N: usize, const M: usize, T: VectorField<M>>(
             // What is left is of the size of the dense output's error: first order in it suffices.
             let landing = landing + f * dt;
             let f = tangent.eval(&landing);
-            let point = SVector::<f64, N>::from_fn(|i, _| if i == plane.axis { plane.value } else { landing[i] });
+            let point =
+                SVector::<f64, N>::from_fn(
+                    |i, _| if i == plane.axis { plane.value } else { landing[i] },
+                );
             // Tangent vectors projected along the flow into the plane.
             let derivative = SMatrix::from_fn(|i, j| {
                 if i == plane.axis || j == plane.axis {
@@ -340,8 +363,9 @@ fn returned<const N: usize, const M: usize, T: VectorField<M>>(
     Err(Error::NoReturn { from: Failure::state(&u), within: settings.longest_return })
 }
 
-/// Eigenvalues of the derivative of a return map without row and column `axis`, by falling modulus: Floquet multipliers. In a section of at
-/// most three dimensions they are zeros of the characteristic polynomial: the large ones, which decide stability, are accurate; a strongly
+/// Eigenvalues of the derivative of a return map without row and column `axis`, by falling modulus:
+/// Floquet multipliers. In a section of at most three dimensions they are zeros of the
+/// characteristic polynomial: the large ones, which decide stability, are accurate; a strongly
 /// contracted one is lost below rounding of the largest. In more dimensions by [`eigenvalues`].
 fn multipliers<const N: usize>(m: &SMatrix<f64, N, N>, axis: usize) -> Vec<[f64; 2]> {
     let rows: Vec<f64> = (0..N * N).map(|k| m[(k / N, k % N)]).collect();
@@ -410,8 +434,14 @@ mod tests {
     fn hopf_normal_form_is_exact() {
         let plane = ReturnPlane { axis: 1, value: 0.0, upward: true };
         for a in [0.05, 0.5, -0.03] {
-            let o = closed_orbit::<2, 6, _>(&Hopf(a), plane, 1, SVector::from([1.2, 0.0]), &FloquetOptions::default())
-                .unwrap();
+            let o = closed_orbit::<2, 6, _>(
+                &Hopf(a),
+                plane,
+                1,
+                SVector::from([1.2, 0.0]),
+                &FloquetOptions::default(),
+            )
+            .unwrap();
             assert!((o.period - std::f64::consts::TAU).abs() < 1e-9, "{o:?}");
             assert!((o.rate - 2.0 * a).abs() < 1e-8, "{o:?}");
             assert!((o.points[0][0] - 1.0).abs() < 1e-8 && (o.opposite[0][0] + 1.0).abs() < 1e-8);
@@ -421,8 +451,13 @@ mod tests {
     #[test]
     fn no_returns_are_refused() {
         let plane = ReturnPlane { axis: 1, value: 0.0, upward: true };
-        let found =
-            closed_orbit::<2, 6, _>(&Hopf(0.5), plane, 0, SVector::from([1.2, 0.0]), &FloquetOptions::default());
+        let found = closed_orbit::<2, 6, _>(
+            &Hopf(0.5),
+            plane,
+            0,
+            SVector::from([1.2, 0.0]),
+            &FloquetOptions::default(),
+        );
         assert_eq!(found, Err(Error::NoReturns));
     }
 
@@ -440,7 +475,8 @@ mod tests {
         assert!(e[2][0] == e[1][0] && e[2][1] == -e[1][1], "a pair: {e:?}");
     }
 
-    /// s' = 1, y' = q'(s) with q(s) = s (s^2 - 1)(s^2 - 4): so y - q(s) stays what it is, and a return of a plane of y is a root of a polynomial.
+    /// s' = 1, y' = q'(s) with q(s) = s (s^2 - 1)(s^2 - 4): so y - q(s) stays what it is, and a
+    /// return of a plane of y is a root of a polynomial.
     struct Quintic;
     impl VectorField<2> for Quintic {
         fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
@@ -451,22 +487,40 @@ mod tests {
 
     #[test]
     fn returns_of_a_polynomial_are_its_roots() {
-        // The method is exact for it and its dense output is not: the crossing is landed on, and what is left is mended.
-        let settings = FloquetOptions { tolerance: Tolerance { rtol: 1e-5, atol: 1e-5 }, ..FloquetOptions::default() };
+        // The method is exact for it and its dense output is not: the crossing is landed on, and
+        // what is left is mended.
+        let settings = FloquetOptions {
+            tolerance: Tolerance { rtol: 1e-5, atol: 1e-5 },
+            ..FloquetOptions::default()
+        };
         for value in [0.0, 0.7, -3.0] {
             let plane = ReturnPlane { axis: 1, value, upward: true };
             let of = |returns| {
                 let start = SVector::from([-2.0, value]);
-                return_map::<2, 6, _>(&Tangent::<Quintic, 2>(&Quintic), plane, returns, &start, &settings).unwrap()
+                return_map::<2, 6, _>(
+                    &Tangent::<Quintic, 2>(&Quintic),
+                    plane,
+                    returns,
+                    &start,
+                    &settings,
+                )
+                .unwrap()
             };
-            // Upwards at -2, 0, 2 with the slopes 24, 4, 24; the derivative is the slope at the start over that at the end.
+            // Upwards at -2, 0, 2 with the slopes 24, 4, 24; the derivative is the slope at the
+            // start over that at the end.
             for (returns, s, derivative) in [(1, 0.0, 6.0), (2, 2.0, 1.0)] {
                 let r = of(returns);
                 assert!((r.point[0] - s).abs() < 1e-9 && r.point[1] == value, "{r:?}");
                 assert!((r.time - (s + 2.0)).abs() < 1e-9, "{r:?}");
-                assert!((r.derivative[0] - derivative).abs() < 1e-6 && r.derivative[1..] == [0.0; 3], "{r:?}");
+                assert!(
+                    (r.derivative[0] - derivative).abs() < 1e-6 && r.derivative[1..] == [0.0; 3],
+                    "{r:?}"
+                );
                 assert_eq!((r.same.len(), r.opposite.len()), (returns, returns));
-                assert!(r.opposite.iter().zip([-1.0, 1.0]).all(|(x, s)| (x[0] - s).abs() < 1e-3), "{r:?}");
+                assert!(
+                    r.opposite.iter().zip([-1.0, 1.0]).all(|(x, s)| (x[0] - s).abs() < 1e-3),
+                    "{r:?}"
+                );
             }
         }
     }
@@ -479,14 +533,27 @@ mod tests {
             let plane = ReturnPlane { axis: 0, value: 0.5, upward };
             for returns in [1, 2] {
                 let guess = SVector::from([0.3, 1.1 * z]);
-                let o = closed_orbit::<2, 6, _>(&Hopf(0.05), plane, returns, guess, &settings).unwrap();
+                let o =
+                    closed_orbit::<2, 6, _>(&Hopf(0.05), plane, returns, guess, &settings).unwrap();
                 let turns = [0.0, 1.0, 2.0][returns];
                 assert!((o.period - turns * std::f64::consts::TAU).abs() < 1e-8, "{o:?}");
-                assert!((ln(o.multipliers[0][0]) + turns * 0.2 * std::f64::consts::PI).abs() < 1e-7, "{o:?}");
+                assert!(
+                    (ln(o.multipliers[0][0]) + turns * 0.2 * std::f64::consts::PI).abs() < 1e-7,
+                    "{o:?}"
+                );
                 assert!((o.rate - 0.1).abs() < 1e-8, "{o:?}");
-                assert_eq!((o.points.len(), o.opposite.len(), o.multipliers.len()), (returns, returns, 1));
-                assert!(o.points.iter().all(|p| (p[0] - 0.5).abs() < 1e-7 && (p[1] - z).abs() < 1e-7), "{o:?}");
-                assert!(o.opposite.iter().all(|p| (p[0] - 0.5).abs() < 1e-7 && (p[1] + z).abs() < 1e-7), "{o:?}");
+                assert_eq!(
+                    (o.points.len(), o.opposite.len(), o.multipliers.len()),
+                    (returns, returns, 1)
+                );
+                assert!(
+                    o.points.iter().all(|p| (p[0] - 0.5).abs() < 1e-7 && (p[1] - z).abs() < 1e-7),
+                    "{o:?}"
+                );
+                assert!(
+                    o.opposite.iter().all(|p| (p[0] - 0.5).abs() < 1e-7 && (p[1] + z).abs() < 1e-7),
+                    "{o:?}"
+                );
             }
         }
     }
@@ -494,10 +561,13 @@ mod tests {
     #[test]
     fn what_does_not_return_or_converge_is_told() {
         let plane = ReturnPlane { axis: 1, value: 0.0, upward: true };
-        let of = |settings| closed_orbit::<2, 6, _>(&Hopf(0.05), plane, 1, SVector::from([1.2, 0.0]), &settings);
+        let of = |settings| {
+            closed_orbit::<2, 6, _>(&Hopf(0.05), plane, 1, SVector::from([1.2, 0.0]), &settings)
+        };
         let short = of(FloquetOptions { longest_return: 6.0, ..FloquetOptions::default() });
         assert_eq!(short, Err(Error::NoReturn { from: vec![1.2, 0.0], within: 6.0 }));
-        // After one iteration it still misses itself, by what Newton's method makes of a start 0.2 off.
+        // After one iteration it still misses itself, by what Newton's method makes of a start 0.2
+        // off.
         let Err(Error::NotConverged { residual, iterations: 1 }) =
             of(FloquetOptions { iterations: 1, ..FloquetOptions::default() })
         else {
@@ -513,8 +583,9 @@ mod tests {
     fn multipliers_come_by_falling_modulus() {
         let of = |rows: &[f64], n, axis| multipliers_of(rows, n, axis);
         let close = |got: &[[f64; 2]], want: &[[f64; 2]]| {
-            let near =
-                |(g, w): (&[f64; 2], &[f64; 2])| (g[0] - w[0]).abs() < 1e-10 && (g[1].abs() - w[1]).abs() < 1e-10;
+            let near = |(g, w): (&[f64; 2], &[f64; 2])| {
+                (g[0] - w[0]).abs() < 1e-10 && (g[1].abs() - w[1]).abs() < 1e-10
+            };
             assert!(got.len() == want.len() && got.iter().zip(want).all(near), "{got:?} {want:?}");
         };
         assert!(of(&[0.0], 1, 0).is_empty());
@@ -529,32 +600,54 @@ mod tests {
         close(&two(2.0, 1.0), &[[1.0, 0.0], [1.0, 0.0]]);
         // The small one keeps its digits beside a large one.
         assert!((two(1e9 + 1e-9, 1.0)[1][0] * 1e9 - 1.0).abs() < 1e-12);
-        // (l - 0.5)(l^2 - 0.2 l + 0.82): the pair has the larger modulus. Not a companion: similar to one, with full rows.
+        // (l - 0.5)(l^2 - 0.2 l + 0.82): the pair has the larger modulus. Not a companion: similar
+        // to one, with full rows.
         let three = |rows: [[f64; 3]; 3]| {
             let shear = [[1.0, 2.0, -1.0], [1.0, 3.0, 2.0], [0.0, 1.0, 4.0]];
             let back = [[10.0, -9.0, 7.0], [-4.0, 4.0, -3.0], [1.0, -1.0, 1.0]];
             let times = |a: [[f64; 3]; 3], b: [[f64; 3]; 3]| -> [[f64; 3]; 3] {
-                std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
+                std::array::from_fn(|i| {
+                    std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum())
+                })
             };
             let m = times(times(shear, rows), back);
-            let full: Vec<f64> =
-                (0..16).map(|k| if k / 4 == 3 || k % 4 == 3 { 0.0 } else { m[k / 4][k % 4] }).collect();
+            let full: Vec<f64> = (0..16)
+                .map(|k| if k / 4 == 3 || k % 4 == 3 { 0.0 } else { m[k / 4][k % 4] })
+                .collect();
             of(&full, 4, 3)
         };
-        close(&three([[0.7, -0.92, 0.41], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), &[[0.1, 0.9], [0.1, 0.9], [0.5, 0.0]]);
+        close(
+            &three([[0.7, -0.92, 0.41], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
+            &[[0.1, 0.9], [0.1, 0.9], [0.5, 0.0]],
+        );
         // The tribonacci constant is larger than any coefficient of its polynomial.
         let pair = [-0.419_643_377_607_080_6, 0.606_290_729_207_199_4];
         let tribonacci = three([[1.0, 1.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
         close(&tribonacci, &[[1.839_286_755_214_161, 0.0], pair, pair]);
         // Four of five states: (l - 0.5)(l + 0.3) and a pair, the first of which feeds the others.
-        let pair_first = [[0.2, -0.82, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [5.0, 0.0, 0.2, 0.15], [0.0, 7.0, 1.0, 0.0]];
-        let pair_last = [[0.2, 0.15, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [5.0, 0.0, 0.2, -0.82], [0.0, 7.0, 1.0, 0.0]];
+        let pair_first = [
+            [0.2, -0.82, 0.0, 0.0],
+            [1.0, 0.0, 0.0, 0.0],
+            [5.0, 0.0, 0.2, 0.15],
+            [0.0, 7.0, 1.0, 0.0],
+        ];
+        let pair_last = [
+            [0.2, 0.15, 0.0, 0.0],
+            [1.0, 0.0, 0.0, 0.0],
+            [5.0, 0.0, 0.2, -0.82],
+            [0.0, 7.0, 1.0, 0.0],
+        ];
         for four in [pair_first, pair_last] {
-            let entry = |k: usize| if k / 5 == 0 || k.is_multiple_of(5) { 9.0 } else { four[k / 5 - 1][k % 5 - 1] };
+            let entry = |k: usize| {
+                if k / 5 == 0 || k.is_multiple_of(5) { 9.0 } else { four[k / 5 - 1][k % 5 - 1] }
+            };
             let full: Vec<f64> = (0..25).map(entry).collect();
             close(&of(&full, 5, 0), &[[0.1, 0.9], [0.1, 0.9], [0.5, 0.0], [-0.3, 0.0]]);
         }
-        close(&three([[0.2, 0.0, 0.0], [0.0, -0.9, 0.0], [0.0, 0.0, 0.5]]), &[[-0.9, 0.0], [0.5, 0.0], [0.2, 0.0]]);
+        close(
+            &three([[0.2, 0.0, 0.0], [0.0, -0.9, 0.0], [0.0, 0.0, 0.5]]),
+            &[[-0.9, 0.0], [0.5, 0.0], [0.2, 0.0]],
+        );
     }
 
     #[test]
@@ -571,7 +664,8 @@ mod tests {
         }
         let plane = ReturnPlane { axis: 1, value: 0.0, upward: true };
         let guess = SVector::from([1.1, 0.0, 0.05]);
-        let o = closed_orbit::<3, 12, _>(&Ring, plane, 1, guess, &FloquetOptions::default()).unwrap();
+        let o =
+            closed_orbit::<3, 12, _>(&Ring, plane, 1, guess, &FloquetOptions::default()).unwrap();
         assert!((o.rate - 0.02).abs() < 1e-8 && o.multipliers[0][1] != 0.0, "{o:?}");
     }
 }

@@ -13,8 +13,8 @@ use twofold_integrate::delay::{
 use twofold_integrate::{Failure, Method, Monitor};
 use twofold_system::{PiecewiseSmooth, System};
 
-/// The largest exponent of the orbit of `x0` under `switch`, `M` being 2 `N`; `data` describes the system. Without kicks, or with those of the
-/// settings, to all states.
+/// The largest exponent of the orbit of `x0` under `switch`, `M` being 2 `N`; `data` describes the
+/// system. Without kicks, or with those of the settings, to all states.
 ///
 /// # Errors
 /// If the orbit cannot be followed.
@@ -32,7 +32,10 @@ where
     const { assert!(M == 2 * N) };
     let varied = Varied(system);
     let delayed = Delayed { sides: Sides::varied(&varied, data), switch, x0: begin(&x0) };
-    let refused = |error: DelayError| Failure::NotApplicable { method: Method::Dopri5.name(), why: error.to_string() };
+    let refused = |error: DelayError| Failure::NotApplicable {
+        method: Method::Dopri5.name(),
+        why: error.to_string(),
+    };
     delayed.with_tangent(settings.tolerance, Waiting { settings, monitor }).map_err(refused)?
 }
 
@@ -109,8 +112,9 @@ mod tests {
         LyapunovOptions { tolerance, transient: 30.0, duration, ..LyapunovOptions::default() }
     }
 
-    /// x' = -c x(t - 1), as a switch that is linear in x for |x| < 9: the exponent is the real part of Lambert's W(-c), below zero for c < pi/2. Blocks are of
-    /// whole turns of the pair, in which what turns has no part.
+    /// x' = -c x(t - 1), as a switch that is linear in x for |x| < 9: the exponent is the real part
+    /// of Lambert's W(-c), below zero for c < pi/2. Blocks are of whole turns of the pair, in which
+    /// what turns has no part.
     #[test]
     fn a_linear_delay_equation_has_lamberts_exponent() {
         let smooth = Some((Transition::Algebraic, 1.0));
@@ -120,18 +124,23 @@ mod tests {
             (1.2, -0.190_462_989_057_677, 1.439_223_535_205_85),
             (2.0, 0.172_816_002_84, 1.673_686_413_740_84),
         ] {
-            let text = format!("states = ['x']\nh = 'x/sqrt(81 - x*x)'\nplus = ['-9*{c}']\nminus = ['9*{c}']");
-            let found = estimate::<1, 2>(&text, switch, [0.0], &settings(64.0 * PI / imaginary)).unwrap();
+            let text = format!(
+                "states = ['x']\nh = 'x/sqrt(81 - x*x)'\nplus = ['-9*{c}']\nminus = ['9*{c}']"
+            );
+            let found =
+                estimate::<1, 2>(&text, switch, [0.0], &settings(64.0 * PI / imaginary)).unwrap();
             let value = found.exponent.value;
             assert!((value - real).abs() < 1e-6, "{c}: {value} {real}");
             assert!((value - real).abs() < found.half_width, "{c}: {found:?}");
         }
     }
 
-    const RELAY: &str = "states = ['x', 'y']\nh = 'x'\nplus = ['-1', '0.3*y']\nminus = ['1', '0.1*y']";
+    const RELAY: &str =
+        "states = ['x', 'y']\nh = 'x'\nplus = ['-1', '0.3*y']\nminus = ['1', '0.1*y']";
 
-    /// A relay with delay, x' = -sign(x(t - 1)), swings with period 4 from any history: what is disturbed is its phase, whose exponent is 0; all else is
-    /// forgotten at once. Beside it y grows by 0.3 in one half of the time and by 0.1 in the other. The same with a memory.
+    /// A relay with delay, x' = -sign(x(t - 1)), swings with period 4 from any history: what is
+    /// disturbed is its phase, whose exponent is 0; all else is forgotten at once. Beside it y
+    /// grows by 0.3 in one half of the time and by 0.1 in the other. The same with a memory.
     #[test]
     fn a_relays_phase_neither_grows_nor_falls() {
         let late = LateSwitch::Delayed { delay: 1.0, smooth: None, history: History::Constant };
@@ -139,13 +148,17 @@ mod tests {
         for switch in [late, relay] {
             let alone = "states = ['x']\nh = 'x'\nplus = ['-1']\nminus = ['1']";
             let found = estimate::<1, 2>(alone, switch, [0.3], &settings(256.0)).unwrap();
-            assert!(found.exponent.value.abs() < 1e-9 && found.half_width < 1e-3, "{switch:?} {found:?}");
+            assert!(
+                found.exponent.value.abs() < 1e-9 && found.half_width < 1e-3,
+                "{switch:?} {found:?}"
+            );
             let found = estimate::<2, 4>(RELAY, switch, [0.3, 0.0], &settings(256.0)).unwrap();
             assert!((found.exponent.value - 0.2).abs() < 1e-6, "{switch:?} {found:?}");
         }
     }
 
-    /// Kicks move the orbit and leave the disturbance alone: of a linear equation they change no exponent, and they do change the share of time on each side.
+    /// Kicks move the orbit and leave the disturbance alone: of a linear equation they change no
+    /// exponent, and they do change the share of time on each side.
     #[test]
     fn kicks_move_the_orbit_alone() {
         let kick = Kick { every: 3.0, size: 0.5, law: KickLaw::Sphere, seed: 3, stream: 0 };
@@ -156,8 +169,8 @@ mod tests {
         let found = estimate::<1, 2>(text, switch, [0.0], &options).unwrap();
         assert!((found.exponent.value + 0.318_131_5).abs() < 3e-3, "{found:?}");
         let relay = LateSwitch::Relay { band: 1.0, inside: Inside::Sign };
-        let apart =
-            [options, settings(256.0)].map(|o| estimate::<2, 4>(RELAY, relay, [0.3, 0.0], &o).unwrap().exponent.value);
+        let apart = [options, settings(256.0)]
+            .map(|o| estimate::<2, 4>(RELAY, relay, [0.3, 0.0], &o).unwrap().exponent.value);
         assert!((apart[0] - apart[1]).abs() > 1e-4 && (apart[0] - 0.2).abs() < 0.05, "{apart:?}");
     }
 

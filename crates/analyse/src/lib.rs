@@ -22,14 +22,16 @@
 //! // Its passages through x = 0: downwards at pi/2, upwards at 3 pi/2.
 //! let mut section = SectionRecorder::<2>::new(0, 0.0);
 //! let mut method = Dopri5::new(Tolerance { rtol: 1e-9, atol: 1e-9 });
-//! let _ = drive(&Oscillator, vector![1.0, 0.0], &DriveOptions::to(6.0), &mut method, &mut section, &())?;
+//! let to = DriveOptions::to(6.0);
+//! let _ = drive(&Oscillator, vector![1.0, 0.0], &to, &mut method, &mut section, &())?;
 //! let [down, up] = section.crossings() else { panic!("two passages") };
 //! assert_eq!((down.direction, up.direction), (Direction::Down, Direction::Up));
 //! assert!((up.t - 4.712_388_98).abs() < 1e-7);
 //! # Ok::<(), twofold_integrate::Failure>(())
 //! ```
 #![forbid(unsafe_code)]
-#![cfg_attr(test, allow(clippy::disallowed_methods))] // tests compare with tolerances, not with hashes
+// tests compare with tolerances, not with hashes
+#![cfg_attr(test, allow(clippy::disallowed_methods))]
 
 pub mod attractor;
 pub mod branch;

@@ -1,18 +1,20 @@
 //! The limit eps -> 0: convergence of a smoothed system to the Filippov motion.
 //!
-//! Before the first visit to a two-fold the motion is unique and smoothing is a perturbation: a transversal crossing
-//! shifts the orbit by the time spent in the layer, O(eps); in attracting sliding the smoothed orbit follows a slow
-//! manifold at the distance O(eps) of the surface with a slow flow O(eps) from the sliding flow (Fenichel 1979; Teixeira
-//! & da Silva 2012). So the expected rate is 1 ([`convergence`]). After the visit the motion is a set and a smoothed orbit
-//! tends to no single Filippov orbit, but it must come near some member of the [`funnel`] ([`after_visit`]).
+//! Before the first visit to a two-fold the motion is unique and smoothing is a perturbation: a
+//! transversal crossing shifts the orbit by the time spent in the layer, O(eps); in attracting
+//! sliding the smoothed orbit follows a slow manifold at the distance O(eps) of the surface with a
+//! slow flow O(eps) from the sliding flow (Fenichel 1979; Teixeira & da Silva 2012). So the
+//! expected rate is 1 ([`convergence`]). After the visit the motion is a set and a smoothed orbit
+//! tends to no single Filippov orbit, but it must come near some member of the [`funnel`]
+//! ([`after_visit`]).
 
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
 use twofold_integrate::dopri5::Dopri5;
 use twofold_integrate::filippov::{
-    EventKind, ExitRule, FilippovError, FilippovObserver, FilippovOptions, Funnel, FunnelGrid, FunnelMember, Mode,
-    Side, SlidingFlow, funnel, run,
+    EventKind, ExitRule, FilippovError, FilippovObserver, FilippovOptions, Funnel, FunnelGrid,
+    FunnelMember, Mode, Side, SlidingFlow, funnel, run,
 };
 use twofold_integrate::{Failure, Flow, Statistics, Step, Stepper};
 use twofold_num::elementary::{ln, pow};
@@ -29,7 +31,8 @@ fn smooth<P: Clone>(system: &P, eps: f64) -> Smoothed<P> {
 pub struct ConvergenceQuestion {
     /// The start, at t = 0.
     pub start: Vec<f64>,
-    /// When the orbits are compared; increasing, all before the first visit to a two-fold or other set-valued point.
+    /// When the orbits are compared; increasing, all before the first visit to a two-fold or other
+    /// set-valued point.
     pub times: Vec<f64>,
     /// The smoothing parameters (tanh).
     pub eps: Vec<f64>,
@@ -86,14 +89,17 @@ fn layer_cap(eps: f64) -> f64 {
 
 /// The start of a question as a state.
 fn state<const N: usize>(start: &[f64]) -> Result<SVector<f64, N>, FilippovError> {
-    let wrong = || FilippovError::Invalid(format!("the start has {} components, the system {N}", start.len()));
+    let wrong = || {
+        FilippovError::Invalid(format!("the start has {} components, the system {N}", start.len()))
+    };
     <[f64; N]>::try_from(start).map(SVector::from).map_err(|_| wrong())
 }
 
 /// Compares the smoothed orbit of each eps with the Filippov orbit.
 ///
 /// # Errors
-/// [`FilippovError::NoSuchExit`] if the Filippov orbit is no longer unique at the last time; failures of the methods.
+/// [`FilippovError::NoSuchExit`] if the Filippov orbit is no longer unique at the last time;
+/// failures of the methods.
 pub fn convergence<P, const N: usize, const M: usize>(
     system: &P,
     question: &ConvergenceQuestion,
@@ -104,8 +110,10 @@ where
 {
     let ConvergenceQuestion { start, times, eps, settings } = question;
     let x0 = state::<N>(start)?;
-    let mut answer =
-        Convergence { rows: Vec::with_capacity(eps.len() * times.len()), statistics: Statistics::default() };
+    let mut answer = Convergence {
+        rows: Vec::with_capacity(eps.len() * times.len()),
+        statistics: Statistics::default(),
+    };
     let Some(&last) = times.last() else { return Ok(answer) };
     let mut exact = AtTimes { times, states: Vec::new() };
     let end = run(system, x0, last, settings, ExitRule::All, &mut exact)?.within_budget()?;
@@ -134,8 +142,8 @@ where
     Ok(answer)
 }
 
-/// The power of eps with which distances fall, points being (eps, distance): the least-squares slope of ln distance against
-/// ln eps; not a number for fewer than two different eps.
+/// The power of eps with which distances fall, points being (eps, distance): the least-squares
+/// slope of ln distance against ln eps; not a number for fewer than two different eps.
 pub fn observed_rate(points: impl IntoIterator<Item = [f64; 2]>) -> f64 {
     let logs: Vec<_> = points.into_iter().map(|[eps, distance]| (ln(eps), ln(distance))).collect();
     line(&logs).map_or(f64::NAN, |l| l.slope)
@@ -151,13 +159,13 @@ pub struct AfterVisitQuestion {
     pub t_end: f64,
     /// The smoothing parameters (tanh).
     pub eps: Vec<f64>,
-    /// Orbits are compared where they first cross h = 0 upwards, farther than this from the singularity; within the grid's horizon
-    /// after the visit.
+    /// Orbits are compared where they first cross h = 0 upwards, farther than this from the
+    /// singularity; within the grid's horizon after the visit.
     pub beyond: f64,
     /// The members that are computed first.
     pub grid: FunnelGrid,
-    /// Around the nearest of them ever finer grids are laid, so many in turn, each over the two neighbouring exit times
-    /// of the one before.
+    /// Around the nearest of them ever finer grids are laid, so many in turn, each over the two
+    /// neighbouring exit times of the one before.
     pub refinements: usize,
     /// Exit times of a refinement, at least 3.
     pub finer: usize,
@@ -177,7 +185,8 @@ pub struct MemberCrossing {
     pub crossing: Vec<f64>,
 }
 
-/// Where a smoothed orbit goes after its first visit, and the member of the funnel that goes nearest.
+/// Where a smoothed orbit goes after its first visit, and the member of the funnel that goes
+/// nearest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AfterVisitRow {
@@ -199,11 +208,13 @@ pub struct AfterVisit {
     pub t_visit: f64,
     /// Where.
     pub point: Vec<f64>,
-    /// The crossings of the first grid's members, by exit time, plus before minus; members that make none are left out.
+    /// The crossings of the first grid's members, by exit time, plus before minus; members that
+    /// make none are left out.
     pub members: Vec<MemberCrossing>,
     /// Largest distance between two of them: the width of the funnel there.
     pub width: f64,
-    /// By eps, in the order asked for; those whose orbit makes no such crossing in time are left out.
+    /// By eps, in the order asked for; those whose orbit makes no such crossing in time are left
+    /// out.
     pub rows: Vec<AfterVisitRow>,
     /// Work of all orbits together.
     pub statistics: Statistics,
@@ -236,7 +247,8 @@ impl<P, const N: usize> Futures<'_, P, N> {
     /// The first upward crossing, beyond the given distance, of each member that has one.
     fn crossings(&self, members: &[FunnelMember<N>]) -> Vec<Candidate<N>> {
         let up = EventKind::Crossing { to: Side::Plus };
-        let far = |state: &SVector<f64, N>| (state - self.family.point).norm() > self.question.beyond;
+        let far =
+            |state: &SVector<f64, N>| (state - self.family.point).norm() > self.question.beyond;
         let found = members.iter().filter_map(|m| {
             let event = m.trajectory.events.iter().find(|e| e.kind == up && far(&e.state))?;
             Some(Candidate { exit_time: m.exit_time, side: m.side, state: event.state })
@@ -244,8 +256,8 @@ impl<P, const N: usize> Futures<'_, P, N> {
         found.collect()
     }
 
-    /// The member that crosses nearest to `x`: the nearest of the first grid, then of finer and finer grids around it, on
-    /// its side. `None` if no member of the first grid crosses.
+    /// The member that crosses nearest to `x`: the nearest of the first grid, then of finer and
+    /// finer grids around it, on its side. `None` if no member of the first grid crosses.
     fn nearest<const M: usize>(
         &mut self,
         first: &[Candidate<N>],
@@ -265,7 +277,8 @@ impl<P, const N: usize> Futures<'_, P, N> {
         for _ in 0..*refinements {
             let (shortest, longest) = (near.0.exit_time / ratio, near.0.exit_time * ratio);
             let around = FunnelGrid { shortest, longest, times: *finer, ..*grid };
-            let members = self.family.members_on(self.system, settings, &around, Some(near.0.side))?;
+            let members =
+                self.family.members_on(self.system, settings, &around, Some(near.0.side))?;
             members.iter().for_each(|m| self.statistics += &m.summary.statistics);
             if let Some(finer) = best(&self.crossings(&members))
                 && finer.1 < near.1
@@ -312,7 +325,12 @@ where
         let Some(crossing) = crossing(eps)? else { continue };
         let crossing = state::<N>(&crossing)?;
         let Some((member, distance)) = futures.nearest(&first, &crossing)? else { continue };
-        rows.push(AfterVisitRow { eps, crossing: Failure::state(&crossing), nearest: member.record(), distance });
+        rows.push(AfterVisitRow {
+            eps,
+            crossing: Failure::state(&crossing),
+            nearest: member.record(),
+            distance,
+        });
     }
     Ok(AfterVisit {
         t_visit: visit.0,
@@ -337,11 +355,15 @@ mod tests {
 
     #[test]
     fn the_rate_of_a_power_is_its_exponent() {
-        let rate = |power: f64| observed_rate([1e-1, 1e-2, 1e-4].map(|eps| [eps, 3.0 * pow(eps, power)]));
+        let rate =
+            |power: f64| observed_rate([1e-1, 1e-2, 1e-4].map(|eps| [eps, 3.0 * pow(eps, power)]));
         for power in [1.0, 2.0, -0.5] {
             assert!((rate(power) - power).abs() < 1e-12, "{power}: {}", rate(power));
         }
-        assert!(observed_rate([[0.1, 1.0]]).is_nan() && observed_rate([[0.1, 1.0], [0.1, 2.0]]).is_nan());
+        assert!(
+            observed_rate([[0.1, 1.0]]).is_nan()
+                && observed_rate([[0.1, 1.0], [0.1, 2.0]]).is_nan()
+        );
     }
 
     /// A caricature whose two-fold is elsewhere.
@@ -366,10 +388,17 @@ mod tests {
 
     #[test]
     fn the_search_finds_a_member_that_is_known() {
-        // Four exit times, each a quarter longer than the one before. Over a wider range members would come by the same places again: the funnel of a
-        // two-fold is self-similar.
+        // Four exit times, each a quarter longer than the one before. Over a wider range members
+        // would come by the same places again: the funnel of a two-fold is self-similar.
         let longest = 1.2 * 1.25 * 1.25 * 1.25;
-        let grid = FunnelGrid { shortest: 1.2, longest, times: 4, horizon: 12.0, until_two_fold: true, per_step: 1 };
+        let grid = FunnelGrid {
+            shortest: 1.2,
+            longest,
+            times: 4,
+            horizon: 12.0,
+            until_two_fold: true,
+            per_step: 1,
+        };
         let system = Moved(Caricature::with_reinjection(1e-1, 1e-5), [1.0, 2.0, -3.0]);
         let question = |beyond| AfterVisitQuestion {
             start: vec![1.2, 2.0, -4.0],
@@ -382,21 +411,30 @@ mod tests {
             settings: FilippovOptions::default(),
         };
         let (near, far) = (question(0.6), question(1.2));
-        let family = funnel(&system, state::<3>(&near.start).unwrap(), 80.0, &near.settings, &grid).unwrap();
+        let family =
+            funnel(&system, state::<3>(&near.start).unwrap(), 80.0, &near.settings, &grid).unwrap();
         assert!((family.point - SVector::from(system.1)).amax() < 1e-9, "{}", family.point);
-        let mut futures = Futures { system: &system, question: &near, family, statistics: Statistics::default() };
+        let mut futures =
+            Futures { system: &system, question: &near, family, statistics: Statistics::default() };
         let all = futures.crossings(&futures.family.members);
         let first: Vec<_> = all.iter().filter(|c| c.side == Side::Minus).copied().collect();
         assert_eq!((all.len(), first.len()), (8, 4));
-        // Three refinements, each of a half of the interval's logarithm, leave an eighth between neighbours.
+        // Three refinements, each of a half of the interval's logarithm, leave an eighth between
+        // neighbours.
         for place in [0.59, 1.41, 1.59, 2.41] {
             let time = 1.2 * pow(1.25, place);
             let only = FunnelGrid { shortest: time, longest: time, times: 1, ..grid };
-            let there = futures.family.members_on(&system, &near.settings, &only, Some(Side::Minus)).unwrap();
+            let there = futures
+                .family
+                .members_on(&system, &near.settings, &only, Some(Side::Minus))
+                .unwrap();
             let there = futures.crossings(&there)[0].state;
             let (found, distance) = futures.nearest(&first, &there).unwrap().unwrap();
             let off = ln(found.exit_time / time).abs() / ln(1.25);
-            assert!(off < 0.045 && found.side == Side::Minus && distance < 0.02, "{place}: {off} {distance}");
+            assert!(
+                off < 0.045 && found.side == Side::Minus && distance < 0.02,
+                "{place}: {off} {distance}"
+            );
         }
         assert!(futures.nearest(&[], &all[0].state).unwrap().is_none());
         // Crossings are looked for at a distance from the two-fold, wherever that is.
@@ -406,14 +444,22 @@ mod tests {
         let farther = futures.crossings(&futures.family.members);
         assert!(!farther.is_empty() && farther.iter().all(|c| away(c) > 1.2));
 
-        // The whole answer: by eps, where there is a crossing; the width is the largest distance between two members' crossings.
+        // The whole answer: by eps, where there is a crossing; the width is the largest distance
+        // between two members' crossings.
         let question = AfterVisitQuestion { eps: vec![1e-2, 1e-3], refinements: 0, ..near.clone() };
         let there = Failure::state(&all[2].state);
-        let answer = after_visit(&system, &question, |eps| Ok((eps < 5e-3).then(|| there.clone()))).unwrap();
+        let answer =
+            after_visit(&system, &question, |eps| Ok((eps < 5e-3).then(|| there.clone()))).unwrap();
         let [row] = &answer.rows[..] else { panic!("{:?}", answer.rows) };
-        assert_eq!((row.eps, row.distance, &row.crossing, &row.nearest), (1e-3, 0.0, &there, &all[2].record()));
+        assert_eq!(
+            (row.eps, row.distance, &row.crossing, &row.nearest),
+            (1e-3, 0.0, &there, &all[2].record())
+        );
         assert_eq!(answer.members, all.iter().map(Candidate::record).collect::<Vec<_>>());
-        let width = all.iter().flat_map(|a| all.iter().map(|b| (a.state - b.state).norm())).fold(0.0, f64::max);
+        let width = all
+            .iter()
+            .flat_map(|a| all.iter().map(|b| (a.state - b.state).norm()))
+            .fold(0.0, f64::max);
         assert_eq!(answer.width, width);
     }
 }

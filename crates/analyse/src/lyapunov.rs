@@ -1,24 +1,29 @@
 //! The largest Lyapunov exponent, from the variational equation.
 //!
-//! A tangent vector is carried along the orbit by v' = Df(x) v and renormalised before it grows or shrinks out of range; the mean rate
-//! of its logarithm is the largest exponent (Benettin, Galgani, Giorgilli & Strelcyn 1980, Meccanica 15, 9-30). Orbit and
-//! vector are stepped together, so that the step resolves both: in the layer |h| < 20 eps of a smoothed system the vector is what
-//! limits the step.
+//! A tangent vector is carried along the orbit by v' = Df(x) v and renormalised before it grows or
+//! shrinks out of range; the mean rate of its logarithm is the largest exponent (Benettin, Galgani,
+//! Giorgilli & Strelcyn 1980, Meccanica 15, 9-30). Orbit and vector are stepped together, so that
+//! the step resolves both: in the layer |h| < 20 eps of a smoothed system the vector is what limits
+//! the step.
 //!
-//! Why not two close orbits (Benettin, Galgani & Strelcyn 1976)? One visit to a two-fold singularity smoothed with eps = 1e-3 amplifies a
-//! displacement by up to 10^10. An initial distance that stays small through that is below rounding; a larger one saturates, and the
+//! Why not two close orbits (Benettin, Galgani & Strelcyn 1976)? One visit to a two-fold
+//! singularity smoothed with eps = 1e-3 amplifies a displacement by up to 10^10. An initial
+//! distance that stays small through that is below rounding; a larger one saturates, and the
 //! exponent comes out too small. A tangent vector has no such ceiling.
 //!
-//! Kicks displace the orbit and leave the vector alone, which is the limit of two close orbits that receive the same kicks: the exponent
-//! of the random system given its noise.
+//! Kicks displace the orbit and leave the vector alone, which is the limit of two close orbits that
+//! receive the same kicks: the exponent of the random system given its noise.
 
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
 use super::tangent::Tangent;
-use twofold_integrate::ensemble::{Carried, Common, EnsembleRun, InstructionSet, Tolerances, ensemble_watched};
+use twofold_integrate::ensemble::{
+    Carried, Common, EnsembleRun, InstructionSet, Tolerances, ensemble_watched,
+};
 use twofold_integrate::{
-    Dopri5, DriveOptions, Failure, Flow, Kick, Kicker, Monitor, Observer, Step, StepCap, Stepper, Tolerance,
+    Dopri5, DriveOptions, Failure, Flow, Kick, Kicker, Monitor, Observer, Step, StepCap, Stepper,
+    Tolerance,
 };
 use twofold_num::elementary::{ln, sqrt};
 use twofold_num::fit::{line, mean};
@@ -29,8 +34,9 @@ use twofold_system::{BatchedField, VectorField};
 pub struct Exponent {
     /// Per unit time.
     pub value: f64,
-    /// Standard error of the mean over the run, from block averages; the largest over block lengths (Flyvbjerg & Petersen
-    /// 1989), because short blocks of a correlated series pretend to be independent.
+    /// Standard error of the mean over the run, from block averages; the largest over block lengths
+    /// (Flyvbjerg & Petersen 1989), because short blocks of a correlated series pretend to be
+    /// independent.
     pub standard_error: f64,
     /// Time averaged over.
     pub duration: f64,
@@ -41,8 +47,9 @@ pub struct Exponent {
 pub struct Estimate {
     /// The mean over the run, with its standard error alone.
     pub exponent: Exponent,
-    /// Half of the interval around the mean in which the exponent lies with 95 %: what scatters (`QUANTILE` standard errors), what growth
-    /// slower than any exponential adds to a mean over a finite time, and what the method's local errors can add.
+    /// Half of the interval around the mean in which the exponent lies with 95 %: what scatters
+    /// (`QUANTILE` standard errors), what growth slower than any exponential adds to a mean over a
+    /// finite time, and what the method's local errors can add.
     pub half_width: f64,
 }
 
@@ -107,17 +114,18 @@ impl Default for LyapunovOptions {
 const BLOCKS: usize = 64;
 /// Fewest blocks that still give an error of an error of a quarter.
 const FEWEST_BLOCKS: usize = 8;
-/// The vector is renormalised when its length leaves (1/RANGE, RANGE): far from under- and overflow and, below, from the absolute
-/// tolerance.
+/// The vector is renormalised when its length leaves (1/RANGE, RANGE): far from under- and overflow
+/// and, below, from the absolute tolerance.
 const RANGE: f64 = 100.0;
 
-/// The largest Lyapunov exponent of the orbit of `field` from `x0`, `M` being 2 `N`: `largest::<3, 6, _>(...)`.
+/// The largest Lyapunov exponent of the orbit of `field` from `x0`, `M` being 2 `N`: `largest::<3,
+/// 6, _>(...)`.
 ///
 /// ```
 /// use nalgebra::vector;
 /// use twofold_analyse::lyapunov::{LyapunovOptions, largest};
 /// use twofold_system::{Definition, Field, System, Transition};
-/// // The Lorenz system; its largest exponent is 0.9056. Both fields are the same, so h has no effect.
+/// // The Lorenz system; its largest exponent is 0.9056. Both fields are the same: h has no effect.
 /// let f = "['10*(y - x)', 'x*(28 - z) - y', 'x*y - 8/3*z']";
 /// let text = format!("states = ['x', 'y', 'z']\nh = 'x'\nplus = {f}\nminus = {f}");
 /// let lorenz = System::new(Definition::from_toml(&text, "lorenz.toml")?);
@@ -142,8 +150,8 @@ where
     largest_along(&Tangent::<F, 1>(field), x0, N.min(3), settings)
 }
 
-/// The same for an equation that comes with its variational equation for one vector: `tangent` is (x, v)' in `M` = 2 `N` dimensions.
-/// Kicks perturb the first `kicked_states` components.
+/// The same for an equation that comes with its variational equation for one vector: `tangent` is
+/// (x, v)' in `M` = 2 `N` dimensions. Kicks perturb the first `kicked_states` components.
 ///
 /// # Errors
 /// If the orbit cannot be followed.
@@ -170,8 +178,9 @@ pub fn largest_watched<const N: usize, const M: usize, T: VectorField<M>>(
     Ok(estimate_along(tangent, x0, kicked_states, settings, monitor)?.exponent)
 }
 
-/// [`largest_along`] with its interval, reporting to `monitor` how far it has come. Where `monitor` refuses, the mean is over the blocks that are finished: its
-/// duration says how long that was. There is no number if they are fewer than eight of the 64.
+/// [`largest_along`] with its interval, reporting to `monitor` how far it has come. Where `monitor`
+/// refuses, the mean is over the blocks that are finished: its duration says how long that was.
+/// There is no number if they are fewer than eight of the 64.
 ///
 /// # Errors
 /// If the orbit cannot be followed.
@@ -184,7 +193,12 @@ pub fn estimate_along<const N: usize, const M: usize, T: VectorField<M>>(
 ) -> Result<Estimate, Failure> {
     const { assert!(M == 2 * N) };
     let stepper = Dopri5::<M>::new(settings.tolerance);
-    averaged(&mut Alone { tangent, stepper, t: 0.0, state: begin(&x0) }, kicked_states, settings, monitor)
+    averaged(
+        &mut Alone { tangent, stepper, t: 0.0, state: begin(&x0) },
+        kicked_states,
+        settings,
+        monitor,
+    )
 }
 
 /// An orbit with a disturbance, `M` numbers.
@@ -296,8 +310,9 @@ pub(super) fn averaged<const M: usize>(
     Ok(estimate_of(&rates, settings, t, orbit.steps()))
 }
 
-/// [`largest_watched`] for many orbits side by side in the lanes of vector registers: of each the number that it has alone, bit for bit, in the
-/// order of `starts`; `tangents` has a run for each. There are no kicks. Nothing if `monitor` refuses.
+/// [`largest_watched`] for many orbits side by side in the lanes of vector registers: of each the
+/// number that it has alone, bit for bit, in the order of `starts`; `tangents` has a run for each.
+/// There are no kicks. Nothing if `monitor` refuses.
 ///
 /// # Panics
 /// If `settings` have kicks, or `tangents` are of fewer runs.
@@ -311,10 +326,17 @@ pub fn largest_side_by_side<const N: usize, const M: usize, E: BatchedField<M>>(
     const { assert!(M == 2 * N) };
     assert!(settings.kick.is_none(), "orbits without kicks");
     let LyapunovOptions { tolerance, max_step, transient, duration, max_steps, .. } = *settings;
-    let stops: Vec<f64> = (0..=BLOCKS).map(|block| block_end(settings, block)).skip_while(|end| *end <= 0.0).collect();
-    let options =
-        DriveOptions { step_cap: StepCap::Absolute(max_step), max_steps, ..DriveOptions::to(transient + duration) };
-    let runs: Vec<EnsembleRun<M>> = starts.iter().map(|x0| EnsembleRun { start: begin(x0), options }).collect();
+    let stops: Vec<f64> = (0..=BLOCKS)
+        .map(|block| block_end(settings, block))
+        .skip_while(|end| *end <= 0.0)
+        .collect();
+    let options = DriveOptions {
+        step_cap: StepCap::Absolute(max_step),
+        max_steps,
+        ..DriveOptions::to(transient + duration)
+    };
+    let runs: Vec<EnsembleRun<M>> =
+        starts.iter().map(|x0| EnsembleRun { start: begin(x0), options }).collect();
     let carried = Carried { first: N, range: [1.0 / RANGE, RANGE], stops: &stops };
     let tolerances = Tolerances::All(tolerance);
     let common = Common { tolerances, plane: None, corners: None, carried: Some(carried), monitor };
@@ -367,7 +389,8 @@ impl<const M: usize> Observer<M> for Growth<'_> {
     }
 }
 
-/// The state to begin with: a start with no preferred direction; almost every vector turns into the fastest one.
+/// The state to begin with: a start with no preferred direction; almost every vector turns into the
+/// fastest one.
 pub(super) fn begin<const N: usize, const M: usize>(x0: &SVector<f64, N>) -> SVector<f64, M> {
     SVector::from_fn(|i, _| if i < N { x0[i] } else { 1.0 / sqrt(N as f64) })
 }
@@ -381,17 +404,27 @@ fn block_end(settings: &LyapunovOptions, block: usize) -> f64 {
 fn mean_of(rates: &[f64], settings: &LyapunovOptions) -> Exponent {
     // Of fewer there is no error, and of a mean without error no use.
     let value = if rates.len() < FEWEST_BLOCKS { f64::NAN } else { mean(rates).0 };
-    let duration =
-        if rates.len() == BLOCKS { settings.duration } else { settings.duration * rates.len() as f64 / BLOCKS as f64 };
+    let duration = if rates.len() == BLOCKS {
+        settings.duration
+    } else {
+        settings.duration * rates.len() as f64 / BLOCKS as f64
+    };
     Exponent { value, standard_error: blocked_error(rates), duration }
 }
 
 /// The mean with its interval, `steps` having been made until `t`.
 ///
-/// Where vectors grow like a power of time, as at a shear or in regular motion, the mean falls like ln(t)/t and its scatter says nothing of it
-/// (Skokos 2010, Lect. Notes Phys. 790, 63-135, sec. 5): ln |v| = exponent t + power ln t is fitted to the blocks, and the interval reaches as
-/// far as the power matters. The method's local errors, at most its tolerance in each step, would make a vector grow or shrink by themselves.
-pub(super) fn estimate_of(rates: &[f64], settings: &LyapunovOptions, t: f64, steps: u64) -> Estimate {
+/// Where vectors grow like a power of time, as at a shear or in regular motion, the mean falls like
+/// ln(t)/t and its scatter says nothing of it (Skokos 2010, Lect. Notes Phys. 790, 63-135, sec. 5):
+/// ln |v| = exponent t + power ln t is fitted to the blocks, and the interval reaches as far as the
+/// power matters. The method's local errors, at most its tolerance in each step, would make a
+/// vector grow or shrink by themselves.
+pub(super) fn estimate_of(
+    rates: &[f64],
+    settings: &LyapunovOptions,
+    t: f64,
+    steps: u64,
+) -> Estimate {
     let exponent = mean_of(rates, settings);
     // The mean of 1/t over a block; the first one has none if it begins at 0.
     let points = rates.iter().enumerate().filter_map(|(k, rate)| {
@@ -411,7 +444,8 @@ fn length<const M: usize>(state: &SVector<f64, M>) -> f64 {
     sqrt(state.iter().skip(M / 2).map(|v| v * v).sum())
 }
 
-/// Standard error of the mean of a correlated series: the largest over repeated joining of neighbours.
+/// Standard error of the mean of a correlated series: the largest over repeated joining of
+/// neighbours.
 fn blocked_error(values: &[f64]) -> f64 {
     let mut values = values.to_vec();
     let mut largest = 0.0_f64;
@@ -437,7 +471,8 @@ mod tests {
 
     #[test]
     fn linear_system_has_its_eigenvalue() {
-        let settings = LyapunovOptions { transient: 30.0, duration: 100.0, ..LyapunovOptions::default() };
+        let settings =
+            LyapunovOptions { transient: 30.0, duration: 100.0, ..LyapunovOptions::default() };
         let e = largest::<2, 4, _>(&Linear, SVector::from([0.0, 0.0]), &settings).unwrap();
         assert!((e.value - 0.3).abs() < 1e-8 && e.standard_error < 1e-8, "{e:?}");
     }
@@ -445,9 +480,19 @@ mod tests {
     #[test]
     fn kicks_do_not_change_a_linear_system() {
         // Its orbit is thrown about, its tangent flow is the same everywhere.
-        let kick = Kick { every: 0.3, size: 0.1, law: twofold_integrate::KickLaw::Normal, seed: 1, stream: 0 };
-        let settings =
-            LyapunovOptions { transient: 10.0, duration: 20.0, kick: Some(kick), ..LyapunovOptions::default() };
+        let kick = Kick {
+            every: 0.3,
+            size: 0.1,
+            law: twofold_integrate::KickLaw::Normal,
+            seed: 1,
+            stream: 0,
+        };
+        let settings = LyapunovOptions {
+            transient: 10.0,
+            duration: 20.0,
+            kick: Some(kick),
+            ..LyapunovOptions::default()
+        };
         struct Kicked;
         impl VectorField<3> for Kicked {
             fn eval<S: Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
@@ -461,7 +506,8 @@ mod tests {
     #[test]
     fn correlated_blocks_have_the_larger_error() {
         // Runs of eight equal values: 8 independent ones, not 64.
-        let values: Vec<f64> = (0..64).map(|i| [0.3, 1.0, -0.5, 0.1, 0.9, -1.0, 0.4, 0.2][i / 8]).collect();
+        let values: Vec<f64> =
+            (0..64).map(|i| [0.3, 1.0, -0.5, 0.1, 0.9, -1.0, 0.4, 0.2][i / 8]).collect();
         assert!(blocked_error(&values) > 2.5 * mean(&values).1);
     }
 
@@ -474,10 +520,26 @@ mod tests {
                 SVector::from([x[0].scale(0.0), x[0] * x[1]])
             }
         }
-        let kick = Kick { every: 0.7, size: 0.05, law: twofold_integrate::KickLaw::Normal, seed: 5, stream: 0 };
-        let settings =
-            LyapunovOptions { transient: 50.0, duration: 20.0, kick: Some(kick), ..LyapunovOptions::default() };
-        let e = largest_along::<2, 4, _>(&Tangent::<Rate, 1>(&Rate), SVector::from([0.8, 0.0]), 1, &settings).unwrap();
+        let kick = Kick {
+            every: 0.7,
+            size: 0.05,
+            law: twofold_integrate::KickLaw::Normal,
+            seed: 5,
+            stream: 0,
+        };
+        let settings = LyapunovOptions {
+            transient: 50.0,
+            duration: 20.0,
+            kick: Some(kick),
+            ..LyapunovOptions::default()
+        };
+        let e = largest_along::<2, 4, _>(
+            &Tangent::<Rate, 1>(&Rate),
+            SVector::from([0.8, 0.0]),
+            1,
+            &settings,
+        )
+        .unwrap();
         // The mean of the rate over (50, 70), the n-th kick coming at 0.7 n.
         let mut kicker = Kicker::new(kick, 1);
         let (mut rate, mut want) = (SVector::from([0.8]), 0.0);
@@ -503,6 +565,9 @@ mod tests {
     fn a_budget_of_steps_is_kept() {
         let settings = LyapunovOptions { max_steps: 10, ..LyapunovOptions::default() };
         let error = largest::<2, 4, _>(&Linear, SVector::from([0.0, 0.0]), &settings).unwrap_err();
-        assert!(matches!(error, Failure::TooManySteps { limit: 10, ref state, .. } if state.len() == 2), "{error:?}");
+        assert!(
+            matches!(error, Failure::TooManySteps { limit: 10, ref state, .. } if state.len() == 2),
+            "{error:?}"
+        );
     }
 }

@@ -1,4 +1,5 @@
-//! The motion of a Filippov system: a path in pieces, each in one mode, and the events between them.
+//! The motion of a Filippov system: a path in pieces, each in one mode, and the events between
+//! them.
 
 use twofold_integrate::filippov::{FilippovObserver, Mode, ModeEvent};
 use twofold_integrate::{Flow, Observer, Step};
@@ -77,9 +78,12 @@ impl<const D: usize> MotionRecorder<D> {
     /// Takes the points recorded so far and clears the recorder, except for the mode of the
     /// unfinished piece, which becomes the first piece.
     pub fn take(&mut self) -> Motion<D> {
-        let unfinished = self.pieces.pop().map(|(mode, mut path)| ((mode, path.take()), (mode, path)));
-        let mut pieces: Vec<(Mode, Vec<Sample<D>>)> =
-            std::mem::take(&mut self.pieces).into_iter().map(|(mode, path)| (mode, path.into_samples())).collect();
+        let unfinished =
+            self.pieces.pop().map(|(mode, mut path)| ((mode, path.take()), (mode, path)));
+        let mut pieces: Vec<(Mode, Vec<Sample<D>>)> = std::mem::take(&mut self.pieces)
+            .into_iter()
+            .map(|(mode, path)| (mode, path.into_samples()))
+            .collect();
         if let Some((done, rest)) = unfinished {
             pieces.push(done);
             self.pieces.push(rest);
@@ -90,7 +94,8 @@ impl<const D: usize> MotionRecorder<D> {
 
     /// What was recorded.
     pub fn into_motion(self) -> Motion<D> {
-        let pieces = self.pieces.into_iter().map(|(mode, path)| (mode, path.into_samples())).collect();
+        let pieces =
+            self.pieces.into_iter().map(|(mode, path)| (mode, path.into_samples())).collect();
         Motion { pieces, events: self.events }
     }
 }
@@ -99,8 +104,8 @@ impl<const D: usize> MotionRecorder<D> {
 #[derive(Clone, Debug)]
 pub struct TimedMotion<const D: usize = 3> {
     times: TimesRecorder<D>,
-    /// The pieces: (mode, how many samples). A piece between two samples has none and is counted all the same, so that pieces have the
-    /// numbers that [`MotionRecorder`] gives them.
+    /// The pieces: (mode, how many samples). A piece between two samples has none and is counted
+    /// all the same, so that pieces have the numbers that [`MotionRecorder`] gives them.
     modes: Vec<(Mode, usize)>,
     start: bool,
     new_piece: bool,
@@ -137,7 +142,10 @@ impl<const D: usize> TimedMotion<D> {
         let last = self.modes.last().map(|(mode, _)| (*mode, 0));
         let modes = std::mem::replace(&mut self.modes, last.into_iter().collect());
         let mut samples = self.times.take().into_iter();
-        let pieces = modes.into_iter().map(|(mode, count)| (mode, samples.by_ref().take(count).collect())).collect();
+        let pieces = modes
+            .into_iter()
+            .map(|(mode, count)| (mode, samples.by_ref().take(count).collect()))
+            .collect();
         Motion { pieces, events: std::mem::take(&mut self.events) }
     }
 
@@ -207,7 +215,13 @@ mod tests {
 
     fn step(to: &mut impl FilippovObserver<1>, mode: Mode, from: f64, until: f64) {
         let straight = Straight(from, until);
-        let step = Step { t0: from, t1: until, x0: [from].into(), x1: [until].into(), interpolant: &straight };
+        let step = Step {
+            t0: from,
+            t1: until,
+            x0: [from].into(),
+            x1: [until].into(),
+            interpolant: &straight,
+        };
         assert_eq!(to.step(mode, &step), Flow::Continue);
     }
 
@@ -219,7 +233,11 @@ mod tests {
     fn times(motion: &Motion<1>) -> Vec<(Mode, Vec<f64>)> {
         assert_eq!(motion.len(), motion.samples().count());
         assert!(motion.samples().all(|(_, s)| s.x == [s.t]));
-        motion.pieces.iter().map(|(mode, samples)| (*mode, samples.iter().map(|s| s.t).collect())).collect()
+        motion
+            .pieces
+            .iter()
+            .map(|(mode, samples)| (*mode, samples.iter().map(|s| s.t).collect()))
+            .collect()
     }
 
     #[test]
@@ -232,30 +250,50 @@ mod tests {
         event(&mut r, 3.0);
         step(&mut r, Mode::Minus, 3.0, 4.0);
         assert_eq!(r.kept(), 7);
-        let want = [(Mode::Plus, vec![0.0, 1.0, 2.0]), (Mode::Minus, vec![2.0, 3.0]), (Mode::Minus, vec![3.0, 4.0])];
+        let want = [
+            (Mode::Plus, vec![0.0, 1.0, 2.0]),
+            (Mode::Minus, vec![2.0, 3.0]),
+            (Mode::Minus, vec![3.0, 4.0]),
+        ];
         assert_eq!(times(&r.clone().into_motion()), want);
         let taken = r.take();
-        assert!(times(&taken) == want && taken.len() == 7 && !taken.is_empty() && taken.events.len() == 1);
+        assert!(
+            times(&taken) == want
+                && taken.len() == 7
+                && !taken.is_empty()
+                && taken.events.len() == 1
+        );
         // What comes next belongs to the last piece.
         assert_eq!(r.kept(), 0);
         step(&mut r, Mode::Minus, 4.0, 5.0);
         step(&mut r, Mode::SlidingAttracting, 5.0, 6.0);
         assert_eq!(r.kept(), 3);
         let rest = r.into_motion();
-        assert_eq!(times(&rest), [(Mode::Minus, vec![5.0]), (Mode::SlidingAttracting, vec![5.0, 6.0])]);
+        assert_eq!(
+            times(&rest),
+            [(Mode::Minus, vec![5.0]), (Mode::SlidingAttracting, vec![5.0, 6.0])]
+        );
         assert!(rest.events.is_empty());
     }
 
     #[test]
     fn the_pieces_of_a_motion_share_the_room_there_is() {
-        // Room for ten points: two are in the first piece and four in the second, so the third ends at its fourth.
+        // Room for ten points: two are in the first piece and four in the second, so the third ends
+        // at its fourth.
         let mut r = MotionRecorder::<1>::new(0.1);
         step(&mut r, Mode::Plus, 0.0, 1.0);
         r.points = MOST_POINTS - 10;
         let full = (1..9).find(|&k| {
-            let (from, until, mode) = (f64::from(k), f64::from(k + 1), if k > 3 { Mode::Plus } else { Mode::Minus });
+            let (from, until, mode) =
+                (f64::from(k), f64::from(k + 1), if k > 3 { Mode::Plus } else { Mode::Minus });
             let straight = Straight(from, until);
-            let step = Step { t0: from, t1: until, x0: [from].into(), x1: [until].into(), interpolant: &straight };
+            let step = Step {
+                t0: from,
+                t1: until,
+                x0: [from].into(),
+                x1: [until].into(),
+                interpolant: &straight,
+            };
             r.step(mode, &step) == Flow::Stop
         });
         assert_eq!((full, r.kept()), (Some(6), 10));
@@ -272,7 +310,11 @@ mod tests {
         step(&mut r, Mode::Minus, 1.9, 2.5);
         step(&mut r, Mode::Minus, 2.5, 3.1);
         assert_eq!(r.kept(), 7);
-        let want = [(Mode::Plus, vec![0.0, 0.5, 1.0]), (Mode::Plus, vec![1.5]), (Mode::Minus, vec![2.0, 2.5, 3.0])];
+        let want = [
+            (Mode::Plus, vec![0.0, 0.5, 1.0]),
+            (Mode::Plus, vec![1.5]),
+            (Mode::Minus, vec![2.0, 2.5, 3.0]),
+        ];
         assert_eq!(times(&r.clone().into_motion()), want);
         let taken = r.take();
         assert!(times(&taken) == want && taken.events.len() == 1);

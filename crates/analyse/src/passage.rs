@@ -1,30 +1,42 @@
 //! Passage of smoothed orbits through a two-fold, for stiffness parameters far smaller than other
 //! modules can treat.
 //!
-//! **The law.** Near a two-fold at the origin of the normal form (Jeffrey 2013, eq. 4), x = eps u and (y, z, t) = sqrt(eps) (Y, Z, T) remove eps: to leading
-//! order there is one inner problem, and powers of eps count how often a motion has shrunk or grown on its way through it. The desingularised
-//! sliding flow (y, z)' = (z + v- y, y + v+ z) has a weak and a strong eigenvalue; with mu their ratio, a disturbance made at the singularity across the
-//! layer leaves it eps^(-1/(2 mu)) larger, one made along it eps^(-(1/mu - 1)/2), one carried in from outside eps^(1/2): smaller. The straight line
-//! along the weak eigenvector, x = const, is a solution of the inner problem (the canard that Kristiansen & Hogan 2015 find by blow-up); linearised about
-//! it, x satisfies Weber's equation xi'' + a (T xi)' + b xi = 0 with a the weak eigenvalue times phi'(u) there and b/a = -1/mu. [`Predicted`] has
-//! these numbers and what Weber's equation adds to the powers: logarithms.
+//! **The law.** Near a two-fold at the origin of the normal form (Jeffrey 2013, eq. 4), x = eps u
+//! and (y, z, t) = sqrt(eps) (Y, Z, T) remove eps: to leading order there is one inner problem, and
+//! powers of eps count how often a motion has shrunk or grown on its way through it. The
+//! desingularised sliding flow (y, z)' = (z + v- y, y + v+ z) has a weak and a strong eigenvalue;
+//! with mu their ratio, a disturbance made at the singularity across the layer leaves it eps^(-1/(2
+//! mu)) larger, one made along it eps^(-(1/mu - 1)/2), one carried in from outside eps^(1/2):
+//! smaller. The straight line along the weak eigenvector, x = const, is a solution of the inner
+//! problem (the canard that Kristiansen & Hogan 2015 find by blow-up); linearised about it, x
+//! satisfies Weber's equation xi'' + a (T xi)' + b xi = 0 with a the weak eigenvalue times phi'(u)
+//! there and b/a = -1/mu. [`Predicted`] has these numbers and what Weber's equation adds to the
+//! powers: logarithms.
 //!
-//! **The method.** An orbit that comes in slides along a strongly attracting surface, where explicit methods need a number of steps in proportion to
-//! 1/eps; errors made there shrink, as the law says of all that is carried in. So it is followed by an implicit method in `f64` where it slides, and by
-//! Taylor series that resolve the layer elsewhere. What is made at the singularity grows: from [`HANDOVER`] on the arithmetic is double-double.
+//! **The method.** An orbit that comes in slides along a strongly attracting surface, where
+//! explicit methods need a number of steps in proportion to 1/eps; errors made there shrink, as the
+//! law says of all that is carried in. So it is followed by an implicit method in `f64` where it
+//! slides, and by Taylor series that resolve the layer elsewhere. What is made at the singularity
+//! grows: from [`HANDOVER`] on the arithmetic is double-double.
 
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
-use super::reference::{ExtendedCrossing, ExtendedPoint, REFERENCE_TOLERANCE, SectionPlane, first_crossing, refine};
+use super::reference::{
+    ExtendedCrossing, ExtendedPoint, REFERENCE_TOLERANCE, SectionPlane, first_crossing, refine,
+};
 use twofold_integrate::roots::CrossingFinder;
-use twofold_integrate::{Failure, Flow, Observer, Radau5, Statistics, Step, Stepper, Taylor, Tolerance};
+use twofold_integrate::{
+    Failure, Flow, Observer, Radau5, Statistics, Step, Stepper, Taylor, Tolerance,
+};
 use twofold_num::elementary::sqrt;
 use twofold_num::{Arithmetic, DoubleDouble, Scalar};
 use twofold_system::VectorField;
 
-/// Beyond this distance from the two-fold the incoming orbit is followed in `f64`. An error made here leaves the singularity HANDOVER^(1 - 1/mu) times
-/// as large as one made at distance 1, and that one shrinks by sqrt(eps): 1e-13 becomes less than 1e-7 at eps = 1e-2, and less and less below.
+/// Beyond this distance from the two-fold the incoming orbit is followed in `f64`. An error made
+/// here leaves the singularity HANDOVER^(1 - 1/mu) times as large as one made at distance 1, and
+/// that one shrinks by sqrt(eps): 1e-13 becomes less than 1e-7 at eps = 1e-2, and less and less
+/// below.
 pub const HANDOVER: f64 = 0.1;
 /// Lower bound of the handover distance, in units of sqrt(eps).
 const HANDOVER_INNER: f64 = 12.0;
@@ -40,7 +52,8 @@ const IN_LAYER: f64 = 2.0;
 const NEAR: f64 = 1.0;
 /// The first passage through the surface farther out than so many sqrt(eps) counts as an exit.
 const OFF: f64 = 1.0;
-/// The surface is left where |x| first exceeds so many eps after the visit: more than hysteresis swings near the two-fold.
+/// The surface is left where |x| first exceeds so many eps after the visit: more than hysteresis
+/// swings near the two-fold.
 const LEAVES: f64 = 3.0;
 /// Most steps of one orbit.
 const MOST_STEPS: u64 = 50_000_000;
@@ -65,12 +78,14 @@ pub struct Predicted {
     pub phi: f64,
     /// (y', z') on the canard.
     pub velocity: [f64; 2],
-    /// By what a turn around the two-fold outside the layer expands: the larger root of l + 1/l = 4 v+ v- - 2.
+    /// By what a turn around the two-fold outside the layer expands: the larger root of l + 1/l = 4
+    /// v+ v- - 2.
     pub turn: f64,
 }
 
 impl Predicted {
-    /// The formulas at v+, v-. Both must be negative and v+ v- > 1 (otherwise the numbers mean nothing).
+    /// The formulas at v+, v-. Both must be negative and v+ v- > 1 (otherwise the numbers mean
+    /// nothing).
     pub fn of(v_plus: f64, v_minus: f64) -> Self {
         let (mean, half) = (0.5 * (v_plus + v_minus), 0.5 * (v_plus - v_minus));
         let root = sqrt(half * half + 1.0);
@@ -103,19 +118,21 @@ impl Predicted {
         0.5
     }
 
-    /// d(z^2/eps)/d ln(1/eps) of the place where the surface is left, where z^2/eps = `z2` and the transition function has the slope `slope` (in
-    /// h/eps) at the canard.
+    /// d(z^2/eps)/d ln(1/eps) of the place where the surface is left, where z^2/eps = `z2` and the
+    /// transition function has the slope `slope` (in h/eps) at the canard.
     ///
-    /// Along the canard a deviation grows like T^(-1/mu) exp(|a| T^2/2), a = weak * slope, z = velocity T; it enters with size
-    /// eps^((1/mu - 1)/2) and the surface is left when it is of order 1. Differentiated by ln(1/eps); for `z2` = infinity the asymptotic value.
+    /// Along the canard a deviation grows like T^(-1/mu) exp(|a| T^2/2), a = weak * slope, z =
+    /// velocity T; it enters with size eps^((1/mu - 1)/2) and the surface is left when it is of
+    /// order 1. Differentiated by ln(1/eps); for `z2` = infinity the asymptotic value.
     pub fn selection(&self, slope: f64, z2: f64) -> f64 {
         let a = self.weak.abs() * slope;
         let speed2 = self.velocity[1] * self.velocity[1];
         speed2 * (1.0 / self.mu - 1.0) / (a - speed2 / (self.mu * z2))
     }
 
-    /// What the logarithm adds to the powers [`Predicted::across`] and [`Predicted::along`] at a given eps, where z^2/eps = `z2`: the growth has 1/T as a
-    /// factor (the faster the deviation grows when the surface is left, the less the place moves).
+    /// What the logarithm adds to the powers [`Predicted::across`] and [`Predicted::along`] at a
+    /// given eps, where z^2/eps = `z2`: the growth has 1/T as a factor (the faster the deviation
+    /// grows when the surface is left, the less the place moves).
     pub fn correction(&self, slope: f64, z2: f64) -> f64 {
         0.5 * self.selection(slope, z2) / z2
     }
@@ -125,15 +142,19 @@ impl Predicted {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PassageQuestion {
-    /// The start, at t = 0. The first component is the switching function; the two-fold is the origin.
+    /// The start, at t = 0. The first component is the switching function; the two-fold is the
+    /// origin.
     pub start: [f64; 3],
-    /// The second component is zero at visits and exits of the kind in which growth is measured: farther out than so many sqrt(eps).
+    /// The second component is zero at visits and exits of the kind in which growth is measured:
+    /// farther out than so many sqrt(eps).
     pub beyond: f64,
-    /// When disturbances are made, relative to the visit, in units of sqrt(eps); increasing; may be empty.
+    /// When disturbances are made, relative to the visit, in units of sqrt(eps); increasing; may be
+    /// empty.
     pub offsets: Vec<f64>,
     /// Size of disturbances made at t = 0; 0: none is made.
     pub carried: f64,
-    /// Follow the orbit to its first upward passage through x = 0 this far from the two-fold; 0: not so far.
+    /// Follow the orbit to its first upward passage through x = 0 this far from the two-fold; 0:
+    /// not so far.
     pub far: f64,
     /// Everything must have happened before this time.
     pub by: f64,
@@ -192,9 +213,11 @@ fn nearest(x: &ExtendedPoint) -> SVector<f64, 3> {
     x.map(|c| c.to_f64())
 }
 
-/// Watches an orbit for the place where it leaves the switching surface behind a two-fold at the origin: where |x| first exceeds 3 eps
-/// after the orbit has been within sqrt(eps). The rule does not depend on how the switch is smoothed, so that hysteresis and noise can be
-/// asked the same; linear between steps, which are short in the layer. A kick that leads out of it ends where it leads.
+/// Watches an orbit for the place where it leaves the switching surface behind a two-fold at the
+/// origin: where |x| first exceeds 3 eps after the orbit has been within sqrt(eps). The rule does
+/// not depend on how the switch is smoothed, so that hysteresis and noise can be asked the same;
+/// linear between steps, which are short in the layer. A kick that leads out of it ends where it
+/// leads.
 #[derive(Clone, Copy, Debug)]
 pub struct Leaving {
     eps: f64,
@@ -252,7 +275,8 @@ impl<const N: usize> Observer<N> for Leaving {
     }
 }
 
-/// Follows the orbit from `start` in `f64` until it is near the two-fold. `None` if it is not in time.
+/// Follows the orbit from `start` in `f64` until it is near the two-fold. `None` if it is not in
+/// time.
 fn approach<F: VectorField<3>>(
     field: &F,
     start: SVector<f64, 3>,
@@ -330,13 +354,17 @@ fn follow<F: VectorField<3>>(
             });
         }
         let step = stepper.step(field)?;
-        let (of_section, of_surface) = (sections.in_step(&step, |x| x[1]), surfaces.in_step(&step, |x| x[0]));
+        let (of_section, of_surface) =
+            (sections.in_step(&step, |x| x[1]), surfaces.in_step(&step, |x| x[0]));
         for p in of_section {
             let (t, x) = refine(&stepper, &SECTION, p.theta);
             let (t, x) = (t.to_f64(), nearest(&x));
             if found.visit.is_none() && extent(&x) < NEAR * scale {
                 found.visit = Some(t);
-            } else if found.visit.is_some() && found.exit.is_none() && extent(&x) >= question.beyond * scale {
+            } else if found.visit.is_some()
+                && found.exit.is_none()
+                && extent(&x) >= question.beyond * scale
+            {
                 found.exit = Some(x.into());
             }
         }
@@ -368,13 +396,16 @@ fn follow<F: VectorField<3>>(
     Ok(Followed { passage: found, steps })
 }
 
-/// Largest response to a disturbance, in units of sqrt(eps), treated as linear (relative error about 1e-3).
+/// Largest response to a disturbance, in units of sqrt(eps), treated as linear (relative error
+/// about 1e-3).
 const LARGEST_RESPONSE: f64 = 1e-4;
 /// Smallest response, in units of sqrt(eps), far above amplified rounding errors for eps >= 1e-6.
 const SMALLEST_RESPONSE: f64 = 1e-7;
-/// Aimed at. At eps = 1e-7 rounding near the visit is worth some 1e-7 of response: when 1e-5 was aimed at, growth there was measured to a per cent only.
+/// Aimed at. At eps = 1e-7 rounding near the visit is worth some 1e-7 of response: when 1e-5 was
+/// aimed at, growth there was measured to a per cent only.
 const RESPONSE: f64 = 5e-5;
-/// Smallest disturbance, in units of eps across and sqrt(eps) along the layer: far above the spacing of double-double numbers.
+/// Smallest disturbance, in units of eps across and sqrt(eps) along the layer: far above the
+/// spacing of double-double numbers.
 const SMALLEST_SIZE: f64 = 1e-30;
 /// A disturbance must be small.
 const LARGEST_SIZE: f64 = 1e-5;
@@ -404,7 +435,9 @@ fn growth<F: VectorField<3>>(
             stepper.step(field)?;
         }
         let (t, x) = stepper.state();
-        let Some(undisturbed) = first_crossing(field, (t, x), SECTION, wanted, question.by, &mut work)? else {
+        let Some(undisturbed) =
+            first_crossing(field, (t, x), SECTION, wanted, question.by, &mut work)?
+        else {
             continue;
         };
         let mut factors = [f64::NAN; 3];
@@ -414,12 +447,15 @@ fn growth<F: VectorField<3>>(
             for _ in 0..TRIALS {
                 let mut disturbed = x;
                 disturbed[component] += DoubleDouble::from_f64(*size * unit);
-                let moved = first_crossing(field, (t, disturbed), SECTION, wanted, question.by, &mut work)?;
-                let response = moved.map_or(f64::INFINITY, |m| nearest(&(m.x - undisturbed.x)).amax() / scale);
+                let moved =
+                    first_crossing(field, (t, disturbed), SECTION, wanted, question.by, &mut work)?;
+                let response =
+                    moved.map_or(f64::INFINITY, |m| nearest(&(m.x - undisturbed.x)).amax() / scale);
                 factors[component] = response * scale / (*size * unit);
                 let inside = (SMALLEST_RESPONSE..=LARGEST_RESPONSE).contains(&response);
                 // Far off, the response is no measure of itself.
-                let next = (*size * (RESPONSE / response).clamp(1e-6, 1e6)).clamp(SMALLEST_SIZE, LARGEST_SIZE);
+                let next = (*size * (RESPONSE / response).clamp(1e-6, 1e6))
+                    .clamp(SMALLEST_SIZE, LARGEST_SIZE);
                 if inside || next == *size {
                     break;
                 }
@@ -433,11 +469,16 @@ fn growth<F: VectorField<3>>(
     Ok(())
 }
 
-/// Follows the orbit of `field`, whose switch has the width `eps`, through its first visit to the two-fold at the origin.
+/// Follows the orbit of `field`, whose switch has the width `eps`, through its first visit to the
+/// two-fold at the origin.
 ///
 /// # Errors
 /// [`Failure`] of an orbit.
-pub fn passage<F: VectorField<3>>(field: &F, eps: f64, question: &PassageQuestion) -> Result<PassageAnswer, Failure> {
+pub fn passage<F: VectorField<3>>(
+    field: &F,
+    eps: f64,
+    question: &PassageQuestion,
+) -> Result<PassageAnswer, Failure> {
     let mut work = Statistics::default();
     let start = SVector::from(question.start);
     let Some(near) = approach(field, start, eps, question.by, &mut work)? else {
@@ -447,7 +488,8 @@ pub fn passage<F: VectorField<3>>(field: &F, eps: f64, question: &PassageQuestio
     growth(field, eps, &mut followed, question)?;
     if let (Some(exit), true) = (followed.passage.exit, question.carried != 0.0) {
         let mut factors = [f64::NAN; 3];
-        let short = PassageQuestion { offsets: Vec::new(), carried: 0.0, far: 0.0, ..question.clone() };
+        let short =
+            PassageQuestion { offsets: Vec::new(), carried: 0.0, far: 0.0, ..question.clone() };
         for (component, factor) in factors.iter_mut().enumerate() {
             let mut moved = start;
             moved[component] += question.carried;
@@ -512,24 +554,35 @@ mod tests {
         // Never within 0.1 of the two-fold in y and z.
         assert_eq!(seen(&[[0.0, 0.3, 0.05], [0.02, 0.05, -0.3], [0.04, -0.2, -0.2]]), None);
         // The layer is left before the visit, and not after it.
-        assert_eq!(seen(&[[0.0, 0.3, 0.3], [0.5, 0.2, 0.2], [0.0, 0.05, 0.05], [0.02, -0.3, -0.3]]), None);
+        assert_eq!(
+            seen(&[[0.0, 0.3, 0.3], [0.5, 0.2, 0.2], [0.0, 0.05, 0.05], [0.02, -0.3, -0.3]]),
+            None
+        );
         // Two states near are one visit.
         assert!(seen(&[[0.0, 0.05, 0.0], [0.0, 0.05, 0.0], [0.04, -0.3, -0.3]]).is_some());
         // Downwards as well; the first place counts.
-        let place = seen(&[[0.0, 0.05, 0.0], [-0.06, 0.15, 0.2], [0.0, 0.0, 0.0], [0.06, 1.0, 1.0]]).unwrap();
+        let place =
+            seen(&[[0.0, 0.05, 0.0], [-0.06, 0.15, 0.2], [0.0, 0.0, 0.0], [0.06, 1.0, 1.0]])
+                .unwrap();
         assert!((place[0] + 0.03).abs() < 1e-15 && (place[1] - 0.1).abs() < 1e-15, "{place:?}");
     }
 
     #[test]
     fn after_a_kick_the_way_goes_on_from_where_it_led() {
-        let kicked = |l: &mut Leaving, to: [f64; 3]| l.kick(0.3, &SVector::from([9.0; 3]), &SVector::from(to));
+        let kicked = |l: &mut Leaving, to: [f64; 3]| {
+            l.kick(0.3, &SVector::from([9.0; 3]), &SVector::from(to))
+        };
         let mut l = Leaving::new(1e-2);
         l.see([0.0, 0.05, 0.0]);
         kicked(&mut l, [0.02, 0.0, 0.05]);
         assert_eq!(l.place(), None);
         l.see([0.04, -0.1, -0.05]);
         let place = l.place().unwrap();
-        assert!((place[0] - 0.03).abs() < 1e-15 && (place[1] + 0.05).abs() < 1e-15 && place[2].abs() < 1e-15);
+        assert!(
+            (place[0] - 0.03).abs() < 1e-15
+                && (place[1] + 0.05).abs() < 1e-15
+                && place[2].abs() < 1e-15
+        );
         // A kick out of the layer is where it is left, after the visit and once.
         for (start, left) in [([0.0, 0.05, 0.0], Some([0.04, 0.1, 0.2])), ([0.0, 0.5, 0.0], None)] {
             let mut l = Leaving::new(1e-2);
@@ -542,18 +595,24 @@ mod tests {
         }
     }
 
-    /// y and z turn about the two-fold once in 2 pi, `GROWTH` per unit time farther out, and x goes by at the speed `drift`: all that happens is known.
+    /// y and z turn about the two-fold once in 2 pi, `GROWTH` per unit time farther out, and x goes
+    /// by at the speed `drift`: all that happens is known.
     struct Screw {
         drift: f64,
     }
     const GROWTH: f64 = 0.2;
     impl VectorField<3> for Screw {
         fn eval<S: twofold_num::Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
-            SVector::from([S::from_f64(self.drift), x[1].scale(GROWTH) - x[2], x[1] + x[2].scale(GROWTH)])
+            SVector::from([
+                S::from_f64(self.drift),
+                x[1].scale(GROWTH) - x[2],
+                x[1] + x[2].scale(GROWTH),
+            ])
         }
     }
 
-    /// From (x, 0.05, 0) at eps = 0.01: y = 0 is passed at pi/2, 3 pi/2, ..., 0.068, 0.128, 0.240 and 0.451 from the two-fold.
+    /// From (x, 0.05, 0) at eps = 0.01: y = 0 is passed at pi/2, 3 pi/2, ..., 0.068, 0.128, 0.240
+    /// and 0.451 from the two-fold.
     fn screwed(crosses: f64, drift: f64, question: &PassageQuestion) -> PassageAnswer {
         let start = [-crosses * drift, 0.05, 0.0];
         passage(&Screw { drift }, 1e-2, &PassageQuestion { start, ..question.clone() }).unwrap()
@@ -581,27 +640,35 @@ mod tests {
             }
             // Far exits go up.
             assert_eq!(p.far, p.surface.filter(|_| drift > 0.0));
-            assert_eq!(screwed(crosses, drift, &PassageQuestion { far: 0.3, ..near.clone() }).far, None);
+            assert_eq!(
+                screwed(crosses, drift, &PassageQuestion { far: 0.3, ..near.clone() }).far,
+                None
+            );
             assert_eq!(screwed(crosses, drift, &near).far, None);
             if crosses > 4.0 {
                 assert!((p.leaving.unwrap()[0].abs() - 0.03).abs() < 1e-12, "{p:?}");
             }
         }
-        // The exit is the first, though y = 0 is passed again at 9 pi/2; what was all found is not followed on, to
-        // where it overflows.
+        // The exit is the first, though y = 0 is passed again at 9 pi/2; what was all found is not
+        // followed on, to where it overflows.
         let long = PassageQuestion { by: 16.0, ..near.clone() };
         let exits = [&long, &near].map(|q| screwed(2.0, 0.01, q).exit.unwrap());
         assert!((0..3).all(|i| (exits[0][i] - exits[1][i]).abs() < 1e-14), "{exits:?}");
         for far in [0.0, 0.2] {
-            let [short, endless] =
-                [12.0, 1e4].map(|by| screwed(8.0, 0.01, &PassageQuestion { far, by, ..near.clone() }));
+            let [short, endless] = [12.0, 1e4]
+                .map(|by| screwed(8.0, 0.01, &PassageQuestion { far, by, ..near.clone() }));
             assert_eq!((short.far.is_some(), endless.far.is_some()), (far > 0.0, far > 0.0));
             let steps = [short, endless].map(|p| p.statistics.steps);
             assert!(steps[1] < 2 * steps[0], "{steps:?}");
         }
         // Before its time is over nothing else has happened.
         let short = screwed(8.0, 0.01, &PassageQuestion { by: 7.0, ..near });
-        assert!(short.visit.is_some() && short.exit.is_none() && short.surface.is_none() && short.leaving.is_none());
+        assert!(
+            short.visit.is_some()
+                && short.exit.is_none()
+                && short.surface.is_none()
+                && short.leaving.is_none()
+        );
     }
 
     #[test]
@@ -615,15 +682,20 @@ mod tests {
         };
         let drift = 0.01;
         let p = screwed(8.0, drift, &question);
-        // With w = y + i z a disturbance d changes ln w by q = d/w: y = 0 is passed Im q earlier, Re q - GROWTH Im q farther out.
+        // With w = y + i z a disturbance d changes ln w by q = d/w: y = 0 is passed Im q earlier,
+        // Re q - GROWTH Im q farther out.
         let want = |t: f64| -> [f64; 3] {
             let end = 0.05 * exp(GROWTH * 3.5 * PI);
-            let part = |re: f64, im: f64| f64::max(end * (re - GROWTH * im).abs(), (drift * im).abs());
+            let part =
+                |re: f64, im: f64| f64::max(end * (re - GROWTH * im).abs(), (drift * im).abs());
             let r = 0.05 * exp(GROWTH * t);
             [1.0, part(cos(t) / r, -sin(t) / r), part(sin(t) / r, cos(t) / r)]
         };
         let close = |got: [f64; 3], want: [f64; 3], by: f64| {
-            assert!(got.iter().zip(want).all(|(g, w)| (g / w - 1.0).abs() < by), "{got:?} {want:?}");
+            assert!(
+                got.iter().zip(want).all(|(g, w)| (g / w - 1.0).abs() < by),
+                "{got:?} {want:?}"
+            );
         };
         assert_eq!(p.growth.iter().map(|g| g.offset).collect::<Vec<_>>(), question.offsets);
         for g in &p.growth {
@@ -636,10 +708,19 @@ mod tests {
     fn the_layer_costs_the_incoming_orbit_hardly_anything() {
         use twofold_system::{Caricature, Smoothed, Transition};
         let eps = 1e-5;
-        let field = Smoothed { system: Caricature::with_reinjection(1e-1, 1e-5), transition: Transition::Tanh, eps };
+        let field = Smoothed {
+            system: Caricature::with_reinjection(1e-1, 1e-5),
+            transition: Transition::Tanh,
+            eps,
+        };
         let mut work = Statistics::default();
-        let (_, x) = approach(&field, SVector::from([0.2, 0.0, -1.0]), eps, 80.0, &mut work).unwrap().unwrap();
-        assert!(x.amax() < HANDOVER && x.amax() > 0.9 * HANDOVER && x[0].abs() < IN_LAYER * eps, "{x}");
+        let (_, x) = approach(&field, SVector::from([0.2, 0.0, -1.0]), eps, 80.0, &mut work)
+            .unwrap()
+            .unwrap();
+        assert!(
+            x.amax() < HANDOVER && x.amax() > 0.9 * HANDOVER && x[0].abs() < IN_LAYER * eps,
+            "{x}"
+        );
         // Steps that resolve a layer of 1e-5 in sliding would be a million.
         assert!(work.steps < 5000, "{}", work.steps);
     }

@@ -13,8 +13,9 @@ pub struct Sample<const D: usize = 3> {
     pub x: [f64; D],
 }
 
-/// Records a path: every accepted step's ends, and between them as many points of the interpolant as it takes for the
-/// polyline to stay within `chord` of it. Of a state with more components, the first `D` are kept and looked at.
+/// Records a path: every accepted step's ends, and between them as many points of the interpolant
+/// as it takes for the polyline to stay within `chord` of it. Of a state with more components, the
+/// first `D` are kept and looked at.
 ///
 /// ```
 /// # use nalgebra::{SVector, vector};
@@ -49,13 +50,15 @@ pub struct PathRecorder<const D: usize = 3> {
 /// written as text. A full recorder stops the run.
 pub const MOST_POINTS: usize = 20_000_000;
 
-/// Halvings of one step: a bound against wild interpolants, far above what a tolerance of 1e-4 asks for.
+/// Halvings of one step: a bound against wild interpolants, far above what a tolerance of 1e-4 asks
+/// for.
 const MOST_HALVINGS: u32 = 10;
 
 impl<const D: usize> PathRecorder<D> {
-    /// A recorder that starts at `x0`; `chord` is the largest distance between polyline and interpolant, in the
-    /// state's units, where they are compared: at the thirds of a step and the middles of its parts. Elsewhere it may be somewhat larger; a third
-    /// of a step whose middle alone lies on its chord, an S, passes for straight.
+    /// A recorder that starts at `x0`; `chord` is the largest distance between polyline and
+    /// interpolant, in the state's units, where they are compared: at the thirds of a step and the
+    /// middles of its parts. Elsewhere it may be somewhat larger; a third of a step whose middle
+    /// alone lies on its chord, an S, passes for straight.
     pub fn new<const N: usize>(x0: &SVector<f64, N>, chord: f64) -> Self {
         Self::starting(0.0, x0, chord)
     }
@@ -89,8 +92,15 @@ impl<const D: usize> PathRecorder<D> {
         std::mem::take(&mut self.samples)
     }
 
-    /// Adds interior points of `step` between the fractions `a` and `b` where the chord misses the curve.
-    fn refine<const N: usize>(&mut self, step: &Step<'_, N>, a: (f64, [f64; D]), b: (f64, [f64; D]), halvings: u32) {
+    /// Adds interior points of `step` between the fractions `a` and `b` where the chord misses the
+    /// curve.
+    fn refine<const N: usize>(
+        &mut self,
+        step: &Step<'_, N>,
+        a: (f64, [f64; D]),
+        b: (f64, [f64; D]),
+        halvings: u32,
+    ) {
         if halvings == 0 {
             return;
         }
@@ -107,12 +117,13 @@ impl<const D: usize> PathRecorder<D> {
 
 impl<const N: usize, const D: usize> Observer<N> for PathRecorder<D> {
     fn step(&mut self, step: &Step<'_, N>) -> Flow {
-        // Thirds first: one midpoint test would accept an S-shaped step whose middle lies on the chord.
+        // Thirds first: one midpoint test would accept an S-shaped step whose middle lies on the
+        // chord.
         let knots = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0].map(|s| (s, leading(&step.at(s))));
         let (start, end) = (knots[0].1, knots[3].1);
-        let straight = knots[1..3]
-            .iter()
-            .all(|(s, x)| (0..D).all(|i| (x[i] - (start[i] + s * (end[i] - start[i]))).abs() <= self.chord));
+        let straight = knots[1..3].iter().all(|(s, x)| {
+            (0..D).all(|i| (x[i] - (start[i] + s * (end[i] - start[i]))).abs() <= self.chord)
+        });
         if !straight {
             for pair in knots.windows(2) {
                 self.refine(step, pair[0], pair[1], MOST_HALVINGS);
@@ -130,8 +141,8 @@ impl<const N: usize, const D: usize> Observer<N> for PathRecorder<D> {
     }
 }
 
-/// Records the state at the multiples of an interval, on the dense output. Times are multiples, not running sums. After a kick at such a
-/// moment the state is the one before it.
+/// Records the state at the multiples of an interval, on the dense output. Times are multiples, not
+/// running sums. After a kick at such a moment the state is the one before it.
 ///
 /// ```
 /// # use nalgebra::{SVector, vector};
@@ -168,8 +179,8 @@ impl<const D: usize> TimesRecorder<D> {
         Self { every, next: 1, most: MOST_POINTS, samples: vec![Sample { t: 0.0, x: leading(x0) }] }
     }
 
-    /// Stops when it has so many samples, instead of [`MOST_POINTS`], also within a step: given the same step again once they are
-    /// taken away, it goes on in it.
+    /// Stops when it has so many samples, instead of [`MOST_POINTS`], also within a step: given the
+    /// same step again once they are taken away, it goes on in it.
     pub fn at_most(mut self, samples: usize) -> Self {
         self.most = samples;
         self
@@ -257,7 +268,13 @@ mod tests {
 
     #[test]
     fn polyline_stays_near_the_curve() {
-        let step = Step { t0: 0.0, t1: 1.0, x0: HalfCircle.at(0.0), x1: HalfCircle.at(1.0), interpolant: &HalfCircle };
+        let step = Step {
+            t0: 0.0,
+            t1: 1.0,
+            x0: HalfCircle.at(0.0),
+            x1: HalfCircle.at(1.0),
+            interpolant: &HalfCircle,
+        };
         let mut r = PathRecorder::<3>::new(&step.x0, 1e-3);
         r.step(&step);
         let samples = r.into_samples();
@@ -290,7 +307,8 @@ mod tests {
         assert_eq!(samples[10].x, <[f64; 3]>::from(HalfCircle.at(1.0)));
     }
 
-    /// Taken away a few at a time, also within a step, the samples are those of one who keeps them all.
+    /// Taken away a few at a time, also within a step, the samples are those of one who keeps them
+    /// all.
     #[test]
     fn a_recorder_of_few_samples_goes_on_within_a_step() {
         let steps = [(0.0, 0.25), (0.25, 0.27), (0.27, 1.0)].map(|(t0, t1)| Step {
@@ -316,12 +334,22 @@ mod tests {
 
     #[test]
     fn a_full_recorder_stops_the_run() {
-        let step = Step { t0: 0.0, t1: 1.0, x0: HalfCircle.at(0.0), x1: HalfCircle.at(1.0), interpolant: &HalfCircle };
+        let step = Step {
+            t0: 0.0,
+            t1: 1.0,
+            x0: HalfCircle.at(0.0),
+            x1: HalfCircle.at(1.0),
+            interpolant: &HalfCircle,
+        };
         let mut r: PathRecorder = PathRecorder::new(&step.x0, 1e-300).at_most(10_000);
         let steps = (1..100).find(|_| r.step(&step) == Flow::Stop).unwrap();
         // No chord is small enough for a step to make more than 3 * 2^10 points of it.
         let per_step = 3 * (1 << MOST_HALVINGS);
-        assert!(steps >= 3 && (10_000..10_000 + per_step).contains(&r.len()), "{steps} steps, {} points", r.len());
+        assert!(
+            steps >= 3 && (10_000..10_000 + per_step).contains(&r.len()),
+            "{steps} steps, {} points",
+            r.len()
+        );
     }
 
     /// y and z as functions of x = s in (0, 1).
@@ -337,7 +365,8 @@ mod tests {
     }
 
     fn recorded(graph: &Graph, chord: f64) -> Vec<Sample> {
-        let step = Step { t0: 2.0, t1: 4.0, x0: graph.at(0.0), x1: graph.at(1.0), interpolant: graph };
+        let step =
+            Step { t0: 2.0, t1: 4.0, x0: graph.at(0.0), x1: graph.at(1.0), interpolant: graph };
         let mut r = PathRecorder::<3>::starting(2.0, &step.x0, chord);
         assert_eq!(r.step(&step), Flow::Continue);
         r.into_samples()
@@ -347,7 +376,10 @@ mod tests {
     fn a_straight_step_needs_no_points_between() {
         let line = Graph(|s| [3.0 - 7.0 * s, 5.0 + 2.0 * s]);
         let samples = recorded(&line, 1e-9);
-        assert_eq!(samples, [(2.0, 0.0), (4.0, 1.0)].map(|(t, s)| Sample { t, x: line.at(s).into() }));
+        assert_eq!(
+            samples,
+            [(2.0, 0.0), (4.0, 1.0)].map(|(t, s)| Sample { t, x: line.at(s).into() })
+        );
     }
 
     #[test]
@@ -370,8 +402,12 @@ mod tests {
                     let share = f64::from(k) / 20.0;
                     let s = w[0].x[0] + share * (w[1].x[0] - w[0].x[0]);
                     let on = graph.at(s);
-                    assert!(((s - (w[0].t - 2.0) / 2.0) - share * (w[1].t - w[0].t) / 2.0).abs() < 1e-15);
-                    // Halvings look at the middle; the largest gap of a cubic is a little beside it.
+                    assert!(
+                        ((s - (w[0].t - 2.0) / 2.0) - share * (w[1].t - w[0].t) / 2.0).abs()
+                            < 1e-15
+                    );
+                    // Halvings look at the middle; the largest gap of a cubic is a little beside
+                    // it.
                     let ends = [w[0].x, w[1].x].map(SVector::from);
                     let off = (ends[0] + (ends[1] - ends[0]) * share - on).amax();
                     assert!(off < 1.2 * chord, "{off} at {s}");
@@ -382,7 +418,13 @@ mod tests {
 
     #[test]
     fn what_is_taken_is_forgotten_and_kicks_are_kept() {
-        let step = Step { t0: 0.0, t1: 1.0, x0: HalfCircle.at(0.0), x1: HalfCircle.at(1.0), interpolant: &HalfCircle };
+        let step = Step {
+            t0: 0.0,
+            t1: 1.0,
+            x0: HalfCircle.at(0.0),
+            x1: HalfCircle.at(1.0),
+            interpolant: &HalfCircle,
+        };
         let mut r = PathRecorder::<2>::new(&step.x0, 10.0);
         r.step(&step);
         r.kick(1.0, &step.x1, &SVector::from([7.0, 8.0, 9.0]));
@@ -395,7 +437,10 @@ mod tests {
         assert_eq!(r.len(), 3);
         let taken = r.take();
         // What the state does not have is zero.
-        assert!(taken.len() == 3 && r.len() == 0 && taken[0].x == [1.0, 0.0, 0.0, 0.0], "{taken:?}");
+        assert!(
+            taken.len() == 3 && r.len() == 0 && taken[0].x == [1.0, 0.0, 0.0, 0.0],
+            "{taken:?}"
+        );
         // It goes on where it was.
         let next = Step { t0: 1.0, t1: 1.6, ..step };
         assert_eq!(r.record(&next), 1);

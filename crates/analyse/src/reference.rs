@@ -5,7 +5,9 @@ use nalgebra::SVector;
 
 use super::section::Direction;
 pub use twofold_integrate::ensemble::SectionPlane;
-use twofold_integrate::{Failure, Statistics, Stepper, StopReason, Taylor, Tolerance, roots::CrossingFinder};
+use twofold_integrate::{
+    Failure, Statistics, Stepper, StopReason, Taylor, Tolerance, roots::CrossingFinder,
+};
 use twofold_num::Arithmetic;
 use twofold_num::{DoubleDouble, Elementary, Scalar};
 use twofold_system::VectorField;
@@ -13,8 +15,9 @@ use twofold_system::VectorField;
 /// A point in double-double precision.
 pub type ExtendedPoint<const N: usize = 3> = SVector<DoubleDouble, N>;
 
-/// The local tolerance of reference orbits: below the precision of the arithmetic, since what a step leaves out just before a two-fold has grown by 10^15 after
-/// it, and roundings, unlike it, may cancel. Absolutely far below: at the two-fold every component is small.
+/// The local tolerance of reference orbits: below the precision of the arithmetic, since what a
+/// step leaves out just before a two-fold has grown by 10^15 after it, and roundings, unlike it,
+/// may cancel. Absolutely far below: at the two-fold every component is small.
 pub const REFERENCE_TOLERANCE: Tolerance = Tolerance { rtol: 1e-33, atol: 1e-40 };
 
 /// A surface whose crossings are recorded: the zeros of a height function, evaluated in the orbit's
@@ -59,12 +62,14 @@ pub struct ReferenceOrbit<const N: usize = 3> {
     pub stop: StopReason,
 }
 
-/// The first `count` crossings of `surface` by the orbit through `x0` at t = 0, in double-double arithmetic; fewer if `t_end`
-/// comes first. `decimal`: read the equation's constants as decimal numbers
-/// ([`Constants::Decimal`](twofold_num::series::Constants)); without, the equation is the one that `f64` methods solve.
+/// The first `count` crossings of `surface` by the orbit through `x0` at t = 0, in double-double
+/// arithmetic; fewer if `t_end` comes first. `decimal`: read the equation's constants as decimal
+/// numbers ([`Constants::Decimal`](twofold_num::series::Constants)); without, the equation is the
+/// one that `f64` methods solve.
 ///
 /// # Errors
-/// [`Failure`] of the method; [`Failure::TooManySteps`] on an orbit that takes more than two million.
+/// [`Failure`] of the method; [`Failure::TooManySteps`] on an orbit that takes more than two
+/// million.
 pub fn reference<F: VectorField<N>, const N: usize>(
     field: &F,
     x0: ExtendedPoint<N>,
@@ -81,14 +86,17 @@ pub fn reference<F: VectorField<N>, const N: usize>(
     let mut found = Vec::new();
     let mut passages = CrossingFinder::default();
     while found.len() < count && stepper.state().0.to_f64() < t_end {
-        next_crossings(&mut stepper, field, &surface, &mut passages, |crossing| found.push(crossing))?;
+        next_crossings(&mut stepper, field, &surface, &mut passages, |crossing| {
+            found.push(crossing)
+        })?;
     }
     let stop = if found.len() >= count { StopReason::Observer } else { StopReason::EndTime };
     found.truncate(count);
     Ok(ReferenceOrbit { crossings: found, statistics: stepper.statistics().clone(), stop })
 }
 
-/// The first crossing of `surface` from (t, x) on, before `t_end`, that `wanted` accepts; the work is added to `work`.
+/// The first crossing of `surface` from (t, x) on, before `t_end`, that `wanted` accepts; the work
+/// is added to `work`.
 ///
 /// # Errors
 /// Those of [`reference()`].
@@ -115,8 +123,8 @@ pub(super) fn first_crossing<F: VectorField<N>, const N: usize>(
     Ok(found)
 }
 
-/// Steps of one reference orbit: a hundred times what orbits of some hundred units of time take; on a stiff attractor, which takes as
-/// many per unit of time, they would never end.
+/// Steps of one reference orbit: a hundred times what orbits of some hundred units of time take; on
+/// a stiff attractor, which takes as many per unit of time, they would never end.
 const MOST_STEPS: u64 = 2_000_000;
 
 /// One step; its crossings go to `found`.
@@ -140,7 +148,8 @@ fn next_crossings<F: VectorField<N>, const N: usize>(
     Ok(())
 }
 
-/// The crossing near the fraction `theta` of the last step, by the secant method: from 16 digits to all.
+/// The crossing near the fraction `theta` of the last step, by the secant method: from 16 digits to
+/// all.
 pub(super) fn refine<const N: usize>(
     stepper: &Taylor<N, DoubleDouble>,
     surface: &impl Surface<N>,
@@ -188,14 +197,18 @@ mod tests {
         let orbit = reference(&Oscillator, start(), PLANE, 10, 6.0, false).unwrap();
         // At pi/2 downwards and at 3 pi/2 upwards, with x' = -1 and 1.
         assert_eq!((orbit.crossings.len(), orbit.stop), (2, StopReason::EndTime));
-        for (c, (half_turns, direction)) in orbit.crossings.iter().zip([(0.5, Direction::Down), (1.5, Direction::Up)]) {
+        for (c, (half_turns, direction)) in
+            orbit.crossings.iter().zip([(0.5, Direction::Down), (1.5, Direction::Up)])
+        {
             close(c.t, DoubleDouble::PI * DoubleDouble::from_f64(half_turns));
             close(c.x[0], DoubleDouble::zero());
             close(c.x[1], DoubleDouble::from_f64(2.0 * half_turns - 2.0));
             assert_eq!(c.direction, direction);
         }
         // A sixth of a turn: cos = 1/2.
-        let half = reference(&Oscillator, start(), SectionPlane { value: 0.5, ..PLANE }, 1, 6.0, false).unwrap();
+        let half =
+            reference(&Oscillator, start(), SectionPlane { value: 0.5, ..PLANE }, 1, 6.0, false)
+                .unwrap();
         assert_eq!((half.crossings.len(), half.stop), (1, StopReason::Observer));
         close(half.crossings[0].t * DoubleDouble::from_f64(3.0), DoubleDouble::PI);
     }
@@ -215,7 +228,15 @@ mod tests {
         let mut work = Statistics::default();
         let mut upward = |t_end| {
             let wanted = |c: &ExtendedCrossing<2>| c.direction == Direction::Up;
-            first_crossing(&Oscillator, (DoubleDouble::zero(), start()), PLANE, wanted, t_end, &mut work).unwrap()
+            first_crossing(
+                &Oscillator,
+                (DoubleDouble::zero(), start()),
+                PLANE,
+                wanted,
+                t_end,
+                &mut work,
+            )
+            .unwrap()
         };
         close(upward(20.0).unwrap().t, DoubleDouble::PI * DoubleDouble::from_f64(1.5));
         assert_eq!(upward(4.0), None);
@@ -226,7 +247,10 @@ mod tests {
     fn the_extent_is_the_largest_component() {
         for x in [[1.0, -3.0], [-3.0, 1.0], [3.0, 0.0]] {
             let x = SVector::from(x.map(DoubleDouble::from_f64));
-            assert_eq!(ExtendedCrossing { t: DoubleDouble::zero(), x, direction: Direction::Up }.extent(), 3.0);
+            assert_eq!(
+                ExtendedCrossing { t: DoubleDouble::zero(), x, direction: Direction::Up }.extent(),
+                3.0
+            );
         }
     }
 }

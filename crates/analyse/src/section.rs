@@ -42,11 +42,12 @@ pub struct Crossing<const D: usize = 3> {
     pub direction: Direction,
 }
 
-/// Records every crossing of the plane `state[coordinate] = value`, in both senses, located on the dense output.
-/// What a crossing is, [`CrossingFinder`] says.
+/// Records every crossing of the plane `state[coordinate] = value`, in both senses, located on the
+/// dense output. What a crossing is, [`CrossingFinder`] says.
 ///
-/// A kick that throws the state across the plane is not a crossing of the flow and is not recorded. In a kicked run two
-/// neighbouring rows can therefore have the same sense: up to some 0.2 % were seen to.
+/// A kick that throws the state across the plane is not a crossing of the flow and is not recorded.
+/// In a kicked run two neighbouring rows can therefore have the same sense: up to some 0.2 % were
+/// seen to.
 ///
 /// ```
 /// # use nalgebra::{SVector, vector};
@@ -132,7 +133,8 @@ mod tests {
 
     #[test]
     fn passages_have_their_moment_their_place_and_their_sense() {
-        let step = Step { t0: 2.0, t1: 6.0, x0: Circle.at(0.0), x1: Circle.at(1.0), interpolant: &Circle };
+        let step =
+            Step { t0: 2.0, t1: 6.0, x0: Circle.at(0.0), x1: Circle.at(1.0), interpolant: &Circle };
         let mut r = SectionRecorder::<3>::new(0, 0.5);
         assert_eq!(r.step(&step), Flow::Continue);
         // cos = 1/2 at a sixth of the turn, going down, and at five sixths, going up.

@@ -5,8 +5,8 @@ use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
 use twofold_integrate::{
-    DriveOptions, Failure, Ignore, Method, Statistics, StepCap, Stepper, StopReason, Summary, Tolerance, WithStepper,
-    drive,
+    DriveOptions, Failure, Ignore, Method, Statistics, StepCap, Stepper, StopReason, Summary,
+    Tolerance, WithStepper, drive,
 };
 use twofold_system::VectorField;
 
@@ -67,8 +67,8 @@ pub fn weighted_error(x: &[f64], solution: &[f64], scale: f64) -> f64 {
     x.iter().zip(solution).map(|(x, r)| (x - r).abs() / (r.abs() + scale)).fold(0.0, f64::max)
 }
 
-/// Runs every method at every tolerance: method by method, both in the order asked for. A run that fails or is given up has
-/// its row, which says so.
+/// Runs every method at every tolerance: method by method, both in the order asked for. A run that
+/// fails or is given up has its row, which says so.
 ///
 /// # Errors
 /// [`DimensionError`] if the question is about another equation.
@@ -78,19 +78,28 @@ pub fn work_precision<F: VectorField<N>, const N: usize>(
 ) -> Result<Vec<WorkPrecisionRow>, DimensionError> {
     let q = question;
     let wrong = |what, v: &[f64]| DimensionError { what, got: v.len(), wanted: N };
-    let start = <[f64; N]>::try_from(q.start.as_slice()).map_err(|_| wrong("the start", &q.start))?;
+    let start =
+        <[f64; N]>::try_from(q.start.as_slice()).map_err(|_| wrong("the start", &q.start))?;
     if q.solution.len() != N {
         return Err(wrong("the solution", &q.solution));
     }
-    let options = DriveOptions { step_cap: q.step_cap, max_steps: q.max_steps, ..DriveOptions::to(q.t_end) };
+    let options =
+        DriveOptions { step_cap: q.step_cap, max_steps: q.max_steps, ..DriveOptions::to(q.t_end) };
     let runs = q.methods.iter().flat_map(|m| q.tolerances.iter().map(move |t| (*m, *t)));
     let rows = runs.map(|(method, tolerance)| {
         let run = WorkPrecisionRun { field, x0: SVector::from(start), options };
-        let mut row = WorkPrecisionRow { method, tolerance, error: None, statistics: None, stop: None, failure: None };
+        let mut row = WorkPrecisionRow {
+            method,
+            tolerance,
+            error: None,
+            statistics: None,
+            stop: None,
+            failure: None,
+        };
         match method.with_stepper(tolerance, run) {
             Ok(end) => {
-                row.error =
-                    (end.stop == StopReason::EndTime).then(|| weighted_error(end.x.as_slice(), &q.solution, q.scale));
+                row.error = (end.stop == StopReason::EndTime)
+                    .then(|| weighted_error(end.x.as_slice(), &q.solution, q.scale));
                 (row.statistics, row.stop) = (Some(end.statistics), Some(end.stop));
             }
             Err(failure) => row.failure = Some(failure.to_string()),
@@ -161,7 +170,8 @@ mod tests {
     #[test]
     fn failures_have_rows_too() {
         let tolerances = vec![Tolerance { rtol: 0.0, atol: 0.0 }];
-        let rows = work_precision(&Fast, &WorkPrecisionQuestion { tolerances, ..question() }).unwrap();
+        let rows =
+            work_precision(&Fast, &WorkPrecisionQuestion { tolerances, ..question() }).unwrap();
         assert!(rows.iter().all(|r| r.failure.is_some() && r.error.is_none()), "{rows:?}");
     }
 
@@ -178,7 +188,10 @@ mod tests {
     #[test]
     fn questions_survive_json_and_refuse_what_they_do_not_know() {
         let json = serde_json::to_value(question()).unwrap();
-        assert_eq!(serde_json::from_value::<WorkPrecisionQuestion>(json.clone()).unwrap(), question());
+        assert_eq!(
+            serde_json::from_value::<WorkPrecisionQuestion>(json.clone()).unwrap(),
+            question()
+        );
         let mut more = json;
         more["colour"] = "red".into();
         assert!(serde_json::from_value::<WorkPrecisionQuestion>(more).is_err());

@@ -1,8 +1,10 @@
-//! A digest of sources, for build scripts: it decides whether an answer that was stored by another build is still valid.
+//! A digest of sources, for build scripts: it decides whether an answer that was stored by another
+//! build is still valid.
 //!
-//! It covers what an answer can depend on and nothing else. Of Rust files it takes the tokens: comments, documentation, blank space and
-//! items under `#[cfg(test)]` (with the files of such modules) change nothing. Of other files it takes every byte, but carriage returns, which
-//! a checkout may add. Of `Cargo.lock` it takes the packages that a given package is built from.
+//! It covers what an answer can depend on and nothing else. Of Rust files it takes the tokens:
+//! comments, documentation, blank space and items under `#[cfg(test)]` (with the files of such
+//! modules) change nothing. Of other files it takes every byte, but carriage returns, which a
+//! checkout may add. Of `Cargo.lock` it takes the packages that a given package is built from.
 #![forbid(unsafe_code)]
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -18,7 +20,8 @@ use sha2::{Digest, Sha256};
 pub struct Sources(BTreeMap<String, Vec<u8>>);
 
 impl Sources {
-    /// Adds every file at `root`/`place` (a file or a folder) whose path from `root` `wanted` accepts. Cargo is told to look at the place.
+    /// Adds every file at `root`/`place` (a file or a folder) whose path from `root` `wanted`
+    /// accepts. Cargo is told to look at the place.
     ///
     /// # Errors
     ///
@@ -31,7 +34,8 @@ impl Sources {
         for file in files {
             let relative = file.strip_prefix(root).unwrap_or(&file);
             // Names with forward slashes: the same on every system.
-            let name: Vec<String> = relative.iter().map(|part| part.to_string_lossy().into_owned()).collect();
+            let name: Vec<String> =
+                relative.iter().map(|part| part.to_string_lossy().into_owned()).collect();
             let name = name.join("/");
             if !wanted(&name) {
                 continue;
@@ -39,11 +43,14 @@ impl Sources {
             let mut bytes = fs::read(&file)?;
             bytes.retain(|b| *b != b'\r');
             if file.extension().is_some_and(|e| e == "rs") {
-                let invalid = |e: String| Error::new(ErrorKind::InvalidData, format!("{}: {e}", file.display()));
+                let invalid = |e: String| {
+                    Error::new(ErrorKind::InvalidData, format!("{}: {e}", file.display()))
+                };
                 let text = String::from_utf8(bytes).map_err(|e| invalid(e.to_string()))?;
                 let (code, modules) = code(&text).map_err(invalid)?;
                 bytes = code.into_bytes();
-                // Where the file of a module stands that this file names: beside lib.rs, main.rs and mod.rs, below others.
+                // Where the file of a module stands that this file names: beside lib.rs, main.rs
+                // and mod.rs, below others.
                 let stem = name.trim_end_matches(".rs");
                 let base = match stem.rsplit_once('/') {
                     Some((folder, "lib" | "main" | "mod")) => folder,
@@ -56,12 +63,15 @@ impl Sources {
             }
             found.insert(name, bytes);
         }
-        found.retain(|name, _| !tests.iter().any(|t| name == t || (t.ends_with('/') && name.starts_with(t.as_str()))));
+        found.retain(|name, _| {
+            !tests.iter().any(|t| name == t || (t.ends_with('/') && name.starts_with(t.as_str())))
+        });
         self.0.append(&mut found);
         Ok(())
     }
 
-    /// Adds the packages of the lock file at `path` that `package` is built from, by name, version and checksum.
+    /// Adds the packages of the lock file at `path` that `package` is built from, by name, version
+    /// and checksum.
     ///
     /// # Errors
     ///
@@ -73,15 +83,20 @@ impl Sources {
         let mut packages: BTreeMap<String, (String, Vec<String>)> = BTreeMap::new();
         for entry in text.split("[[package]]").skip(1) {
             let field = |key: &str| {
-                let mut lines =
-                    entry.lines().filter_map(|l| l.strip_prefix(key)?.strip_prefix(" = \"")?.strip_suffix('"'));
+                let mut lines = entry
+                    .lines()
+                    .filter_map(|l| l.strip_prefix(key)?.strip_prefix(" = \"")?.strip_suffix('"'));
                 lines.next().unwrap_or_default().to_owned()
             };
             let (name, version, sum) = (field("name"), field("version"), field("checksum"));
-            let list =
-                entry.split_once("dependencies = [").map_or("", |(_, list)| list.split(']').next().unwrap_or_default());
-            let needs: Vec<String> =
-                list.split(',').map(|d| d.trim().trim_matches('"').to_owned()).filter(|d| !d.is_empty()).collect();
+            let list = entry
+                .split_once("dependencies = [")
+                .map_or("", |(_, list)| list.split(']').next().unwrap_or_default());
+            let needs: Vec<String> = list
+                .split(',')
+                .map(|d| d.trim().trim_matches('"').to_owned())
+                .filter(|d| !d.is_empty())
+                .collect();
             let value = (format!("{name} {version} {sum}"), needs);
             packages.insert(format!("{name} {version}"), value.clone());
             packages.insert(name, value);
@@ -89,7 +104,10 @@ impl Sources {
         let (mut open, mut seen) = (vec![package.to_owned()], BTreeSet::new());
         while let Some(name) = open.pop() {
             let Some((identity, needs)) = packages.get(&name) else {
-                return Err(Error::new(ErrorKind::NotFound, format!("{}: no package {name}", path.display())));
+                return Err(Error::new(
+                    ErrorKind::NotFound,
+                    format!("{}: no package {name}", path.display()),
+                ));
             };
             if seen.insert(identity.clone()) {
                 open.extend(needs.iter().cloned());
@@ -111,8 +129,8 @@ impl Sources {
     }
 }
 
-/// What Rust code says: its tokens, one a line, without comments, documentation and items under `#[cfg(test)]`; and the names of test modules
-/// that stand in files of their own.
+/// What Rust code says: its tokens, one a line, without comments, documentation and items under
+/// `#[cfg(test)]`; and the names of test modules that stand in files of their own.
 ///
 /// # Errors
 ///
@@ -127,7 +145,8 @@ pub fn code(text: &str) -> std::result::Result<(String, Vec<String>), String> {
 /// Every file at a place, which must exist.
 fn collect(place: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
     if !place.is_dir() {
-        fs::metadata(place).map_err(|e| Error::new(e.kind(), format!("{}: {e}", place.display())))?;
+        fs::metadata(place)
+            .map_err(|e| Error::new(e.kind(), format!("{}: {e}", place.display())))?;
         files.push(place.to_path_buf());
         return Ok(());
     }
@@ -137,7 +156,8 @@ fn collect(place: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
     Ok(())
 }
 
-/// Writes what tokens say, one a line, without documentation and tests; `modules` gets the names of test modules that stand in files.
+/// Writes what tokens say, one a line, without documentation and tests; `modules` gets the names of
+/// test modules that stand in files.
 fn write(tokens: TokenStream, into: &mut String, modules: &mut Vec<String>) {
     let tokens: Vec<TokenTree> = tokens.into_iter().collect();
     let mut i = 0;
@@ -151,8 +171,11 @@ fn write(tokens: TokenStream, into: &mut String, modules: &mut Vec<String>) {
                     i += 1;
                 }
                 i += 1;
-                let item: Vec<String> = tokens[start..i.min(tokens.len())].iter().map(ToString::to_string).collect();
-                if let [.., "mod", name, ";"] = &item.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+                let item: Vec<String> =
+                    tokens[start..i.min(tokens.len())].iter().map(ToString::to_string).collect();
+                if let [.., "mod", name, ";"] =
+                    &item.iter().map(String::as_str).collect::<Vec<_>>()[..]
+                {
                     modules.push((*name).to_owned());
                 }
             }
@@ -189,7 +212,8 @@ fn ends_item(token: &TokenTree) -> bool {
 
 /// If an attribute begins here: how many tokens it takes, and its text without spaces.
 fn attribute(tokens: &[TokenTree]) -> Option<(usize, String)> {
-    let is = |i: usize, c: char| matches!(tokens.get(i), Some(TokenTree::Punct(p)) if p.as_char() == c);
+    let is =
+        |i: usize, c: char| matches!(tokens.get(i), Some(TokenTree::Punct(p)) if p.as_char() == c);
     if !is(0, '#') {
         return None;
     }
@@ -206,15 +230,20 @@ fn attribute(tokens: &[TokenTree]) -> Option<(usize, String)> {
 mod tests {
     use super::*;
 
-    const CODE: &str = "/// One.\npub fn one() -> i32 {\n    1 // one\n}\n\n#[cfg(test)]\nmod plain;\n";
+    const CODE: &str =
+        "/// One.\npub fn one() -> i32 {\n    1 // one\n}\n\n#[cfg(test)]\nmod plain;\n";
 
     /// The digest of a folder with the sources above after an edit.
     fn after(edit: impl Fn(&Path)) -> String {
         let folder = tempfile::tempdir().unwrap();
         let root = folder.path();
         fs::create_dir_all(root.join("src/part")).unwrap();
-        for (name, text) in [("lib.rs", CODE), ("plain.rs", "fn two() {}"), ("part/mod.rs", ""), ("data.toml", "a = 1")]
-        {
+        for (name, text) in [
+            ("lib.rs", CODE),
+            ("plain.rs", "fn two() {}"),
+            ("part/mod.rs", ""),
+            ("data.toml", "a = 1"),
+        ] {
             fs::write(root.join("src").join(name), text).unwrap();
         }
         edit(root);
@@ -239,13 +268,21 @@ mod tests {
             ("\n\n", "\n\r\n\t \n"),
             (
                 "#[cfg(test)]",
-                "#[cfg(test)]\nuse std::fs;\n#[cfg(test)]\nfn helper() -> [u8; 2] { [1, 2] }\n#[cfg(test)]",
+                "#[cfg(test)]\nuse std::fs;\n#[cfg(test)]\nfn helper() -> [u8; 2] { [1, 2] \
+                    }\n#[cfg(test)]",
             ),
-            ("#[cfg(test)]", "#[cfg(test)]\n#[allow(dead_code)]\nmod tests { fn f() { g(\"}\") } }\n#[cfg(test)]"),
+            (
+                "#[cfg(test)]",
+                "#[cfg(test)]\n#[allow(dead_code)]\nmod tests { fn f() { g(\"}\") } \
+                    }\n#[cfg(test)]",
+            ),
         ] {
             assert_eq!(rewritten(from, to), before, "{from} -> {to}");
         }
-        assert_eq!(after(|root| fs::write(root.join("src/plain.rs"), "fn three() {}").unwrap()), before);
+        assert_eq!(
+            after(|root| fs::write(root.join("src/plain.rs"), "fn three() {}").unwrap()),
+            before
+        );
         assert_eq!(after(|root| fs::write(root.join("src/picture.png"), "x").unwrap()), before);
         assert_eq!(after(|root| fs::write(root.join("src/data.toml"), "a = 1\r").unwrap()), before);
     }
@@ -263,18 +300,26 @@ mod tests {
         ] {
             assert!(seen.insert(rewritten(from, to)), "{from} -> {to}");
         }
-        for (file, text) in
-            [("data.toml", "a = 2"), ("part/mod.rs", "fn f() {}"), ("part/new.rs", "fn f() {}"), ("x.csv", "")]
-        {
-            assert!(seen.insert(after(|root| fs::write(root.join("src").join(file), text).unwrap())), "{file}");
+        for (file, text) in [
+            ("data.toml", "a = 2"),
+            ("part/mod.rs", "fn f() {}"),
+            ("part/new.rs", "fn f() {}"),
+            ("x.csv", ""),
+        ] {
+            assert!(
+                seen.insert(after(|root| fs::write(root.join("src").join(file), text).unwrap())),
+                "{file}"
+            );
         }
     }
 
     #[test]
     fn of_the_lock_file_only_what_a_package_is_built_from() {
-        let lock = "version = 4\n\n[[package]]\nname = \"ours\"\nversion = \"1.0.0\"\ndependencies = [\n \"libm\",\n \"rand 0.2.0\",\n]\n\n\
+        let lock = "version = 4\n\n[[package]]\nname = \"ours\"\nversion = \"1.0.0\"\ndependencies \
+            = [\n \"libm\",\n \"rand 0.2.0\",\n]\n\n\
             [[package]]\nname = \"libm\"\nversion = \"0.2.16\"\nchecksum = \"ab\"\n\n\
-            [[package]]\nname = \"rand\"\nversion = \"0.1.0\"\n\n[[package]]\nname = \"rand\"\nversion = \"0.2.0\"\n\n\
+            [[package]]\nname = \"rand\"\nversion = \"0.1.0\"\n\n[[package]]\nname \
+            = \"rand\"\nversion = \"0.2.0\"\n\n\
             [[package]]\nname = \"clap\"\nversion = \"4.0.0\"\ndependencies = [\n \"libm\",\n]\n";
         let digest = |text: &str| {
             let folder = tempfile::tempdir().unwrap();
@@ -285,7 +330,11 @@ mod tests {
         };
         let before = digest(lock).unwrap();
         for unrelated in [("4.0.0", "4.0.1"), ("0.1.0", "0.1.1")] {
-            assert_eq!(digest(&lock.replace(unrelated.0, unrelated.1)).unwrap(), before, "{unrelated:?}");
+            assert_eq!(
+                digest(&lock.replace(unrelated.0, unrelated.1)).unwrap(),
+                before,
+                "{unrelated:?}"
+            );
         }
         for related in [("0.2.16", "0.2.17"), ("\"ab\"", "\"ac\""), ("0.2.0", "0.2.1")] {
             assert_ne!(digest(&lock.replace(related.0, related.1)).unwrap(), before, "{related:?}");

@@ -2,7 +2,8 @@
 
 use crate::definition::{Interpolation, TableEntry};
 
-/// A table's values between its rows: on each piece a cubic in the time since the piece's beginning.
+/// A table's values between its rows: on each piece a cubic in the time since the piece's
+/// beginning.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
     /// The times of the rows, increasing.
@@ -17,13 +18,18 @@ pub struct Table {
 pub struct BadTable(String);
 
 impl Table {
-    /// Reads the columns that `entry` names from a CSV text with a line of names; lines that begin with # are left out.
+    /// Reads the columns that `entry` names from a CSV text with a line of names; lines that begin
+    /// with # are left out.
     ///
     /// # Errors
-    /// If a column is not there, a cell is no finite number, times do not increase, or there are too few rows.
+    /// If a column is not there, a cell is no finite number, times do not increase, or there are
+    /// too few rows.
     pub fn read(entry: &TableEntry, csv: &str) -> Result<Self, BadTable> {
         let file = &entry.file;
-        let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(csv.as_bytes());
+        let mut reader = csv::ReaderBuilder::new()
+            .comment(Some(b'#'))
+            .trim(csv::Trim::All)
+            .from_reader(csv.as_bytes());
         let header = reader.headers().map_err(|e| BadTable(format!("{file}: {e}")))?.clone();
         let column = |name: &str| {
             header.iter().position(|h| h == name).ok_or_else(|| {
@@ -37,10 +43,9 @@ impl Table {
             let record = record.map_err(|e| BadTable(format!("{file}: {e}")))?;
             let cell = |i: usize| {
                 let text = record.get(i).unwrap_or_default();
-                text.parse::<f64>()
-                    .ok()
-                    .filter(|v| v.is_finite())
-                    .ok_or_else(|| BadTable(format!("{file}, row {}: `{text}` is not a finite number", row + 1)))
+                text.parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(|| {
+                    BadTable(format!("{file}, row {}: `{text}` is not a finite number", row + 1))
+                })
             };
             let (t, v) = (cell(at)?, cell(value)?);
             if knots.last().is_some_and(|last| t <= *last) {
@@ -52,19 +57,25 @@ impl Table {
             knots.push(t);
             values.push(v);
         }
-        Self::new(knots, &values, entry.interpolation).map_err(|BadTable(why)| BadTable(format!("{file}: {why}")))
+        Self::new(knots, &values, entry.interpolation)
+            .map_err(|BadTable(why)| BadTable(format!("{file}: {why}")))
     }
 
     /// The function through these points.
     ///
     /// # Errors
     /// If there are fewer than two.
-    pub fn new(knots: Vec<f64>, values: &[f64], interpolation: Interpolation) -> Result<Self, BadTable> {
+    pub fn new(
+        knots: Vec<f64>,
+        values: &[f64],
+        interpolation: Interpolation,
+    ) -> Result<Self, BadTable> {
         if knots.len() < 2 {
             return Err(BadTable("a table needs at least two rows".into()));
         }
         let h: Vec<f64> = knots.windows(2).map(|w| w[1] - w[0]).collect();
-        let slope: Vec<f64> = h.iter().zip(values.windows(2)).map(|(h, v)| (v[1] - v[0]) / h).collect();
+        let slope: Vec<f64> =
+            h.iter().zip(values.windows(2)).map(|(h, v)| (v[1] - v[0]) / h).collect();
         let hermite = |d: &[f64]| -> Vec<[f64; 4]> {
             let piece = |i: usize| {
                 let (a, b, m) = (d[i], d[i + 1], slope[i]);
@@ -74,7 +85,9 @@ impl Table {
         };
         let pieces = match interpolation {
             Interpolation::Previous => (0..h.len()).map(|i| [values[i], 0.0, 0.0, 0.0]).collect(),
-            Interpolation::Linear => (0..h.len()).map(|i| [values[i], slope[i], 0.0, 0.0]).collect(),
+            Interpolation::Linear => {
+                (0..h.len()).map(|i| [values[i], slope[i], 0.0, 0.0]).collect()
+            }
             Interpolation::Pchip => hermite(&monotone_slopes(&h, &slope)),
             Interpolation::Cubic => hermite(&spline_slopes(&h, &slope)),
         };
@@ -98,7 +111,8 @@ impl Table {
     }
 }
 
-/// Slopes at the knots of a monotone interpolant: Fritsch & Butland (1984), with the three-point ends of Moler (2004, sec. 3.6), as SciPy's.
+/// Slopes at the knots of a monotone interpolant: Fritsch & Butland (1984), with the three-point
+/// ends of Moler (2004, sec. 3.6), as SciPy's.
 fn monotone_slopes(h: &[f64], m: &[f64]) -> Vec<f64> {
     let n = h.len();
     if n == 1 {
@@ -128,7 +142,8 @@ fn monotone_slopes(h: &[f64], m: &[f64]) -> Vec<f64> {
     d
 }
 
-/// Slopes at the knots of the cubic spline with not-a-knot ends (de Boor 1978, ch. IV); a parabola through three points, a line through two.
+/// Slopes at the knots of the cubic spline with not-a-knot ends (de Boor 1978, ch. IV); a parabola
+/// through three points, a line through two.
 fn spline_slopes(h: &[f64], m: &[f64]) -> Vec<f64> {
     let n = h.len();
     if n == 1 {
@@ -143,7 +158,8 @@ fn spline_slopes(h: &[f64], m: &[f64]) -> Vec<f64> {
     let w = h[0] + h[1];
     rows[0] = [0.0, h[1], w, ((h[0] + 2.0 * w) * h[1] * m[0] + h[0] * h[0] * m[1]) / w];
     for i in 1..n {
-        rows[i] = [h[i], 2.0 * (h[i - 1] + h[i]), h[i - 1], 3.0 * (h[i] * m[i - 1] + h[i - 1] * m[i])];
+        rows[i] =
+            [h[i], 2.0 * (h[i - 1] + h[i]), h[i - 1], 3.0 * (h[i] * m[i - 1] + h[i - 1] * m[i])];
     }
     let (p, q) = (h[n - 1], h[n - 2]);
     let w = p + q;
@@ -166,7 +182,9 @@ mod tests {
     use super::*;
 
     fn at(interpolation: Interpolation, t: f64) -> f64 {
-        let table = Table::new(vec![0.0, 1.0, 2.5, 3.0, 5.0], &[1.0, 2.0, 0.5, 0.5, 4.0], interpolation).unwrap();
+        let table =
+            Table::new(vec![0.0, 1.0, 2.5, 3.0, 5.0], &[1.0, 2.0, 0.5, 0.5, 4.0], interpolation)
+                .unwrap();
         table.value(table.piece(t), t)
     }
 
@@ -176,8 +194,16 @@ mod tests {
         assert_eq!(at(Interpolation::Previous, 2.4), 2.0);
         assert_eq!(at(Interpolation::Linear, 1.75), 1.25);
         for (t, spline, pchip) in TABLE {
-            assert!((at(Interpolation::Cubic, t) - spline).abs() < 1e-13, "{t}: {}", at(Interpolation::Cubic, t));
-            assert!((at(Interpolation::Pchip, t) - pchip).abs() < 1e-13, "{t}: {}", at(Interpolation::Pchip, t));
+            assert!(
+                (at(Interpolation::Cubic, t) - spline).abs() < 1e-13,
+                "{t}: {}",
+                at(Interpolation::Cubic, t)
+            );
+            assert!(
+                (at(Interpolation::Pchip, t) - pchip).abs() < 1e-13,
+                "{t}: {}",
+                at(Interpolation::Pchip, t)
+            );
         }
     }
 

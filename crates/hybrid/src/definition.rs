@@ -13,9 +13,9 @@
 //! [[event]]
 //! name = "impact"                        # optional, as all but when, at or every
 //! when = "x"                             # where this is met ...
-//! direction = "down"                     # ... in this direction; or a condition: when = "x < 0" fires when it becomes true
+//! direction = "down"                     # in this direction; a condition fires as it becomes true
 //! set = { v = "-0.8*v" }                 # right-hand sides see the old values
-//! after_zeno = "stick"                   # impacts that accumulate: motion goes on at rest on the surface
+//! after_zeno = "stick"                   # where impacts accumulate: motion rests on the surface
 //!
 //! [modes.NAME]                           # instead of f; the first is where motion begins
 //! f = ["..."]
@@ -27,7 +27,8 @@
 //! interpolation = "linear"               # previous, linear, cubic or pchip
 //! ```
 //!
-//! `h`, `plus` and `minus` may stand instead of `f`, as in a [system with one switch](twofold_system::definition).
+//! `h`, `plus` and `minus` may stand instead of `f`, as in a [system with one
+//! switch](twofold_system::definition).
 
 // A diagnostic is made once, when a file is read.
 #![allow(clippy::result_large_err)]
@@ -69,7 +70,10 @@ impl Constant {
 
 /// A constant, or several.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(untagged, expecting = "a number is wanted here, or an expression as a string, or a list of them")]
+#[serde(
+    untagged,
+    expecting = "a number is wanted here, or an expression as a string, or a list of them"
+)]
 pub enum Constants {
     /// One.
     One(Constant),
@@ -82,7 +86,8 @@ pub enum Constants {
 #[serde(
     untagged,
     deny_unknown_fields,
-    expecting = "a parameter is a number, an expression as a string, or a table of value, above, below, meaning and unit"
+    expecting = "a parameter is a number, an expression as a string, or a table of value, above, \
+        below, meaning and unit"
 )]
 pub enum ParameterEntry {
     /// Its value.
@@ -196,7 +201,8 @@ pub struct TableEntry {
     pub time: String,
     /// The name of its column of values.
     pub column: String,
-    /// How it is read between its rows: `previous` value, `linear` (the default), `cubic` spline, or `pchip`, which overshoots nowhere.
+    /// How it is read between its rows: `previous` value, `linear` (the default), `cubic` spline,
+    /// or `pchip`, which overshoots nowhere.
     #[serde(default)]
     pub interpolation: Interpolation,
 }
@@ -237,7 +243,8 @@ pub struct Document {
     /// The derivatives where h < 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub minus: Option<Vec<Constant>>,
-    /// Parameters by name: a constant, or a table with `value`, `above`, `below`, `meaning` and `unit`.
+    /// Parameters by name: a constant, or a table with `value`, `above`, `below`, `meaning` and
+    /// `unit`.
     #[serde(default)]
     pub parameters: Ordered<ParameterEntry>,
     /// Expressions by name, in any order.
@@ -308,7 +315,8 @@ pub struct Event {
     pub sticks: bool,
 }
 
-/// A general system as expressions. One that exists is sound: names are known, counts fit, terms do not depend on themselves.
+/// A general system as expressions. One that exists is sound: names are known, counts fit, terms do
+/// not depend on themselves.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Definition {
     pub(crate) document: Document,
@@ -322,7 +330,8 @@ pub struct Definition {
     pub(crate) tables: Vec<(String, TableEntry)>,
 }
 
-/// Whether a file in TOML or JSON defines a general system: it has a key that systems with one switch have not.
+/// Whether a file in TOML or JSON defines a general system: it has a key that systems with one
+/// switch have not.
 pub fn is_general(text: &str, json: bool) -> bool {
     const KEYS: [&str; 4] = ["f", "event", "modes", "tables"];
     if json {
@@ -399,23 +408,35 @@ impl Definition {
     ///
     /// ```
     /// use twofold_hybrid::Definition;
-    /// let error = Definition::from_toml("states = ['x']\nf = ['if(x, 1, 2)']", "my.toml").unwrap_err();
+    /// let text = "states = ['x']\nf = ['if(x, 1, 2)']";
+    /// let error = Definition::from_toml(text, "my.toml").unwrap_err();
     /// assert_eq!(error.to_string().lines().nth(1), Some("  --> my.toml:2:10"));
     /// ```
     pub fn from_toml(text: &str, origin: &str) -> Result<Self, Diagnostic> {
-        let at = |message: String, span: Range<usize>, help| Diagnostic::new(message, origin, text, span, help);
+        let at = |message: String, span: Range<usize>, help| {
+            Diagnostic::new(message, origin, text, span, help)
+        };
         if text.len() > MAX_FILE {
-            return Err(at(format!("a file of {} bytes; the limit is {MAX_FILE}", text.len()), 0..0, None));
+            return Err(at(
+                format!("a file of {} bytes; the limit is {MAX_FILE}", text.len()),
+                0..0,
+                None,
+            ));
         }
         let document: Document = toml::from_str(text).map_err(|e| {
             let quoted: Vec<&str> = e.message().split('`').skip(1).step_by(2).collect();
             let near = quoted.split_first().and_then(|(unknown, known)| nearest(unknown, known));
-            at(e.message().to_owned(), e.span().unwrap_or(0..0), near.map(|n| format!("did you mean `{n}`?")))
+            at(
+                e.message().to_owned(),
+                e.span().unwrap_or(0..0),
+                near.map(|n| format!("did you mean `{n}`?")),
+            )
         })?;
         Self::from_document(document).map_err(|problem| {
             let mut span = span_of(text, &problem.place).unwrap_or(0..0);
             if let Some((expression, part)) = problem.within
-                && let Some(start) = text.get(span.clone()).and_then(|literal| literal.rfind(&expression))
+                && let Some(start) =
+                    text.get(span.clone()).and_then(|literal| literal.rfind(&expression))
             {
                 span = span.start + start + part.start..span.start + start + part.end;
             }
@@ -432,8 +453,8 @@ impl Definition {
             let message = format!("a file of {} bytes; the limit is {MAX_FILE}", text.len());
             return Err(Diagnostic::new(message, origin, text, 0..0, None));
         }
-        let document: Document =
-            serde_json::from_str(text).map_err(|e| Diagnostic::new(e.to_string(), origin, text, 0..0, None))?;
+        let document: Document = serde_json::from_str(text)
+            .map_err(|e| Diagnostic::new(e.to_string(), origin, text, 0..0, None))?;
         Self::from_document(document).map_err(|problem| {
             let place: Vec<String> = problem
                 .place
@@ -534,7 +555,8 @@ impl Definition {
         let list = |place: Place, texts: &[Constant]| -> Result<Vec<Expression>, Problem> {
             if texts.len() != n {
                 let names: Vec<&str> = d.states.iter().map(|s| s.name.as_str()).collect();
-                let message = format!("{} expressions for {n} states ({})", texts.len(), names.join(", "));
+                let message =
+                    format!("{} expressions for {n} states ({})", texts.len(), names.join(", "));
                 return problem(place, message, Some("give one for each state, in their order"));
             }
             texts.iter().enumerate().map(|(i, c)| parse(item(&place, i), &c.text(), &all)).collect()
@@ -545,13 +567,19 @@ impl Definition {
             let known: Vec<&str> = parameters.iter().map(|p| p.name.as_str()).collect();
             let (value, about, bounds) = match entry {
                 ParameterEntry::Plain(value) => (value, About::default(), (None, None)),
-                ParameterEntry::Table { value, meaning, unit, above, below } => {
-                    (value, About { meaning: meaning.clone(), unit: unit.clone() }, (*above, *below))
-                }
+                ParameterEntry::Table { value, meaning, unit, above, below } => (
+                    value,
+                    About { meaning: meaning.clone(), unit: unit.clone() },
+                    (*above, *below),
+                ),
             };
             let value = parse(place.clone(), &value.text(), &known)?;
             if value.names().contains(&"t") {
-                return problem(place, "a parameter does not depend on the time", Some("put it into [let]"));
+                return problem(
+                    place,
+                    "a parameter does not depend on the time",
+                    Some("put it into [let]"),
+                );
             }
             parameters.push(Parameter { name: name.clone(), value, about, bounds });
         }
@@ -571,9 +599,15 @@ impl Definition {
                 let zero = || Box::new(Expression::Number(0.0.into()));
                 let choose = |(a, b)| {
                     let condition = Expression::Greater(Box::new(switching.clone()), zero());
-                    Expression::Apply(twofold_system::expression::General::If, vec![condition, a, b])
+                    Expression::Apply(
+                        twofold_system::expression::General::If,
+                        vec![condition, a, b],
+                    )
                 };
-                vec![Mode { name: String::new(), field: plus.into_iter().zip(minus).map(choose).collect() }]
+                vec![Mode {
+                    name: String::new(),
+                    field: plus.into_iter().zip(minus).map(choose).collect(),
+                }]
             }
             (None, None, false) => {
                 let mut modes = Vec::new();
@@ -620,10 +654,12 @@ impl Definition {
                 (Some(text), None, None) => {
                     let at = inside(&place, "when");
                     let parsed = parse(at.clone(), text, &all)?;
-                    let named = matches!(&parsed, Expression::Name(name) if conditions.contains(&name.as_str()));
+                    let named = matches!(&parsed, Expression::Name(name)
+                        if conditions.contains(&name.as_str()));
                     if parsed.is_condition() || named {
                         if entry.direction.is_some() {
-                            let help = "leave direction out, or give an expression whose zero is met";
+                            let help =
+                                "leave direction out, or give an expression whose zero is met";
                             return problem(
                                 inside(&place, "direction"),
                                 "a condition fires when it becomes true",
@@ -640,12 +676,19 @@ impl Definition {
                         Constants::One(one) => vec![one.clone()],
                         Constants::List(list) => list.clone(),
                     };
-                    let read = times.iter().map(|c| parse(inside(&place, "at"), &c.text(), &constants));
+                    let read =
+                        times.iter().map(|c| parse(inside(&place, "at"), &c.text(), &constants));
                     When::At(read.collect::<Result<_, _>>()?)
                 }
-                (None, None, Some(period)) => When::Every(parse(inside(&place, "every"), &period.text(), &constants)?),
+                (None, None, Some(period)) => {
+                    When::Every(parse(inside(&place, "every"), &period.text(), &constants)?)
+                }
                 (None, None, None) => {
-                    return problem(place, "it is not said when the event fires", Some("give when, at or every"));
+                    return problem(
+                        place,
+                        "it is not said when the event fires",
+                        Some("give when, at or every"),
+                    );
                 }
                 _ => {
                     return problem(
@@ -664,7 +707,9 @@ impl Definition {
                 let Some(state) = d.states.iter().position(|s| s.name == *name) else {
                     let known: Vec<&str> = d.states.iter().map(|s| s.name.as_str()).collect();
                     let help = nearest(name, &known)
-                        .map_or(format!("states are {}", known.join(", ")), |n| format!("did you mean `{n}`?"));
+                        .map_or(format!("states are {}", known.join(", ")), |n| {
+                            format!("did you mean `{n}`?")
+                        });
                     return problem(at, format!("there is no state `{name}` to set"), Some(&help));
                 };
                 set.push((state, parse(at, &value.text(), &all)?));
@@ -680,18 +725,26 @@ impl Definition {
                     Some(help),
                 );
             }
-            let name = if entry.name.is_empty() { format!("event {}", i + 1) } else { entry.name.clone() };
+            let name =
+                if entry.name.is_empty() { format!("event {}", i + 1) } else { entry.name.clone() };
             events.push(Event { name, when, set, mode, from, stop: entry.stop, sticks });
         }
         let start = match &d.start {
             None => None,
             Some(start) if start.len() != n => {
                 let message = format!("{} numbers for {n} states", start.len());
-                return problem(key("start"), message, Some("give one for each state, in their order"));
+                return problem(
+                    key("start"),
+                    message,
+                    Some("give one for each state, in their order"),
+                );
             }
             Some(start) => {
                 let known: Vec<&str> = parameters.iter().map(|p| p.name.as_str()).collect();
-                let read = start.iter().enumerate().map(|(i, c)| parse(item(&key("start"), i), &c.text(), &known));
+                let read = start
+                    .iter()
+                    .enumerate()
+                    .map(|(i, c)| parse(item(&key("start"), i), &c.text(), &known));
                 Some(read.collect::<Result<_, _>>()?)
             }
         };
@@ -705,12 +758,21 @@ impl Definition {
         for (name, table) in &d.tables.0 {
             let place = inside(&inside(&key("tables"), name), "file");
             let file = std::path::Path::new(&table.file);
-            let plain = file.components().count() == 1 && file.file_name().is_some_and(|f| f == file.as_os_str());
+            let plain = file.components().count() == 1
+                && file.file_name().is_some_and(|f| f == file.as_os_str());
             if !plain {
-                return problem(place, "a table's file stands beside the system's, without folders", None);
+                return problem(
+                    place,
+                    "a table's file stands beside the system's, without folders",
+                    None,
+                );
             }
         }
-        let states = d.states.iter().map(|s| State { name: s.name.clone(), about: s.about.clone() }).collect();
+        let states = d
+            .states
+            .iter()
+            .map(|s| State { name: s.name.clone(), about: s.about.clone() })
+            .collect();
         let tables = d.tables.0.clone();
         Ok(Self { states, parameters, start, axes, terms, modes, events, tables, document })
     }
@@ -718,7 +780,8 @@ impl Definition {
 
 /// The names in `[let]` that stand for conditions.
 fn conditions<'a>(d: &'a Document, names: &[&str]) -> Vec<&'a str> {
-    // Read as if every term were a condition where one is wanted: what a term is does not depend on that.
+    // Read as if every term were a condition where one is wanted: what a term is does not depend on
+    // that.
     let terms: Vec<&str> = d.terms.0.iter().map(|(n, _)| n.as_str()).collect();
     let read = |text: &Constant| Expression::parse_general_with(&text.text(), names, &terms).ok();
     let parsed: Vec<Option<Expression>> = d.terms.0.iter().map(|(_, text)| read(text)).collect();
@@ -740,7 +803,8 @@ fn conditions<'a>(d: &'a Document, names: &[&str]) -> Vec<&'a str> {
 
 /// All names that expressions may use, each sound and given once, with its place.
 fn names(d: &Document) -> Result<Vec<(Place, &str)>, Problem> {
-    let states = d.states.iter().enumerate().map(|(i, s)| (item(&key("states"), i), s.name.as_str()));
+    let states =
+        d.states.iter().enumerate().map(|(i, s)| (item(&key("states"), i), s.name.as_str()));
     let under = |table: &'static str| move |n: &'_ str| inside(&key(table), n);
     let (of_parameters, of_terms, of_tables) = (under("parameters"), under("let"), under("tables"));
     let parameters = d.parameters.0.iter().map(|(n, _)| (of_parameters(n), n.as_str()));
@@ -761,7 +825,11 @@ fn names(d: &Document) -> Result<Vec<(Place, &str)>, Problem> {
         }
         if names.iter().any(|(_, n)| *n == name) {
             let message = format!("the name `{name}` is given twice");
-            return problem(place, message, Some("give every state, parameter, term and table its own name"));
+            return problem(
+                place,
+                message,
+                Some("give every state, parameter, term and table its own name"),
+            );
         }
         names.push((place, name));
     }
@@ -773,7 +841,8 @@ fn in_order(mut terms: Vec<(String, Expression)>) -> Result<Vec<(String, Express
     let mut done: Vec<(String, Expression)> = Vec::new();
     while !terms.is_empty() {
         let open: Vec<String> = terms.iter().map(|(n, _)| n.clone()).collect();
-        let ready = terms.iter().position(|(_, e)| !e.names().iter().any(|n| open.iter().any(|o| o == n)));
+        let ready =
+            terms.iter().position(|(_, e)| !e.names().iter().any(|n| open.iter().any(|o| o == n)));
         match ready {
             Some(i) => done.push(terms.remove(i)),
             None => {

@@ -1,8 +1,10 @@
 //! Switching functions found in plain equations.
 //!
-//! Every `sign`, `abs`, `min`, `max`, `if`, `heaviside`, `clip` and comparison asks on which side of zero some expression is; `floor` and `mod`
-//! ask between which whole numbers. These expressions are the system's switching functions. For fixed answers (a [`Configuration`]) the equations
-//! are smooth, and that is what is written on a [`Tape`] and evaluated: only the branches that hold are computed.
+//! Every `sign`, `abs`, `min`, `max`, `if`, `heaviside`, `clip` and comparison asks on which side
+//! of zero some expression is; `floor` and `mod` ask between which whole numbers. These expressions
+//! are the system's switching functions. For fixed answers (a [`Configuration`]) the equations are
+//! smooth, and that is what is written on a [`Tape`] and evaluated: only the branches that hold are
+//! computed.
 
 use std::collections::{BTreeMap, HashMap};
 use std::rc::Rc;
@@ -38,8 +40,8 @@ pub struct Configuration {
     pub pieces: Vec<usize>,
 }
 
-/// The equations for one structure of answers, ready for evaluation. Variables: states, time, answers, then for each table its knot and
-/// coefficients.
+/// The equations for one structure of answers, ready for evaluation. Variables: states, time,
+/// answers, then for each table its knot and coefficients.
 #[derive(Debug)]
 pub struct Compiled {
     /// The derivatives.
@@ -54,8 +56,9 @@ pub struct Compiled {
     place: Vec<Option<usize>>,
     /// Which variables each value depends on: derivatives, then watched values.
     depends: Vec<Vec<u64>>,
-    /// The states and the time that each watched value depends on, and for each of those variables a colour: no value depends on two of one colour,
-    /// so that one derivative a colour gives all gradients (Curtis, Powell & Reid 1974).
+    /// The states and the time that each watched value depends on, and for each of those variables
+    /// a colour: no value depends on two of one colour, so that one derivative a colour gives all
+    /// gradients (Curtis, Powell & Reid 1974).
     pub(crate) touches: Vec<Vec<usize>>,
     colours: Vec<usize>,
     /// Watched values that are sums of variables with constant factors.
@@ -93,7 +96,10 @@ pub enum EquationError {
     #[error(transparent)]
     Model(#[from] ModelError),
     /// A name in the place of a condition is none.
-    #[error("`{0}` stands where a condition is wanted, and is a number: compare it with something, such as {0} > 0")]
+    #[error(
+        "`{0}` stands where a condition is wanted, and is a number: compare it with something, \
+            such as {0} > 0"
+    )]
     NoCondition(String),
 }
 
@@ -145,29 +151,42 @@ impl Equation {
             known: Default::default(),
             definition,
         };
-        let fields: Vec<Expression> = equation.definition.modes.iter().flat_map(|m| m.field.clone()).collect();
-        let terms: Vec<Expression> = equation.definition.terms.iter().map(|(_, e)| e.clone()).collect();
+        let fields: Vec<Expression> =
+            equation.definition.modes.iter().flat_map(|m| m.field.clone()).collect();
+        let terms: Vec<Expression> =
+            equation.definition.terms.iter().map(|(_, e)| e.clone()).collect();
         for e in fields.iter().chain(&terms).chain(&watched) {
             equation.find(e, false)?;
         }
         for e in &conditions {
             equation.find(e, true)?;
         }
-        equation.resets = equation.definition.events.iter().map(|event| equation.reset(&event.set)).collect();
+        equation.resets =
+            equation.definition.events.iter().map(|event| equation.reset(&event.set)).collect();
         Ok(equation)
     }
 
-    /// Whether an expression is one of states, time and parameters, which no switching function decides.
+    /// Whether an expression is one of states, time and parameters, which no switching function
+    /// decides.
     fn is_plain(&self, e: &Expression) -> bool {
         let tables = &self.definition.tables;
-        !asks(e) && e.names().iter().all(|n| self.term(n).is_none() && !tables.iter().any(|(table, _)| table == n))
+        !asks(e)
+            && e.names()
+                .iter()
+                .all(|n| self.term(n).is_none() && !tables.iter().any(|(table, _)| table == n))
     }
 
     /// Plain expressions as a tape.
     fn record(&self, plain: &[&Expression]) -> Tape {
         let at = Configuration { mode: 0, sides: vec![1.0; self.guards.len()], pieces: Vec::new() };
         Tape::record(self.variables(), |v| {
-            let mut writer = Writer { equation: self, at: &at, v, terms: HashMap::new(), guards: BTreeMap::new() };
+            let mut writer = Writer {
+                equation: self,
+                at: &at,
+                v,
+                terms: HashMap::new(),
+                guards: BTreeMap::new(),
+            };
             plain.iter().map(|e| writer.number(e)).collect()
         })
     }
@@ -182,7 +201,8 @@ impl Equation {
         self.definition.states.len()
     }
 
-    /// Whether a guard chooses between expressions, so that its side changes the structure of the equations.
+    /// Whether a guard chooses between expressions, so that its side changes the structure of the
+    /// equations.
     pub(crate) fn chooses(&self, guard: usize) -> bool {
         self.guards[guard].chooses
     }
@@ -231,12 +251,18 @@ impl Equation {
                 _ => return Err(EquationError::NoCondition(name.clone())),
             },
             Expression::Greater(a, b) => self.register(difference(a, b), false, true),
-            Expression::Call(Function::Sign | Function::Abs, a) => self.register((**a).clone(), false, false),
+            Expression::Call(Function::Sign | Function::Abs, a) => {
+                self.register((**a).clone(), false, false)
+            }
             Expression::Apply(f, list) => match f {
                 General::Min | General::Max => {
                     // Each with the least or greatest before it.
                     for i in 1..list.len() {
-                        self.register(difference(&list[i], &self.folded(*f, &list[..i])), false, true);
+                        self.register(
+                            difference(&list[i], &self.folded(*f, &list[..i])),
+                            false,
+                            true,
+                        );
                     }
                 }
                 General::Clip => {
@@ -301,8 +327,9 @@ impl Equation {
         self.by_text.get(&key).map_or((0, flipped), |(i, other)| (*i, *other != flipped))
     }
 
-    /// An expression that has the same sign everywhere, or the other one, without what changes nothing about that: constant factors, odd powers, odd rising
-    /// functions, absolute values beside what they are of, divisors instead of factors.
+    /// An expression that has the same sign everywhere, or the other one, without what changes
+    /// nothing about that: constant factors, odd powers, odd rising functions, absolute values
+    /// beside what they are of, divisors instead of factors.
     fn bare(&self, e: &Expression) -> (Expression, bool) {
         let constant = |e: &Expression| -> Option<f64> {
             let fixed = |name: &str| self.values.contains_key(name);
@@ -319,7 +346,10 @@ impl Equation {
                 (Some(factor), _) => scaled(b, factor),
                 (_, Some(factor)) => scaled(a, factor),
                 _ => match (&**a, &**b) {
-                    (x, Expression::Call(Function::Abs, y)) | (Expression::Call(Function::Abs, y), x) if x == &**y => {
+                    (x, Expression::Call(Function::Abs, y))
+                    | (Expression::Call(Function::Abs, y), x)
+                        if x == &**y =>
+                    {
                         self.bare(x)
                     }
                     _ => (e.clone(), false),
@@ -332,12 +362,15 @@ impl Equation {
             },
             Expression::Power(a, n) if n % 2 != 0 => self.bare(a),
             Expression::Call(Function::Tanh | Function::Atan | Function::Erf, a) => self.bare(a),
-            Expression::Apply(General::Sinh | General::Asin, list) if list.len() == 1 => self.bare(&list[0]),
+            Expression::Apply(General::Sinh | General::Asin, list) if list.len() == 1 => {
+                self.bare(&list[0])
+            }
             other => (other.clone(), false),
         }
     }
 
-    /// A key that sums of the same states and time share in whatever scale and order they are written, and whether the sum is the key's negative.
+    /// A key that sums of the same states and time share in whatever scale and order they are
+    /// written, and whether the sum is the key's negative.
     fn sum_key(&self, e: &Expression) -> Option<(String, bool)> {
         if !self.is_plain(e) {
             return None;
@@ -348,13 +381,16 @@ impl Equation {
         let first = factors.first()?.1;
         // Without the last digit, in which the same ratio may differ.
         let scaled = |v: f64| format!("{:.14e}", v / first + 0.0);
-        let terms: Vec<String> = factors.iter().map(|(variable, f)| format!("{variable} {}", scaled(*f))).collect();
+        let terms: Vec<String> =
+            factors.iter().map(|(variable, f)| format!("{variable} {}", scaled(*f))).collect();
         Some((format!("sum {} {}", terms.join(" "), scaled(constant)), first < 0.0))
     }
 
     /// The switching functions as text, in the order of a point's signs.
     pub fn switching_functions(&self) -> Vec<String> {
-        let text = |g: &Guard| if g.whole { format!("floor({})", g.expression) } else { g.expression.to_string() };
+        let text = |g: &Guard| {
+            if g.whole { format!("floor({})", g.expression) } else { g.expression.to_string() }
+        };
         self.guards.iter().map(text).collect()
     }
 
@@ -365,7 +401,10 @@ impl Equation {
             Expression::Not(inner) => return self.switching(inner),
             other => self.bare(other).0.to_string(),
         };
-        self.by_text.get(&key).or_else(|| self.by_text.get(&format!("whole {key}"))).map(|(i, _)| *i)
+        self.by_text
+            .get(&key)
+            .or_else(|| self.by_text.get(&format!("whole {key}")))
+            .map(|(i, _)| *i)
     }
 
     /// Whether a condition holds in a configuration.
@@ -409,7 +448,9 @@ impl Equation {
     /// The equations for the structure of this configuration.
     pub fn compiled(&self, at: &Configuration) -> Rc<Compiled> {
         let mut key = vec![at.mode as i8];
-        key.extend(self.guards.iter().zip(&at.sides).filter(|(g, _)| g.chooses).map(|(_, s)| *s as i8));
+        key.extend(
+            self.guards.iter().zip(&at.sides).filter(|(g, _)| g.chooses).map(|(_, s)| *s as i8),
+        );
         if let Some(found) = self.known.borrow().get(&key) {
             return found.clone();
         }
@@ -427,7 +468,8 @@ impl Equation {
         let mut active = Vec::new();
         let n = self.dimension();
         let tape = Tape::record(self.variables(), |v| {
-            let mut writer = Writer { equation: self, at, v, terms: HashMap::new(), guards: BTreeMap::new() };
+            let mut writer =
+                Writer { equation: self, at, v, terms: HashMap::new(), guards: BTreeMap::new() };
             let mut outputs: Vec<Recorded> =
                 self.definition.modes[at.mode].field.iter().map(|e| writer.number(e)).collect();
             let watched: Vec<Recorded> = self.watched.iter().map(|e| writer.number(e)).collect();
@@ -438,7 +480,8 @@ impl Equation {
             }
             // A guard may ask others: until no new one is found.
             loop {
-                let open: Vec<usize> = writer.guards.iter().filter(|(_, g)| g.is_none()).map(|(i, _)| *i).collect();
+                let open: Vec<usize> =
+                    writer.guards.iter().filter(|(_, g)| g.is_none()).map(|(i, _)| *i).collect();
                 if open.is_empty() {
                     break;
                 }
@@ -456,20 +499,31 @@ impl Equation {
         });
         let outputs = n + active.len() + self.watched.len();
         let depends = dependencies(&tape);
-        let on = |value: usize, variable: usize| depends[value][variable / 64] & (1 << (variable % 64)) != 0;
-        let touches: Vec<Vec<usize>> = (n..outputs).map(|o| (0..=n).filter(|v| on(o, *v)).collect()).collect();
+        let on = |value: usize, variable: usize| {
+            depends[value][variable / 64] & (1 << (variable % 64)) != 0
+        };
+        let touches: Vec<Vec<usize>> =
+            (n..outputs).map(|o| (0..=n).filter(|v| on(o, *v)).collect()).collect();
         let (gates, watched_gates) = (gates(&tape.select(0..n)), gates(&tape.select(n..outputs)));
         Compiled {
             field: Program::new(&tape.select(0..n)),
             watched: Program::new(&tape.select(n..outputs)),
             outputs: outputs - n,
-            place: (0..self.guards.len()).map(|guard| active.iter().position(|a| *a == guard)).collect(),
+            place: (0..self.guards.len())
+                .map(|guard| active.iter().position(|a| *a == guard))
+                .collect(),
             affine: affine(&tape).split_off(n),
             colours: colours(&touches, n + 1),
             touches,
             depends,
-            gate_arguments: Program::new(&with_outputs(&tape, gates.iter().map(|(_, a)| *a).collect())),
-            watched_gate_arguments: Program::new(&with_outputs(&tape, watched_gates.iter().map(|(_, a)| *a).collect())),
+            gate_arguments: Program::new(&with_outputs(
+                &tape,
+                gates.iter().map(|(_, a)| *a).collect(),
+            )),
+            watched_gate_arguments: Program::new(&with_outputs(
+                &tape,
+                watched_gates.iter().map(|(_, a)| *a).collect(),
+            )),
             watched_gates: watched_gates.into_iter().map(|(gate, _)| gate).collect(),
             gates: gates.into_iter().map(|(gate, _)| gate).collect(),
             active,
@@ -477,7 +531,8 @@ impl Equation {
         }
     }
 
-    /// The domain that is left at a point: the first root, logarithm or division there whose value is no finite number, as words.
+    /// The domain that is left at a point: the first root, logarithm or division there whose value
+    /// is no finite number, as words.
     pub fn broken(&self, compiled: &Compiled, variables: &[f64]) -> Option<String> {
         use twofold_num::tape::Operation;
         let tape = compiled.tape.select(0..self.dimension());
@@ -492,7 +547,8 @@ impl Equation {
                 let what = match operation {
                     Operation::Sqrt(_) => "the square root of a negative number",
                     Operation::Ln(_) if makes_a_power(&tape, node) => {
-                        "a power whose exponent is no whole number, of a number that is not positive (an odd root of one is sign(x)*abs(x)^(1/3))"
+                        "a power whose exponent is no whole number, of a number that is not \
+                            positive (an odd root of one is sign(x)*abs(x)^(1/3))"
                     }
                     Operation::Ln(_) => "the logarithm of a number that is not positive",
                     Operation::Div(..) => "a division by zero",
@@ -500,7 +556,9 @@ impl Equation {
                 };
                 // The component that it spoils, and the expression that is written there.
                 let spoilt = self.definition.modes.iter().flat_map(|m| m.field.iter().enumerate());
-                let place = spoilt.zip(tape.outputs().iter().cycle()).find(|(_, out)| !values[**out].is_finite());
+                let place = spoilt
+                    .zip(tape.outputs().iter().cycle())
+                    .find(|(_, out)| !values[**out].is_finite());
                 return Some(match place {
                     Some(((i, e), _)) => format!("{what}, in the equation of {}, `{e}`", names[i]),
                     None => what.into(),
@@ -515,7 +573,10 @@ impl Equation {
 fn makes_a_power(tape: &Tape, logarithm: usize) -> bool {
     use twofold_num::tape::Operation::{Exp, Mul};
     let operations = tape.operations();
-    let is_factor = |product: usize| matches!(operations[product], Mul(a, b) if a == logarithm || b == logarithm);
+    let is_factor = |product: usize| {
+        matches!(operations[product], Mul(a,
+        b) if a == logarithm || b == logarithm)
+    };
     operations.iter().any(|o| matches!(o, Exp(product) if is_factor(*product)))
 }
 
@@ -660,7 +721,8 @@ fn affine(tape: &Tape) -> Vec<Option<Affine>> {
     tape.outputs().iter().map(|node| of[*node].clone()).collect()
 }
 
-/// Colours of variables, so that no list has two of one colour: the smallest that is free, one variable after the other.
+/// Colours of variables, so that no list has two of one colour: the smallest that is free, one
+/// variable after the other.
 fn colours(lists: &[Vec<usize>], variables: usize) -> Vec<usize> {
     let mut member = vec![Vec::new(); variables];
     lists.iter().enumerate().for_each(|(i, list)| list.iter().for_each(|v| member[*v].push(i)));
@@ -684,11 +746,13 @@ impl Compiled {
 
     /// The derivatives of the watched values by the variables that each [touches](Self::touches).
     pub(crate) fn gradients(&self, variables: &[f64]) -> Vec<Vec<f64>> {
-        let mut gradients: Vec<Vec<f64>> = self.touches.iter().map(|list| vec![0.0; list.len()]).collect();
+        let mut gradients: Vec<Vec<f64>> =
+            self.touches.iter().map(|list| vec![0.0; list.len()]).collect();
         let colours = self.colours.iter().max().map_or(0, |most| most + 1);
         let mut out = vec![Dual::<f64, WIDE>::constant(0.0); self.outputs];
         for from in (0..colours).step_by(WIDE) {
-            let mut duals: Vec<Dual<f64, WIDE>> = variables.iter().map(|v| Dual::constant(*v)).collect();
+            let mut duals: Vec<Dual<f64, WIDE>> =
+                variables.iter().map(|v| Dual::constant(*v)).collect();
             for (dual, colour) in duals.iter_mut().zip(&self.colours) {
                 if (from..from + WIDE).contains(colour) {
                     dual.partials[colour - from] = 1.0;
@@ -762,7 +826,8 @@ struct Writer<'a> {
 }
 
 impl Writer<'_> {
-    /// Asks on which side of zero an expression is: the answer's variable and whether it is to be mirrored.
+    /// Asks on which side of zero an expression is: the answer's variable and whether it is to be
+    /// mirrored.
     fn ask(&mut self, e: &Expression, whole: bool) -> (usize, bool) {
         let (i, flipped) = self.equation.guard(e, whole);
         self.guards.entry(i).or_insert(None);
@@ -844,9 +909,10 @@ impl Writer<'_> {
                 let value = self.number(a);
                 f.apply(value)
             }
-            Expression::Greater(..) | Expression::And(..) | Expression::Or(..) | Expression::Not(_) => {
-                Recorded::from_f64(if self.condition(e) { 1.0 } else { 0.0 })
-            }
+            Expression::Greater(..)
+            | Expression::And(..)
+            | Expression::Or(..)
+            | Expression::Not(_) => Recorded::from_f64(if self.condition(e) { 1.0 } else { 0.0 }),
             Expression::Apply(f, list) => self.apply(*f, list),
         }
     }
@@ -864,7 +930,11 @@ impl Writer<'_> {
                 }
                 let before = self.equation.folded(f, &list[..last]);
                 let greater = self.positive(&difference(&list[last], &before));
-                if greater == (f == General::Max) { self.number(&list[last]) } else { self.number(&before) }
+                if greater == (f == General::Max) {
+                    self.number(&list[last])
+                } else {
+                    self.number(&before)
+                }
             }
             General::Clip => {
                 if !self.positive(&difference(&list[0], &list[1])) {
@@ -886,7 +956,8 @@ impl Writer<'_> {
                 let right = self.positive(&list[1]);
                 let up = if right { true } else { self.positive(&list[0]) };
                 let (y, x) = (self.number(&list[0]), self.number(&list[1]));
-                // To the right the half angle keeps away from its branch; to the left it is measured from the axis.
+                // To the right the half angle keeps away from its branch; to the left it is
+                // measured from the axis.
                 let r = (x * x + y * y).sqrt();
                 match (right, up) {
                     (true, _) => (y / (r + x)).atan().scale(2.0),

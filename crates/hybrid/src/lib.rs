@@ -1,9 +1,10 @@
 //! General piecewise-smooth and hybrid systems.
 //!
-//! A system is written as plain equations: `f = [...]`, in which `sign`, `abs`, `min`, `max`, `if`, `heaviside`, `floor`, `mod`, `clip` and comparisons
-//! are [switching functions](definition). They are found in the expressions ([`equation`]), located as motion meets them, crossed or slid upon as
-//! Filippov's convention says ([`selection`]). Events reset states and change modes; tables bring data. [`motion`] follows all of it exactly: no step
-//! runs across a switch.
+//! A system is written as plain equations: `f = [...]`, in which `sign`, `abs`, `min`, `max`, `if`,
+//! `heaviside`, `floor`, `mod`, `clip` and comparisons are [switching functions](definition). They
+//! are found in the expressions ([`equation`]), located as motion meets them, crossed or slid upon
+//! as Filippov's convention says ([`selection`]). Events reset states and change modes; tables
+//! bring data. [`motion`] follows all of it exactly: no step runs across a switch.
 //!
 //! ```
 //! use twofold_hybrid::{Definition, Model, Options, follow};
@@ -22,14 +23,16 @@
 //!     impacts.extend(point.event.map(|_| point.t));
 //!     true
 //! })?;
-//! assert!((impacts[0] - 1.0).abs() < 1e-12 && (impacts[1] - 1.0).abs() < 1e-12); // before and after the reset
+//! // Before and after the reset.
+//! assert!((impacts[0] - 1.0).abs() < 1e-12 && (impacts[1] - 1.0).abs() < 1e-12);
 //! assert!((impacts[2] - 2.0).abs() < 1e-12);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 // Indices are those of states; comparisons that fail for what is no number are meant so.
 #![allow(clippy::needless_range_loop, clippy::neg_cmp_op_on_partial_ord, clippy::nonminimal_bool)]
-#![cfg_attr(test, allow(clippy::disallowed_methods))] // tests compare with tolerances, not with hashes
+// tests compare with tolerances, not with hashes
+#![cfg_attr(test, allow(clippy::disallowed_methods))]
 #![forbid(unsafe_code)]
 
 pub mod data;

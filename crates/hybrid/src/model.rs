@@ -79,7 +79,8 @@ impl Model {
 
     /// Another definition with the same data for its tables, or what is wrong with it.
     pub(crate) fn redefined(&self, document: Document) -> Result<Self, String> {
-        let definition = Arc::new(Definition::from_document(document).map_err(|problem| problem.message)?);
+        let definition =
+            Arc::new(Definition::from_document(document).map_err(|problem| problem.message)?);
         Ok(Self { definition, given: BTreeMap::new(), tables: self.tables.clone() })
     }
 
@@ -147,20 +148,23 @@ impl Model {
         crate::Equation::new(self, None).is_ok_and(|equation| equation.depends_on_time())
     }
 
-    /// What decides the system's numbers, as data: what the file says, with these values, and the tables' points.
+    /// What decides the system's numbers, as data: what the file says, with these values, and the
+    /// tables' points.
     pub fn json(&self) -> Value {
         let mut document = serde_json::to_value(&self.definition.document).unwrap_or_default();
         for (name, value) in &self.given {
             document["parameters"][name] = json!(value);
         }
         for (name, table) in &self.tables {
-            document["tables"][name]["data"] = json!({ "knots": table.knots, "pieces": table.pieces });
+            document["tables"][name]["data"] =
+                json!({ "knots": table.knots, "pieces": table.pieces });
         }
         document
     }
 }
 
-/// The value of an expression in `f64` with the value of each name; not-a-number where a name has none.
+/// The value of an expression in `f64` with the value of each name; not-a-number where a name has
+/// none.
 pub fn evaluate(e: &Expression, name: &dyn Fn(&str) -> Option<f64>) -> f64 {
     let at = |e: &Expression| evaluate(e, name);
     let truth = |holds: bool| if holds { 1.0 } else { 0.0 };
@@ -182,8 +186,12 @@ pub fn evaluate(e: &Expression, name: &dyn Fn(&str) -> Option<f64>) -> f64 {
         Expression::Not(a) => truth(at(a) == 0.0),
         Expression::Apply(f, list) => match f {
             General::If => at(&list[if at(&list[0]) != 0.0 { 1 } else { 2 }]),
-            General::Min => list.iter().map(at).reduce(|a, b| if b < a { b } else { a }).unwrap_or(f64::NAN),
-            General::Max => list.iter().map(at).reduce(|a, b| if b > a { b } else { a }).unwrap_or(f64::NAN),
+            General::Min => {
+                list.iter().map(at).reduce(|a, b| if b < a { b } else { a }).unwrap_or(f64::NAN)
+            }
+            General::Max => {
+                list.iter().map(at).reduce(|a, b| if b > a { b } else { a }).unwrap_or(f64::NAN)
+            }
             General::Heaviside => truth(at(&list[0]) >= 0.0),
             General::Floor => at(&list[0]).floor(),
             General::Mod => {
@@ -201,9 +209,12 @@ pub fn evaluate(e: &Expression, name: &dyn Fn(&str) -> Option<f64>) -> f64 {
                 }
             }
             General::Atan2 => elementary::atan2(at(&list[0]), at(&list[1])),
-            General::Sinh | General::Cosh | General::Asin | General::Acos | General::Log10 | General::Log => {
-                smooth(*f, at(&list[0]))
-            }
+            General::Sinh
+            | General::Cosh
+            | General::Asin
+            | General::Acos
+            | General::Log10
+            | General::Log => smooth(*f, at(&list[0])),
         },
     }
 }
@@ -213,7 +224,8 @@ fn real_power<S: twofold_num::Elementary>(a: S, b: S) -> S {
     (b * a.ln()).exp()
 }
 
-/// A smooth function of one number made of those that every number type has. Sinh through tanh keeps its digits near zero.
+/// A smooth function of one number made of those that every number type has. Sinh through tanh
+/// keeps its digits near zero.
 pub(crate) fn smooth<S: twofold_num::Elementary>(f: General, x: S) -> S {
     let number = S::from_f64;
     let cosh = |x: S| {

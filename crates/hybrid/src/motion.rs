@@ -1,8 +1,9 @@
 //! Following a general system exactly: from switch to switch, from event to event.
 //!
-//! Between switches the equations are smooth and a step of one of the methods is made. Every step is searched for the first
-//! zero of all switching functions, events' expressions and limits of sliding; it is made again to end there, and
-//! [what happens there](crate::selection) is decided from the equations on both sides.
+//! Between switches the equations are smooth and a step of one of the methods is made. Every step
+//! is searched for the first zero of all switching functions, events' expressions and limits of
+//! sliding; it is made again to end there, and [what happens there](crate::selection) is decided
+//! from the equations on both sides.
 
 mod clock;
 mod meeting;
@@ -28,7 +29,9 @@ use crate::definition::{Direction, When};
 use crate::equation::{Compiled, Configuration, Equation, EquationError};
 use crate::model::Model;
 use crate::roots::{PLACES, at_fraction, first, first_of_polynomial, first_of_series, stays};
-use crate::selection::{Intersection, MOST_TOGETHER, Mixture, Way, groups, mixture, nearest_of_hull, possibilities};
+use crate::selection::{
+    Intersection, MOST_TOGETHER, Mixture, Way, groups, mixture, nearest_of_hull, possibilities,
+};
 use crate::step::Step;
 
 /// What is recorded.
@@ -139,7 +142,8 @@ pub struct Point<'a> {
     pub x: &'a [f64],
     /// The mode's number.
     pub mode: usize,
-    /// For each switching function +, - or 0 (slid upon); . where the equations do not ask it here. Whole parts stand as #.
+    /// For each switching function +, - or 0 (slid upon); . where the equations do not ask it here.
+    /// Whole parts stand as #.
     pub signs: &'a str,
     /// The event that happens here.
     pub event: Option<&'a str>,
@@ -203,7 +207,10 @@ pub enum HybridError {
     NoOrbit(String),
     /// Several continuations.
     #[error(
-        "the motion is not decided at t = {t}, state {x:?}: on {surfaces} it can go on in more than one way ({ways}). Nothing is chosen here: end the run before that time (--t-end), start elsewhere (--start), change a parameter (--set), choose a side (--exit at-once:plus or at-once:minus), or of mixtures one (--intersection)"
+        "the motion is not decided at t = {t}, state {x:?}: on {surfaces} it can go on in more \
+            than one way ({ways}). Nothing is chosen here: end the run before that time (--t-end), \
+            start elsewhere (--start), change a parameter (--set), choose a side (--exit \
+            at-once:plus or at-once:minus), or of mixtures one (--intersection)"
     )]
     Undecided {
         /// When.
@@ -227,7 +234,8 @@ pub enum HybridError {
     },
     /// A domain is left.
     #[error(
-        "the motion leaves the domain of the equations at t = {t}, state {x:?}: {what}. End the run before that time (--t-end), or start elsewhere (--start)"
+        "the motion leaves the domain of the equations at t = {t}, state {x:?}: {what}. End the \
+            run before that time (--t-end), or start elsewhere (--start)"
     )]
     Domain {
         /// When.
@@ -239,7 +247,9 @@ pub enum HybridError {
     },
     /// Switches accumulate.
     #[error(
-        "switches at {surfaces} accumulate at t = {t} (error at most {error:e}), state {x:?}, and nothing says how motion goes on: end the run before that time (--t-end), or describe what holds there by an [[event]]"
+        "switches at {surfaces} accumulate at t = {t} (error at most {error:e}), state {x:?}, and \
+            nothing says how motion goes on: end the run before that time (--t-end), or describe \
+            what holds there by an [[event]]"
     )]
     Accumulation {
         /// When.
@@ -280,7 +290,8 @@ enum Sought {
     Watched(usize),
     /// A watched expression that changes its sign through a pole.
     Pole(usize),
-    /// A weight of sliding: the surface's place among those slid upon, and whether it is left to the positive side.
+    /// A weight of sliding: the surface's place among those slid upon, and whether it is left to
+    /// the positive side.
     Leave { place: usize, plus: bool },
     /// Sliding stops being attracting.
     Repelling,
@@ -304,8 +315,8 @@ impl Train {
         }
     }
 
-    /// Notes one more; gives the time at which infinitely many are over, with a bound on its error, once that is known. Times that are less than
-    /// `grain` apart are not told apart reliably.
+    /// Notes one more; gives the time at which infinitely many are over, with a bound on its error,
+    /// once that is known. Times that are less than `grain` apart are not told apart reliably.
     fn note(&mut self, t: f64, grain: f64) -> Option<(f64, f64)> {
         self.times.push(t);
         let rounding = 4.0 * f64::EPSILON * t.abs();
@@ -334,7 +345,8 @@ impl Train {
         let steady = (g1 / g2 - g2 / g3).abs() < 0.1 && g1 / g2 < 0.999;
         (steady
             && left >= 0.0
-            && (g1 <= grain || left <= 1e-8 * (self.times[n - 1] - self.times[0]).max(1e-4 * t.abs()))
+            && (g1 <= grain
+                || left <= 1e-8 * (self.times[n - 1] - self.times[0]).max(1e-4 * t.abs()))
             && error <= 0.1 * left.max(1e-13 * t.abs()))
         .then_some((now, error))
     }
@@ -371,18 +383,22 @@ struct Follower<'a> {
     compiled: Rc<Compiled>,
     /// States, time, answers, tables: what programs read.
     variables: Vec<f64>,
-    /// Guards that are slid upon, and for each the configuration on its positive side (all others slid upon on their negative one).
+    /// Guards that are slid upon, and for each the configuration on its positive side (all others
+    /// slid upon on their negative one).
     sliding: Vec<usize>,
     /// Whether each guard is slid upon.
     slides: Vec<bool>,
-    /// For each guard that is slid upon the side whose field runs along the surface, so that its weight is one to rounding; else 0.
+    /// For each guard that is slid upon the side whose field runs along the surface, so that its
+    /// weight is one to rounding; else 0.
     along: Vec<f64>,
     base: Vec<(Rc<Compiled>, Vec<f64>)>,
-    /// Where mixtures differ: the fields on all sides of the surfaces slid upon, for the rule that chooses among them.
+    /// Where mixtures differ: the fields on all sides of the surfaces slid upon, for the rule that
+    /// chooses among them.
     corners: Vec<(Rc<Compiled>, Vec<f64>)>,
     /// The surfaces of [`Intersection::Order`].
     order: Vec<usize>,
-    /// Surfaces slid upon that know nothing of each other: the one that each state's derivative depends on.
+    /// Surfaces slid upon that know nothing of each other: the one that each state's derivative
+    /// depends on.
     separate: Option<Vec<Option<usize>>>,
     contacts: Vec<Contact>,
     /// Whether the motion has come to a point that it does not leave.
@@ -394,7 +410,8 @@ struct Follower<'a> {
     /// Guards and watched expressions that left zero at the step's beginning.
     fresh_guard: Vec<bool>,
     fresh_watch: Vec<bool>,
-    /// Of each guard whose zero was slid upon until now, by how much the speeds of its two sides differ.
+    /// Of each guard whose zero was slid upon until now, by how much the speeds of its two sides
+    /// differ.
     left: Vec<f64>,
     /// The event of each watched expression; none for a section.
     event_of: Vec<Option<usize>>,
@@ -422,8 +439,8 @@ struct Follower<'a> {
 /// Follows a system and gives each recorded point to `observe`, which says whether more is wanted.
 ///
 /// # Errors
-/// If the equations are not complete, motion is not decided or leaves their domain, or the budget of steps is used up. What was recorded until then has
-/// been given to `observe`.
+/// If the equations are not complete, motion is not decided or leaves their domain, or the budget
+/// of steps is used up. What was recorded until then has been given to `observe`.
 pub fn follow(
     model: &Model,
     options: &Options,
@@ -432,7 +449,8 @@ pub fn follow(
     follow_watched(model, options, observe, &|_| true)
 }
 
-/// [`follow`], with a word on the time `reached` now and then, whether or not something is recorded; it says whether more is wanted.
+/// [`follow`], with a word on the time `reached` now and then, whether or not something is
+/// recorded; it says whether more is wanted.
 ///
 /// # Errors
 /// As [`follow`].
@@ -458,7 +476,8 @@ fn scale_now(follower: &Follower, step: &Step, out: &mut Vec<f64>) {
         let size = step.x[i].abs().max(step.y[i].abs());
         match options.atol {
             Some(atol) => atol + options.rtol * size,
-            // By the state's own size; from zero on by what it moves in this step, or in a millionth of the run.
+            // By the state's own size; from zero on by what it moves in this step, or in a
+            // millionth of the run.
             None => {
                 let moved = (step.y[i] - step.x[i]).abs();
                 let speed = step.k.iter().map(|k| k[i].abs()).fold(0.0, f64::max);
@@ -478,23 +497,38 @@ fn order(equation: &Equation, rule: &Intersection) -> Result<Vec<usize>, HybridE
     for e in named {
         let found = equation.switching(e).filter(|guard| !order.contains(guard));
         order.push(found.ok_or_else(|| {
-            let known: Vec<String> = equation.guards.iter().map(|g| g.expression.to_string()).collect();
+            let known: Vec<String> =
+                equation.guards.iter().map(|g| g.expression.to_string()).collect();
             let known = if known.is_empty() { "none".into() } else { known.join(", ") };
-            let why = if equation.switching(e).is_some() { "stands twice" } else { "is no switching function" };
-            HybridError::Bad(format!("--intersection order: `{e}` {why}; give those that may meet, of {known}"))
+            let why = if equation.switching(e).is_some() {
+                "stands twice"
+            } else {
+                "is no switching function"
+            };
+            HybridError::Bad(format!(
+                "--intersection order: `{e}` {why}; give those that may meet, of {known}"
+            ))
         })?);
     }
     Ok(order)
 }
 
 /// Where a brief step of length `h` of the classical method of order 4 ends (Kutta 1901).
-fn a_little_later(field: &mut dyn FnMut(f64, &[f64]) -> Vec<f64>, t: f64, x: &[f64], h: f64) -> Vec<f64> {
-    let ahead = |by: f64, slope: &[f64]| -> Vec<f64> { x.iter().zip(slope).map(|(x, f)| x + by * f).collect() };
+fn a_little_later(
+    field: &mut dyn FnMut(f64, &[f64]) -> Vec<f64>,
+    t: f64,
+    x: &[f64],
+    h: f64,
+) -> Vec<f64> {
+    let ahead = |by: f64, slope: &[f64]| -> Vec<f64> {
+        x.iter().zip(slope).map(|(x, f)| x + by * f).collect()
+    };
     let k1 = field(t, x);
     let k2 = field(t + 0.5 * h, &ahead(0.5 * h, &k1));
     let k3 = field(t + 0.5 * h, &ahead(0.5 * h, &k2));
     let k4 = field(t + h, &ahead(h, &k3));
-    let mean: Vec<f64> = (0..x.len()).map(|i| (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]) / 6.0).collect();
+    let mean: Vec<f64> =
+        (0..x.len()).map(|i| (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]) / 6.0).collect();
     ahead(h, &mean)
 }
 
@@ -538,7 +572,9 @@ impl<'a> Follower<'a> {
         let x = match &options.start {
             Some(x) => x.clone(),
             None => model.start().map_err(EquationError::from)?.ok_or_else(|| {
-                HybridError::Start(format!("the system suggests no initial state; give one by --start, {n} numbers"))
+                HybridError::Start(format!(
+                    "the system suggests no initial state; give one by --start, {n} numbers"
+                ))
             })?,
         };
         if x.len() != n || !x.iter().all(|v| v.is_finite()) {
@@ -549,26 +585,33 @@ impl<'a> Follower<'a> {
         }
         let modes = model.definition().modes().len();
         if options.mode >= modes.max(1) {
-            return Err(HybridError::Start(format!("there is no mode number {}: there are {modes}", options.mode)));
+            return Err(HybridError::Start(format!(
+                "there is no mode number {}: there are {modes}",
+                options.mode
+            )));
         }
         let (t0, t1) = (options.t_start, options.t_end);
         if !(t0.is_finite() && t1.is_finite() && t1 > t0) {
             return Err(HybridError::Bad(format!(
-                "the run goes from t = {t0} to {t1}: give an end time after the start (--t-end, --t-start)"
+                "the run goes from t = {t0} to {t1}: give an end time after the start (--t-end, \
+                    --t-start)"
             )));
         }
         for ((name, entry), table) in model.definition().tables().iter().zip(&equation.tables) {
             let (first, last) = table.range();
             if t0 < first || t1 > last {
                 return Err(HybridError::Bad(format!(
-                    "the table `{name}` ({}) goes from t = {first} to {last}, and the run from {t0} to {t1}: stay within it (--t-start, --t-end)",
+                    "the table `{name}` ({}) goes from t = {first} to {last}, and the run from \
+                        {t0} to {t1}: stay within it (--t-start, --t-end)",
                     entry.file
                 )));
             }
         }
         let events = model.definition().events();
         let mut event_of: Vec<Option<usize>> = Vec::new();
-        event_of.extend((0..events.len()).filter(|i| matches!(events[*i].when, When::Zero(..))).map(Some));
+        event_of.extend(
+            (0..events.len()).filter(|i| matches!(events[*i].when, When::Zero(..))).map(Some),
+        );
         event_of.resize(equation.watched.len(), None);
         let config = Configuration {
             mode: options.mode,
@@ -638,7 +681,10 @@ impl<'a> Follower<'a> {
     }
 
     /// The run, and the follower as it is at its end.
-    fn run_whole(mut self, observe: &mut dyn FnMut(&Point) -> bool) -> Result<(Outcome, Self), HybridError> {
+    fn run_whole(
+        mut self,
+        observe: &mut dyn FnMut(&Point) -> bool,
+    ) -> Result<(Outcome, Self), HybridError> {
         let ending = self.run(observe)?;
         self.outcome.ending = ending;
         self.outcome.t = self.t;
@@ -723,7 +769,9 @@ impl<'a> Follower<'a> {
             if to_stop {
                 wanted = stop - self.t;
             }
-            let Some(Accepted { length: wanted, error, parts, rejected }) = self.step_within(&mut step, wanted) else {
+            let Some(Accepted { length: wanted, error, parts, rejected }) =
+                self.step_within(&mut step, wanted)
+            else {
                 if self.land_at_an_edge()? {
                     continue;
                 }
@@ -737,15 +785,25 @@ impl<'a> Follower<'a> {
             let h_next = match self.options.method {
                 // The next step's series says it.
                 Method::Taylor => f64::INFINITY,
-                _ => wanted * if error > 0.0 { (0.9 * rough_pow(error, -0.2)).clamp(0.2, most) } else { most },
+                _ => {
+                    wanted
+                        * if error > 0.0 {
+                            (0.9 * rough_pow(error, -0.2)).clamp(0.2, most)
+                        } else {
+                            most
+                        }
+                }
             };
             self.sought(&step, &mut list);
             let found = self.find(&step, &list, &parts, &mut last_values);
             let earliest = found.iter().map(|(theta, _)| *theta).fold(f64::INFINITY, f64::min);
             // Together is what no rounding of the time tells apart.
             let together = (64.0 * f64::EPSILON * self.t.abs().max(wanted) / wanted).min(1e-9);
-            let mut met: Vec<Sought> =
-                found.iter().filter(|(theta, _)| *theta <= earliest + together).map(|(_, sought)| *sought).collect();
+            let mut met: Vec<Sought> = found
+                .iter()
+                .filter(|(theta, _)| *theta <= earliest + together)
+                .map(|(_, sought)| *sought)
+                .collect();
             if earliest.is_finite() {
                 self.tell_poles(&step, earliest, &mut met);
                 self.land(&mut step, earliest * wanted, wanted, met[0]);
@@ -786,7 +844,10 @@ impl<'a> Follower<'a> {
             }
             quiet = if progress { 0 } else { quiet + 1 };
             if quiet > 40 {
-                let why = "the same surface is met again and again without time passing: the motion there is not resolved; smooth the switch, or describe what holds there by an [[event]]".into();
+                let why = "the same surface is met again and again without time passing: the \
+                    motion there is not resolved; smooth the switch, or describe what holds there \
+                    by an [[event]]"
+                    .into();
                 return Err(HybridError::Stuck { t: self.t, x: self.x.clone(), why });
             }
             let rounding = 4.0 * f64::EPSILON * self.t.abs().max(length);
@@ -810,7 +871,8 @@ impl<'a> Follower<'a> {
         }
     }
 
-    /// Makes a step of at most this length that the tolerance allows and that has seen what there is; none if none is short enough.
+    /// Makes a step of at most this length that the tolerance allows and that has seen what there
+    /// is; none if none is short enough.
     fn step_within(&mut self, step: &mut Step, longest: f64) -> Option<Accepted> {
         let mut scale = std::mem::take(&mut self.scale);
         let accepted = self.step_in_units(step, longest, &mut scale);
@@ -818,14 +880,20 @@ impl<'a> Follower<'a> {
         accepted
     }
 
-    fn step_in_units(&mut self, step: &mut Step, longest: f64, scale: &mut Vec<f64>) -> Option<Accepted> {
+    fn step_in_units(
+        &mut self,
+        step: &mut Step,
+        longest: f64,
+        scale: &mut Vec<f64>,
+    ) -> Option<Accepted> {
         let mut length = longest;
         let mut noise = None;
         for tried in 0..=MOST_SHORTENINGS {
             step.take(length, &mut |t, x, out| self.rhs(t, x, out));
             scale_now(self, step, scale);
             if (tried > 0 || self.noisy) && length <= 1e8 * f64::EPSILON * self.t.abs() {
-                // Whether it is the rounding of the time that keeps the error large, as in the step before.
+                // Whether it is the rounding of the time that keeps the error large, as in the step
+                // before.
                 let noise = noise.get_or_insert_with(|| self.noise_of_time(step));
                 scale.iter_mut().zip(noise).for_each(|(s, noise)| *s += 4.0 * length * *noise);
             }
@@ -865,7 +933,8 @@ impl<'a> Follower<'a> {
         before.iter().zip(&after).map(|(a, b)| (b - a).abs()).collect()
     }
 
-    /// What is met first in a step, with its place and all else in the same part of the step; `last` takes the values where the search ends.
+    /// What is met first in a step, with its place and all else in the same part of the step;
+    /// `last` takes the values where the search ends.
     fn find(
         &mut self,
         step: &Step,
@@ -907,11 +976,19 @@ impl<'a> Follower<'a> {
             for (j, (sought, side)) in list.iter().enumerate() {
                 if let Some(c) = self.series_of(step, *sought, parts.len() <= 1) {
                     // Of the two ends of a whole part one is left.
-                    let far = matches!(sought, Sought::Guard { guard, .. } if self.equation.guards[*guard].whole && c[0] > 0.5);
+                    let far = matches!(sought, Sought::Guard { guard,
+                        .. } if self.equation.guards[*guard].whole && c[0] > 0.5);
                     let begins = (self.is_fresh(*sought) && !far).then(|| {
-                        let terms = self.place_of(*sought).and_then(|place| terms.get(place)).unwrap_or(&0.0);
+                        let terms = self
+                            .place_of(*sought)
+                            .and_then(|place| terms.get(place))
+                            .unwrap_or(&0.0);
                         // What leaves sliding is tangent to the surface.
-                        let left = if let Sought::Guard { guard, .. } = sought { self.left[*guard] } else { 0.0 };
+                        let left = if let Sought::Guard { guard, .. } = sought {
+                            self.left[*guard]
+                        } else {
+                            0.0
+                        };
                         SMALLEST_SLOPE * step.h * terms.max(left)
                     });
                     let place = first_of_series(&c, *side, begins);
@@ -1018,19 +1095,34 @@ impl<'a> Follower<'a> {
             return Vec::new();
         }
         let (compiled, rates) = self.rates(&config);
-        let passes = |i: &usize| rates.direction(compiled.active.len() + i) * self.watch_side[*i] < 0.0;
+        let passes =
+            |i: &usize| rates.direction(compiled.active.len() + i) * self.watch_side[*i] < 0.0;
         near.into_iter().filter(passes).map(Sought::Watched).collect()
     }
 
     fn emit(&self, t: f64, event: Option<&str>, observe: &mut dyn FnMut(&Point) -> bool) -> bool {
-        observe(&Point { t, x: &self.x, mode: self.config.mode, signs: &self.signs, event, direction: None })
+        observe(&Point {
+            t,
+            x: &self.x,
+            mode: self.config.mode,
+            signs: &self.signs,
+            event,
+            direction: None,
+        })
     }
 
     /// Records a step; says whether more is wanted.
     fn record(&mut self, step: &Step, end: f64, observe: &mut dyn FnMut(&Point) -> bool) -> bool {
         let mut at = vec![0.0; self.n];
         let mut give = |t: f64, x: &[f64]| {
-            observe(&Point { t, x, mode: self.config.mode, signs: &self.signs, event: None, direction: None })
+            observe(&Point {
+                t,
+                x,
+                mode: self.config.mode,
+                signs: &self.signs,
+                event: None,
+                direction: None,
+            })
         };
         match self.options.record {
             Record::Times { every } => {

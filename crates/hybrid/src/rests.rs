@@ -1,10 +1,12 @@
 //! Rests: states that do not move, in the fields and on switching surfaces.
 //!
-//! An equilibrium is a zero of a field on its own side of all switching functions. A *pseudo-equilibrium* is a zero of the sliding field: a point of
-//! one surface, or of several at once, where a mixture of the fields around it vanishes (Filippov 1988, sec. 17; Kuznetsov, Rinaldi & Gragnani
-//! 2003). On several surfaces the weights are products, one factor a surface (Alexander & Seidman 1998). Newton's method looks for both from many
-//! places of a box. It takes the least step where the equations leave a direction open; rests that fill a curve, such as a block that sticks within
-//! friction, are followed to both ends.
+//! An equilibrium is a zero of a field on its own side of all switching functions. A
+//! *pseudo-equilibrium* is a zero of the sliding field: a point of one surface, or of several at
+//! once, where a mixture of the fields around it vanishes (Filippov 1988, sec. 17; Kuznetsov,
+//! Rinaldi & Gragnani 2003). On several surfaces the weights are products, one factor a surface
+//! (Alexander & Seidman 1998). Newton's method looks for both from many places of a box. It takes
+//! the least step where the equations leave a direction open; rests that fill a curve, such as a
+//! block that sticks within friction, are followed to both ends.
 
 use twofold_num::Dual;
 use twofold_num::elementary::sqrt;
@@ -43,27 +45,32 @@ pub struct Rest {
     pub mode: usize,
     /// The switching surfaces on which it lies; none in a field.
     pub on: Vec<On>,
-    /// Whether motion near by comes to all of these surfaces, however fast each of them switches; nothing where that decides.
+    /// Whether motion near by comes to all of these surfaces, however fast each of them switches;
+    /// nothing where that decides.
     pub attracting: Option<bool>,
     /// The set of rests to which it belongs, if it is not isolated.
     pub family: Option<Family>,
     /// Eigenvalues of the linearised motion, on surfaces along them: real and imaginary parts.
     pub eigenvalues: Vec<[f64; 2]>,
-    /// By how much an eigenvalue may be off, the state being known to 1e-9 of the box: at a double root none has a sign.
+    /// By how much an eigenvalue may be off, the state being known to 1e-9 of the box: at a double
+    /// root none has a sign.
     pub blur: f64,
-    /// A further switching function that is zero there: the equations change, and eigenvalues are those of one side.
+    /// A further switching function that is zero there: the equations change, and eigenvalues are
+    /// those of one side.
     pub boundary: Option<String>,
-    /// An event behind whose surface it lies: motion that comes from the other side is changed before. Only a start behind it comes to the rest.
+    /// An event behind whose surface it lies: motion that comes from the other side is changed
+    /// before. Only a start behind it comes to the rest.
     pub behind: Option<String>,
 }
 
 impl Rest {
-    /// "stable node", "saddle", ... from the eigenvalues; on a surface that repels everything is unstable. Of a curve of rests, what they are all
-    /// along it is not asked.
+    /// "stable node", "saddle", ... from the eigenvalues; on a surface that repels everything is
+    /// unstable. Of a curve of rests, what they are all along it is not asked.
     pub fn kind(&self) -> String {
         if let Some(surface) = &self.boundary {
             return format!(
-                "boundary equilibrium: the equations change on {surface} = 0, and one side does not decide"
+                "boundary equilibrium: the equations change on {surface} = 0, and one side does \
+                    not decide"
             );
         }
         // Along a set of rests nothing moves: as many eigenvalues are zero.
@@ -78,7 +85,8 @@ impl Rest {
         let (out, into) = (values.iter().any(|e| e[0] > zero), values.iter().any(|e| e[0] < -zero));
         let neutral = values.iter().any(|e| e[0].abs() <= zero);
         let shape = if turns { "focus" } else { "node" };
-        let [repels, open] = [Some(false), None].map(|a| !self.on.is_empty() && self.attracting == a);
+        let [repels, open] =
+            [Some(false), None].map(|a| !self.on.is_empty() && self.attracting == a);
         match (out, into) {
             _ if along > 0 => match (out, neutral || open) {
                 _ if repels => "unstable: neighbours leave the set",
@@ -114,7 +122,8 @@ pub enum RestError {
     Box(String),
 }
 
-/// Starts of Newton's method: for each set of surfaces of one size, as many as there are places for all of them together, but so many at least.
+/// Starts of Newton's method: for each set of surfaces of one size, as many as there are places for
+/// all of them together, but so many at least.
 const STARTS: usize = 400;
 const LEAST_STARTS: usize = 20;
 const MOST_ITERATIONS: usize = 60;
@@ -138,7 +147,8 @@ const MOST_SETS: usize = 256;
 /// let rest = &rests(&relay, &[(-1.0, 1.0)])?[0];
 /// assert!(rest.attracting == Some(true) && (rest.on[0].weight - 0.75).abs() < 1e-12);
 /// // A block that dry friction holds: x from -1/2 to 1/2.
-/// let block = Model::new(Definition::from_toml("states = ['x', 'v']\nf = ['v', '-x - 0.5*sign(v)']", "f")?);
+/// let text = "states = ['x', 'v']\nf = ['v', '-x - 0.5*sign(v)']";
+/// let block = Model::new(Definition::from_toml(text, "f")?);
 /// let stuck = rests(&block, &[(-3.0, 3.0), (-1.0, 1.0)])?[0].family.clone().unwrap();
 /// let [from, to] = stuck.ends.unwrap();
 /// assert!((from[0] + 0.5).abs() < 1e-9 && (to[0] - 0.5).abs() < 1e-9);
@@ -155,11 +165,13 @@ pub fn rests(model: &Model, within: &[(f64, f64)]) -> Result<Vec<Rest>, RestErro
     if equation.depends_on_time() {
         return Err(RestError::Driven);
     }
-    let search = Search { equation, n, widths: within.iter().map(|(a, b)| b - a).collect(), within };
+    let search =
+        Search { equation, n, widths: within.iter().map(|(a, b)| b - a).collect(), within };
     let mut found: Vec<Rest> = Vec::new();
     for mode in 0..model.definition().modes().len() {
         let places: Vec<Vec<f64>> = (0..STARTS).map(|start| search.place(start)).collect();
-        let configs: Vec<Configuration> = places.iter().map(|x| search.configuration(mode, x)).collect();
+        let configs: Vec<Configuration> =
+            places.iter().map(|x| search.configuration(mode, x)).collect();
         let mut active: Vec<usize> = Vec::new();
         for config in &configs {
             active.extend(search.equation.compiled(config).active.iter());
@@ -187,7 +199,10 @@ pub fn rests(model: &Model, within: &[(f64, f64)]) -> Result<Vec<Rest>, RestErro
         let is_edge_of = |f: &Rest| {
             let on = |surface: &String| f.on.iter().any(|on| on.surface == *surface);
             let may_be = f.mode == r.mode && on(boundary) && r.on.iter().all(|r| on(&r.surface));
-            may_be && f.family.as_ref().is_some_and(|family| family.dimension > 1 || search.passes(f, &r.x))
+            may_be
+                && f.family
+                    .as_ref()
+                    .is_some_and(|family| family.dimension > 1 || search.passes(f, &r.x))
         };
         !families.iter().any(is_edge_of)
     });
@@ -239,8 +254,8 @@ struct Local {
     jacobian: Vec<f64>,
 }
 
-/// The mixture of the fields around some surfaces, by weights: its value, its derivatives by the states and by the weights (row by row), and the
-/// surfaces' functions and gradients.
+/// The mixture of the fields around some surfaces, by weights: its value, its derivatives by the
+/// states and by the weights (row by row), and the surfaces' functions and gradients.
 struct Mixture {
     local: Local,
     by_weight: Vec<f64>,
@@ -250,14 +265,16 @@ struct Mixture {
     sizes: Vec<f64>,
 }
 
-/// A zero: the state, the weights, and the directions in which the equations do not fix them (the state's part a unit vector in widths of the box).
+/// A zero: the state, the weights, and the directions in which the equations do not fix them (the
+/// state's part a unit vector in widths of the box).
 struct Zero {
     x: Vec<f64>,
     weights: Vec<f64>,
     open: Vec<Vec<f64>>,
 }
 
-/// Rows that depend on the others to this share are taken for dependent, if a walk along the open direction finds further zeros.
+/// Rows that depend on the others to this share are taken for dependent, if a walk along the open
+/// direction finds further zeros.
 const DEPENDENT: f64 = 1e-8;
 /// The same where no such walk does.
 const ROUNDING: f64 = 1e-15;
@@ -278,7 +295,9 @@ impl Search<'_> {
 
     /// A place of the box to start from: the middle, then Halton's points.
     fn place(&self, start: usize) -> Vec<f64> {
-        let share = |i: usize| if start == 0 { 0.5 } else { radical_inverse(start, PRIMES[i % PRIMES.len()]) };
+        let share = |i: usize| {
+            if start == 0 { 0.5 } else { radical_inverse(start, PRIMES[i % PRIMES.len()]) }
+        };
         self.within.iter().enumerate().map(|(i, (a, b))| a + (b - a) * share(i)).collect()
     }
 
@@ -296,7 +315,8 @@ impl Search<'_> {
                 there.is_some_and(|there| self.distance(&there.x, &aim) <= 0.1 * WALK)
             })
         };
-        let (along, spurious): (Vec<_>, Vec<_>) = zero.open.clone().into_iter().partition(|d| continues(&zero, d));
+        let (along, spurious): (Vec<_>, Vec<_>) =
+            zero.open.clone().into_iter().partition(|d| continues(&zero, d));
         let dimension = along.len();
         let rest = if dimension > 0 {
             zero.open = along;
@@ -314,14 +334,16 @@ impl Search<'_> {
         }
     }
 
-    /// Whether a zero of a mixture is a rest: in the box, on its own side of all other surfaces, with weights of a mixture.
+    /// Whether a zero of a mixture is a rest: in the box, on its own side of all other surfaces,
+    /// with weights of a mixture.
     fn is_valid(&self, config: &Configuration, on: &[usize], zero: &Zero) -> bool {
         let mixes = zero.weights.iter().all(|w| *w > 0.0 && *w < 1.0);
         mixes && self.is_inside(&zero.x) && self.is_its_own(config, &zero.x, on)
     }
 
     fn is_known(&self, config: &Configuration, on: &[usize], x: &[f64], found: &[Rest]) -> bool {
-        let names: Vec<String> = on.iter().map(|g| self.equation.guards[*g].expression.to_string()).collect();
+        let names: Vec<String> =
+            on.iter().map(|g| self.equation.guards[*g].expression.to_string()).collect();
         found.iter().any(|r| {
             let same = r.mode == config.mode && r.on.iter().map(|on| &on.surface).eq(names.iter());
             same && match &r.family {
@@ -339,8 +361,10 @@ impl Search<'_> {
             let [a, b] = [&ends[0], &ends[1]].map(|p| self.scaled(p, x));
             let along: Vec<f64> = b.iter().zip(&a).map(|(b, a)| b - a).collect();
             let square: f64 = dot(&along, &along);
-            let share = if square > 0.0 { (-dot(&a, &along) / square).clamp(0.0, 1.0) } else { 0.0 };
-            a.iter().zip(&along).map(|(a, d)| (a + share * d) * (a + share * d)).sum::<f64>() <= 1e-6
+            let share =
+                if square > 0.0 { (-dot(&a, &along) / square).clamp(0.0, 1.0) } else { 0.0 };
+            a.iter().zip(&along).map(|(a, d)| (a + share * d) * (a + share * d)).sum::<f64>()
+                <= 1e-6
         })
     }
 
@@ -357,7 +381,8 @@ impl Search<'_> {
     /// The state and the weights at a distance along a direction.
     fn moved(&self, zero: &Zero, direction: &[f64], by: f64) -> (Vec<f64>, Vec<f64>) {
         let (states, weights) = direction.split_at(self.n);
-        let x = zero.x.iter().zip(states).zip(&self.widths).map(|((x, d), w)| x + by * d * w).collect();
+        let x =
+            zero.x.iter().zip(states).zip(&self.widths).map(|((x, d), w)| x + by * d * w).collect();
         (x, zero.weights.iter().zip(weights).map(|(w, d)| w + by * d).collect())
     }
 
@@ -375,7 +400,11 @@ impl Search<'_> {
                 }
             }
         };
-        Configuration { mode, sides: self.equation.guards.iter().map(side).collect(), pieces: Vec::new() }
+        Configuration {
+            mode,
+            sides: self.equation.guards.iter().map(side).collect(),
+            pieces: Vec::new(),
+        }
     }
 
     fn local(&self, config: &Configuration, x: &[f64]) -> Local {
@@ -383,15 +412,22 @@ impl Search<'_> {
     }
 
     /// A field and its Jacobian, with values and gradients of guards that it asks (NaN of others).
-    fn with_guards(&self, config: &Configuration, guards: &[usize], x: &[f64]) -> (Local, Vec<f64>, Vec<f64>) {
+    fn with_guards(
+        &self,
+        config: &Configuration,
+        guards: &[usize],
+        x: &[f64],
+    ) -> (Local, Vec<f64>, Vec<f64>) {
         let n = self.n;
         let compiled = self.equation.compiled(config);
         let mut local = Local { field: vec![0.0; n], jacobian: vec![0.0; n * n] };
-        let (mut values, mut gradients) = (vec![f64::NAN; guards.len()], vec![f64::NAN; guards.len() * n]);
+        let (mut values, mut gradients) =
+            (vec![f64::NAN; guards.len()], vec![f64::NAN; guards.len() * n]);
         let mut v: Vec<Dual<f64, 1>> = x.iter().map(|v| Dual::constant(*v)).collect();
         v.push(Dual::constant(0.0));
         v.extend(config.sides.iter().map(|s| Dual::constant(*s)));
-        let (mut f, mut g) = (vec![Dual::constant(0.0); n], vec![Dual::constant(0.0); compiled.outputs]);
+        let (mut f, mut g) =
+            (vec![Dual::constant(0.0); n], vec![Dual::constant(0.0); compiled.outputs]);
         for j in 0..n {
             v[j].partials = [1.0];
             compiled.field.evaluate(&v, &mut f);
@@ -466,8 +502,8 @@ impl Search<'_> {
         mixture
     }
 
-    /// Newton's method for a state and weights at which a mixture vanishes and the state lies on its surfaces; the least step where the equations
-    /// depend on each other.
+    /// Newton's method for a state and weights at which a mixture vanishes and the state lies on
+    /// its surfaces; the least step where the equations depend on each other.
     fn settle(
         &self,
         config: &Configuration,
@@ -496,8 +532,9 @@ impl Search<'_> {
             if !x.iter().chain(&weights).all(|v| v.is_finite()) {
                 return None;
             }
-            let close =
-                |(s, (x, w)): (&f64, (&f64, &f64))| s.abs() <= 1e-13 || s.abs() * w <= 4.0 * f64::EPSILON * x.abs();
+            let close = |(s, (x, w)): (&f64, (&f64, &f64))| {
+                s.abs() <= 1e-13 || s.abs() * w <= 4.0 * f64::EPSILON * x.abs()
+            };
             let settled = step.by.iter().zip(x.iter().zip(&self.widths)).all(close);
             if settled && step.by[n..].iter().all(|s| s.abs() <= 1e-12) {
                 let open = step.open(n);
@@ -507,7 +544,8 @@ impl Search<'_> {
         None
     }
 
-    /// The switching function, none of those in `on`, that is zero at a state, to rounding, and on whose other side the equations are others.
+    /// The switching function, none of those in `on`, that is zero at a state, to rounding, and on
+    /// whose other side the equations are others.
     fn boundary(&self, config: &Configuration, on: &[usize], x: &[f64]) -> Option<String> {
         let n = self.n;
         let own = self.local(config, x);
@@ -515,19 +553,24 @@ impl Search<'_> {
             let (_, values, gradients) = self.with_guards(config, &[*guard], x);
             // The distance that the state is known to.
             let reach: f64 = gradients.iter().zip(&self.widths).map(|(g, w)| (g * w).abs()).sum();
-            if on.contains(guard) || self.equation.guards[*guard].whole || !(values[0].abs() <= 1e-12 * reach) {
+            if on.contains(guard)
+                || self.equation.guards[*guard].whole
+                || !(values[0].abs() <= 1e-12 * reach)
+            {
                 return false;
             }
             let mut other = config.clone();
             other.sides[*guard] = -config.sides[*guard];
             let there = self.local(&other, x);
-            (0..n).any(|i| own.field[i] != there.field[i]) || (0..n * n).any(|i| own.jacobian[i] != there.jacobian[i])
+            (0..n).any(|i| own.field[i] != there.field[i])
+                || (0..n * n).any(|i| own.jacobian[i] != there.jacobian[i])
         };
         let guard = self.equation.compiled(config).active.iter().copied().find(|g| is_on(g))?;
         Some(self.equation.guards[guard].expression.to_string())
     }
 
-    /// The first event of a mode whose condition holds at a state, or whose expression has passed zero there.
+    /// The first event of a mode whose condition holds at a state, or whose expression has passed
+    /// zero there.
     fn behind(&self, mode: usize, x: &[f64]) -> Option<String> {
         let config = self.configuration(mode, x);
         let passed = |when: &When| match when {
@@ -551,13 +594,17 @@ impl Search<'_> {
         let mut normal = vec![0.0; k * k];
         for i in 0..k {
             for j in 0..k {
-                normal[i * k + j] = (0..n).map(|l| m.gradients[i * n + l] * m.by_weight[l * k + j]).sum();
+                normal[i * k + j] =
+                    (0..n).map(|l| m.gradients[i * n + l] * m.by_weight[l * k + j]).sum();
             }
         }
-        // Where the mixture vanishes, sliding is linearised by (1 - B (C B)^-1 C) A: the rows of C have the eigenvalue 0, which is none of the surfaces.
+        // Where the mixture vanishes, sliding is linearised by (1 - B (C B)^-1 C) A: the rows of C
+        // have the eigenvalue 0, which is none of the surfaces.
         let mut along = m.local.jacobian.clone();
         for j in 0..if k > 0 { n } else { 0 } {
-            let pull = |i: usize| (0..n).map(|l| m.gradients[i * n + l] * m.local.jacobian[l * n + j]).sum::<f64>();
+            let pull = |i: usize| {
+                (0..n).map(|l| m.gradients[i * n + l] * m.local.jacobian[l * n + j]).sum::<f64>()
+            };
             let shift = solve_any(&normal, &(0..k).map(pull).collect::<Vec<_>>(), 0.0)?;
             for i in 0..n {
                 let kept: f64 = (0..k).map(|l| m.by_weight[i * k + l] * shift[l]).sum();
@@ -580,14 +627,31 @@ impl Search<'_> {
         };
         let boundary = self.boundary(config, on, &x);
         let name = |guard: &usize| self.equation.guards[*guard].expression.to_string();
-        let on = on.iter().zip(&weights).map(|(g, w)| On { surface: name(g), weight: *w }).collect();
+        let on =
+            on.iter().zip(&weights).map(|(g, w)| On { surface: name(g), weight: *w }).collect();
         let attracting = if k > 0 { attracts(&normal, k) } else { None };
         let behind = self.behind(config.mode, &x);
-        Some(Rest { x, mode: config.mode, on, attracting, family: None, eigenvalues, blur, boundary, behind })
+        Some(Rest {
+            x,
+            mode: config.mode,
+            on,
+            attracting,
+            family: None,
+            eigenvalues,
+            blur,
+            boundary,
+            behind,
+        })
     }
 
     /// A rest that is not isolated; a curve of them is followed to its ends.
-    fn family(&self, config: &Configuration, on: &[usize], zero: Zero, dimension: usize) -> Option<Rest> {
+    fn family(
+        &self,
+        config: &Configuration,
+        on: &[usize],
+        zero: Zero,
+        dimension: usize,
+    ) -> Option<Rest> {
         if dimension > 1 {
             let mut rest = self.rest(config, on, zero)?;
             rest.family = Some(Family { dimension, ends: None, points: Vec::new() });
@@ -600,14 +664,19 @@ impl Search<'_> {
             if closed {
                 break;
             }
-            let mut here = Zero { x: zero.x.clone(), weights: zero.weights.clone(), open: vec![first.clone()] };
+            let mut here = Zero {
+                x: zero.x.clone(),
+                weights: zero.weights.clone(),
+                open: vec![first.clone()],
+            };
             let mut heading: Vec<f64> = first.iter().map(|d| sign * d).collect();
             let mut side = Vec::new();
             for _ in 0..MOST_STRIDES {
                 let ahead = |by: f64| {
                     let (aim, weights) = self.moved(&here, &heading, by);
                     let there = self.settle(config, on, &aim, &weights, DEPENDENT)?;
-                    let follows = self.distance(&there.x, &aim) <= 0.5 * by && self.is_valid(config, on, &there);
+                    let follows = self.distance(&there.x, &aim) <= 0.5 * by
+                        && self.is_valid(config, on, &there);
                     (follows && !there.open.is_empty()).then_some(there)
                 };
                 let Some(next) = ahead(STRIDE) else {
@@ -635,12 +704,13 @@ impl Search<'_> {
         }
         let middle = points[points.len() / 2].clone();
         let ends = (!closed).then(|| [points[points.len() - 1].clone(), points[0].clone()]);
-        let ends =
-            ends.map(
-                |[a, b]| {
-                    if a.iter().zip(&b).find(|(a, b)| a != b).is_some_and(|(a, b)| a > b) { [b, a] } else { [a, b] }
-                },
-            );
+        let ends = ends.map(|[a, b]| {
+            if a.iter().zip(&b).find(|(a, b)| a != b).is_some_and(|(a, b)| a > b) {
+                [b, a]
+            } else {
+                [a, b]
+            }
+        });
         let there = self.settle(config, on, &middle, &zero.weights, DEPENDENT)?;
         let mut rest = self.rest(config, on, there)?;
         rest.family = Some(Family { dimension, ends, points });
@@ -662,7 +732,8 @@ struct Step {
 }
 
 impl Step {
-    /// Directions along which no equation changes, orthogonal, with a unit vector as their first `n` components.
+    /// Directions along which no equation changes, orthogonal, with a unit vector as their first
+    /// `n` components.
     fn open(&self, n: usize) -> Vec<Vec<f64>> {
         let (mut span, mut open) = (self.span.clone(), Vec::new());
         let all = self.by.len();
@@ -690,7 +761,8 @@ impl Step {
     }
 }
 
-/// The least solution of equations (row, right-hand side, size that rounding is measured by): rows are made orthogonal, the most independent first.
+/// The least solution of equations (row, right-hand side, size that rounding is measured by): rows
+/// are made orthogonal, the most independent first.
 fn least_step(mut rows: Vec<(Vec<f64>, f64, f64)>, dependent: f64) -> Option<Step> {
     let all = rows.first()?.0.len();
     let mut step = Step { by: vec![0.0; all], span: Vec::new(), left_over: 0.0 };
@@ -730,10 +802,12 @@ fn least_step(mut rows: Vec<(Vec<f64>, f64, f64)>, dependent: f64) -> Option<Ste
     Some(step)
 }
 
-/// Whether w' = D W w comes to zero for every diagonal matrix D > 0: `Some` if it does for all, or for none.
+/// Whether w' = D W w comes to zero for every diagonal matrix D > 0: `Some` if it does for all, or
+/// for none.
 fn attracts(w: &[f64], k: usize) -> Option<bool> {
     let minor = |rows: &[usize]| {
-        let matrix: Vec<f64> = rows.iter().flat_map(|i| rows.iter().map(move |j| -w[i * k + j])).collect();
+        let matrix: Vec<f64> =
+            rows.iter().flat_map(|i| rows.iter().map(move |j| -w[i * k + j])).collect();
         determinant(matrix, rows.len())
     };
     let all: Vec<usize> = (0..k).collect();
@@ -753,8 +827,10 @@ fn attracts(w: &[f64], k: usize) -> Option<bool> {
     // W + W^T is negative definite: so is that of D^1/2 W D^1/2, which has the eigenvalues of D W.
     let symmetric: Vec<f64> = (0..k * k).map(|p| -0.5 * (w[p] + w[p % k * k + p / k])).collect();
     let leading = |m: usize| {
-        let part: Vec<f64> =
-            (0..m).flat_map(|i| (0..m).map(move |j| (i, j))).map(|(i, j)| symmetric[i * k + j]).collect();
+        let part: Vec<f64> = (0..m)
+            .flat_map(|i| (0..m).map(move |j| (i, j)))
+            .map(|(i, j)| symmetric[i * k + j])
+            .collect();
         determinant(part, m)
     };
     (1..=k).all(|m| leading(m) > 0.0).then_some(true)
@@ -764,7 +840,10 @@ fn attracts(w: &[f64], k: usize) -> Option<bool> {
 fn determinant(mut a: Vec<f64>, n: usize) -> f64 {
     let mut product = 1.0;
     for k in 0..n {
-        let Some(pivot) = (k..n).max_by(|i, j| a[i * n + k].abs().total_cmp(&a[j * n + k].abs())) else { break };
+        let Some(pivot) = (k..n).max_by(|i, j| a[i * n + k].abs().total_cmp(&a[j * n + k].abs()))
+        else {
+            break;
+        };
         if pivot != k {
             (0..n).for_each(|j| a.swap(k * n + j, pivot * n + j));
             product = -product;

@@ -1,12 +1,15 @@
 //! The first zero of a function along a step.
 //!
-//! Values at five places give a polynomial of degree four, which is what a linear function of the step's continuous extension is. Where its Bernstein
-//! coefficients have one sign there is no zero (Farin 2002, sec. 6.3); else the step is halved until a change of sign stands alone, which is then narrowed
-//! down on the function itself (regula falsi, the Illinois way: Dowell & Jarratt 1971; halving where that is slow).
+//! Values at five places give a polynomial of degree four, which is what a linear function of the
+//! step's continuous extension is. Where its Bernstein coefficients have one sign there is no zero
+//! (Farin 2002, sec. 6.3); else the step is halved until a change of sign stands alone, which is
+//! then narrowed down on the function itself (regula falsi, the Illinois way: Dowell & Jarratt
+//! 1971; halving where that is slow).
 
 /// Places of the samples, as fractions.
 pub(crate) const PLACES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
-/// How often a step is halved where its end is on the same side, and where it is beyond zero: down to the last digits.
+/// How often a step is halved where its end is on the same side, and where it is beyond zero: down
+/// to the last digits.
 const DEPTH: usize = 12;
 const DEEPEST: usize = 60;
 
@@ -34,7 +37,8 @@ pub(crate) fn at_fraction(b: &[f64; 5], u: f64) -> f64 {
     level[0]
 }
 
-/// Whether the polynomial through these values stays on its side of zero, where it may begin at zero.
+/// Whether the polynomial through these values stays on its side of zero, where it may begin at
+/// zero.
 pub(crate) fn stays(v: &[f64; 5], side: f64) -> bool {
     // What is zero all along passes it nowhere.
     if v.iter().all(|v| *v == 0.0) {
@@ -49,16 +53,20 @@ pub(crate) fn stays(v: &[f64; 5], side: f64) -> bool {
 
 /// Whether Bernstein coefficients on one side of zero say that there is no zero.
 pub(crate) fn keeps_away(b: &[f64; 5], side: f64) -> bool {
-    // A polynomial that only comes near to zero between its ends is not what the function is: it is looked at closer.
-    let (low, high) = b.iter().fold((f64::INFINITY, 0.0_f64), |(l, h), c| (l.min(c * side), h.max(c * side)));
+    // A polynomial that only comes near to zero between its ends is not what the function is: it is
+    // looked at closer.
+    let (low, high) =
+        b.iter().fold((f64::INFINITY, 0.0_f64), |(l, h), c| (l.min(c * side), h.max(c * side)));
     let goes_one_way = b.windows(2).all(|w| w[0] <= w[1]) || b.windows(2).all(|w| w[0] >= w[1]);
     goes_one_way || low > NEAR * (high - low)
 }
 
-/// A function whose least value in an interval is less than this part of its range there is looked at closer.
+/// A function whose least value in an interval is less than this part of its range there is looked
+/// at closer.
 const NEAR: f64 = 0.05;
 
-/// The first place in (from, to] where the function, which begins on `side` of zero (or at zero, leaving to that side), meets zero or is beyond it.
+/// The first place in (from, to] where the function, which begins on `side` of zero (or at zero,
+/// leaving to that side), meets zero or is beyond it.
 pub(crate) fn first(
     v: [f64; 5],
     side: f64,
@@ -94,13 +102,21 @@ pub(crate) fn first(
     first([v[2], p, v[3], q, v[4]], side, middle, to, f, depth + 1)
 }
 
-/// Where a function that is on its side at both ends of an interval is beyond zero between them, and its value there: its least value is sought by parabolas
-/// (Brent 1973, ch. 5), where the least of five values is not at an end.
-fn dip(v: &[f64; 5], side: f64, from: f64, to: f64, f: &mut dyn FnMut(f64) -> f64) -> Option<(f64, f64)> {
+/// Where a function that is on its side at both ends of an interval is beyond zero between them,
+/// and its value there: its least value is sought by parabolas (Brent 1973, ch. 5), where the least
+/// of five values is not at an end.
+fn dip(
+    v: &[f64; 5],
+    side: f64,
+    from: f64,
+    to: f64,
+    f: &mut dyn FnMut(f64) -> f64,
+) -> Option<(f64, f64)> {
     let least = (0..5).min_by(|i, j| (v[*i] * side).total_cmp(&(v[*j] * side)))?;
     let inner = least.clamp(1, 3);
-    let mut three: [(f64, f64); 3] =
-        std::array::from_fn(|i| (from + PLACES[inner + i - 1] * (to - from), v[inner + i - 1] * side));
+    let mut three: [(f64, f64); 3] = std::array::from_fn(|i| {
+        (from + PLACES[inner + i - 1] * (to - from), v[inner + i - 1] * side)
+    });
     for _ in 0..MOST_PARABOLAS {
         let [(a, fa), (b, fb), (c, fc)] = three;
         let (p, q) = ((b - a) * (fb - fc), (b - c) * (fb - fa));
@@ -144,8 +160,9 @@ pub(crate) fn first_of_polynomial(v: [f64; 5], side: f64) -> Option<f64> {
     first(v, side, 0.0, 1.0, &mut |u| at_fraction(&b, u), 0)
 }
 
-/// The first place in (0, 1] where the polynomial with these coefficients, by powers, which begins on `side` of zero, is at zero or beyond it; where it
-/// begins at zero, the first place behind that: `at_zero` is the slope that rounding makes.
+/// The first place in (0, 1] where the polynomial with these coefficients, by powers, which begins
+/// on `side` of zero, is at zero or beyond it; where it begins at zero, the first place behind
+/// that: `at_zero` is the slope that rounding makes.
 pub(crate) fn first_of_series(c: &[f64], side: f64, at_zero: Option<f64>) -> Option<f64> {
     let mut q: Vec<f64> = c.iter().map(|c| c * side).collect();
     let size = |q: &[f64]| q.iter().map(|c| c.abs()).sum::<f64>();
@@ -203,7 +220,8 @@ pub(crate) fn first_of_series(c: &[f64], side: f64, at_zero: Option<f64>) -> Opt
     None
 }
 
-/// The zero of a polynomial that is positive at `low` and not at `high`: Newton's method within bounds.
+/// The zero of a polynomial that is positive at `low` and not at `high`: Newton's method within
+/// bounds.
 fn root_between(q: &[f64], mut low: f64, mut high: f64) -> f64 {
     let mut u = 0.5 * (low + high);
     for _ in 0..100 {
@@ -233,7 +251,8 @@ fn changes(b: &[f64; 5]) -> usize {
     changes
 }
 
-/// Where the polynomial through five values, which has one change of sign, is zero, as a fraction: Newton's method within bounds.
+/// Where the polynomial through five values, which has one change of sign, is zero, as a fraction:
+/// Newton's method within bounds.
 fn polynomial_root(v: &[f64; 5], side: f64) -> f64 {
     let b = bernstein(v);
     let value = |u: f64| {
@@ -315,19 +334,25 @@ mod tests {
     fn the_first_zero_of_a_series_is_found() {
         let times = |a: &[f64], b: &[f64]| {
             let mut out = vec![0.0; a.len() + b.len() - 1];
-            a.iter().enumerate().for_each(|(i, a)| b.iter().enumerate().for_each(|(j, b)| out[i + j] += a * b));
+            a.iter()
+                .enumerate()
+                .for_each(|(i, a)| b.iter().enumerate().for_each(|(j, b)| out[i + j] += a * b));
             out
         };
         let of = |zeros: &[f64]| zeros.iter().fold(vec![1.0], |all, z| times(&all, &[-z, 1.0]));
         for degree in [1, 4, 12] {
-            // Rounding of coefficients that sum up to 3^degree, where the slope is about (3/2)^degree times the distance of the zeros.
+            // Rounding of coefficients that sum up to 3^degree, where the slope is about
+            // (3/2)^degree times the distance of the zeros.
             let within = f64::EPSILON * 1e4 * 2.0_f64.powi(degree as i32);
-            let near =
-                |found: Option<f64>, want: f64| assert!((found.unwrap() - want).abs() < within, "{found:?} {want}");
+            let near = |found: Option<f64>, want: f64| {
+                assert!((found.unwrap() - want).abs() < within, "{found:?} {want}")
+            };
             let rest = vec![2.0; degree];
             let at = |zeros: &[f64]| of(&[zeros, &rest].concat());
-            let side = |zeros: &[f64]| if (zeros.len() + degree).is_multiple_of(2) { 1.0 } else { -1.0 };
-            for zeros in [&[0.3][..], &[0.3, 0.9], &[0.61, 0.62], &[1e-9, 0.5], &[0.5, 0.5001, 0.9]] {
+            let side =
+                |zeros: &[f64]| if (zeros.len() + degree).is_multiple_of(2) { 1.0 } else { -1.0 };
+            for zeros in [&[0.3][..], &[0.3, 0.9], &[0.61, 0.62], &[1e-9, 0.5], &[0.5, 0.5001, 0.9]]
+            {
                 near(first_of_series(&at(zeros), side(zeros), None), zeros[0]);
                 // From zero on.
                 let behind = [&[0.0], zeros].concat();
@@ -337,7 +362,9 @@ mod tests {
             assert_eq!(first_of_series(&at(&[0.0]), -side(&[0.0]), Some(0.0)), None);
         }
         // It leaves zero like a square, to one side and to the other.
-        assert!((first_of_series(&[0.0, 0.0, 1.0, -2.0], 1.0, Some(0.0)).unwrap() - 0.5).abs() < 1e-15);
+        assert!(
+            (first_of_series(&[0.0, 0.0, 1.0, -2.0], 1.0, Some(0.0)).unwrap() - 0.5).abs() < 1e-15
+        );
         assert!(first_of_series(&[0.0, 0.0, -1.0, 2.0], 1.0, Some(0.0)).unwrap() < 1e-12);
         // A dip that does not reach zero, by much and by little; one that does.
         assert_eq!(first_of_series(&[0.09 + 1e-6, -0.6, 1.0], 1.0, None), None);
@@ -349,7 +376,9 @@ mod tests {
 
     #[test]
     fn the_first_of_several_is_found() {
-        let near = |found: Option<f64>, want: f64| assert!((found.unwrap() - want).abs() < 1e-14, "{found:?}");
+        let near = |found: Option<f64>, want: f64| {
+            assert!((found.unwrap() - want).abs() < 1e-14, "{found:?}")
+        };
         near(find(|x| (x - 0.3) * (x - 0.9), 1.0), 0.3);
         near(find(|x| (x - 0.61) * (x - 0.62), 1.0), 0.61);
         near(find(|x| 0.2 - x, 1.0), 0.2);

@@ -1,8 +1,10 @@
 //! Where motion goes from switching surfaces.
 //!
-//! At a point where k switching functions are zero each may go to its positive side (its derivative is positive there), to its negative side (negative),
-//! or stay at zero, where the field is a mixture of those on both sides (Filippov 1988, sec. 4). What is possible is what is consistent: an assignment in which every
-//! function does what it is said to do. One possibility is the motion; several are a motion that is not decided.
+//! At a point where k switching functions are zero each may go to its positive side (its derivative
+//! is positive there), to its negative side (negative), or stay at zero, where the field is a
+//! mixture of those on both sides (Filippov 1988, sec. 4). What is possible is what is consistent:
+//! an assignment in which every function does what it is said to do. One possibility is the motion;
+//! several are a motion that is not decided.
 
 use twofold_num::linear::solve_any;
 use twofold_system::Expression;
@@ -32,15 +34,18 @@ impl Way {
 /// Most surfaces that depend on each other at one point.
 pub const MOST_TOGETHER: usize = 6;
 
-/// Which mixture of the fields is taken on several surfaces at once where mixtures have different velocities.
+/// Which mixture of the fields is taken on several surfaces at once where mixtures have different
+/// velocities.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Intersection {
     /// None: the run ends with an error.
     #[default]
     Undecided,
-    /// Products of one weight for each surface: what equally steep smoothed switches tend to (Alexander & Seidman 1998).
+    /// Products of one weight for each surface: what equally steep smoothed switches tend to
+    /// (Alexander & Seidman 1998).
     Bilinear,
-    /// The shortest velocity of Filippov's hull that stays on the surfaces (the slow solution: Aubin & Cellina 1984, ch. 2).
+    /// The shortest velocity of Filippov's hull that stays on the surfaces (the slow solution:
+    /// Aubin & Cellina 1984, ch. 2).
     HullLeastNorm,
     /// The hierarchy of switches: these switching functions, the one that switches fastest first.
     /// The first is slid upon for each side of all others, the second on the result, and so on
@@ -52,12 +57,14 @@ pub enum Intersection {
 pub(crate) struct Mixture {
     /// One for each field.
     pub weights: Vec<f64>,
-    /// For each surface the least weight of its positive and of its negative side: of all fields, or for each side of the slower ones.
+    /// For each surface the least weight of its positive and of its negative side: of all fields,
+    /// or for each side of the slower ones.
     pub margins: Vec<[f64; 2]>,
 }
 
-/// Weights of the 2^k fields around the meeting of k surfaces (bit i: the positive side of surface i), so that their mixture stays on all of them.
-/// `rates` are the derivatives of the k functions along each field, `order` the surfaces of [`Intersection::Order`] by their places.
+/// Weights of the 2^k fields around the meeting of k surfaces (bit i: the positive side of surface
+/// i), so that their mixture stays on all of them. `rates` are the derivatives of the k functions
+/// along each field, `order` the surfaces of [`Intersection::Order`] by their places.
 pub(crate) fn mixture(
     rule: &Intersection,
     order: &[usize],
@@ -77,8 +84,9 @@ pub(crate) fn mixture(
     Some(Mixture { weights, margins })
 }
 
-/// One surface after the other: for each side of those that are left the two mixtures are mixed so that the next function stays at zero. None if the
-/// order leaves a surface out, or if one does not attract from both sides.
+/// One surface after the other: for each side of those that are left the two mixtures are mixed so
+/// that the next function stays at zero. None if the order leaves a surface out, or if one does not
+/// attract from both sides.
 fn hierarchy(order: &[usize], rates: &[Vec<f64>], k: usize) -> Option<Mixture> {
     let count = rates.len();
     if order.len() != k {
@@ -113,7 +121,8 @@ fn hierarchy(order: &[usize], rates: &[Vec<f64>], k: usize) -> Option<Mixture> {
 
 /// Newton's method for the weights of the surfaces.
 fn bilinear(rates: &[Vec<f64>], k: usize) -> Option<Vec<f64>> {
-    let factor = |w: &[f64], vertex: usize, i: usize| if vertex >> i & 1 == 1 { w[i] } else { 1.0 - w[i] };
+    let factor =
+        |w: &[f64], vertex: usize, i: usize| if vertex >> i & 1 == 1 { w[i] } else { 1.0 - w[i] };
     let mut w = vec![0.5; k];
     for _ in 0..50 {
         let (mut value, mut jacobian) = (vec![0.0; k], vec![0.0; k * k]);
@@ -123,7 +132,8 @@ fn bilinear(rates: &[Vec<f64>], k: usize) -> Option<Vec<f64>> {
                 value[r] += all * rate[r];
             }
             for c in 0..k {
-                let others: f64 = (0..k).filter(|i| *i != c).map(|i| factor(&w, vertex, i)).product();
+                let others: f64 =
+                    (0..k).filter(|i| *i != c).map(|i| factor(&w, vertex, i)).product();
                 let sign = if vertex >> c & 1 == 1 { 1.0 } else { -1.0 };
                 for r in 0..k {
                     jacobian[r * k + c] += sign * others * rate[r];
@@ -139,8 +149,9 @@ fn bilinear(rates: &[Vec<f64>], k: usize) -> Option<Vec<f64>> {
     Some((0..rates.len()).map(|vertex| (0..k).map(|i| factor(&w, vertex, i)).product()).collect())
 }
 
-/// The least square of the mixture's length under the conditions that weights sum to one, are not negative and keep all functions at zero: the
-/// conditions of Karush, Kuhn and Tucker for every set of fields that take part.
+/// The least square of the mixture's length under the conditions that weights sum to one, are not
+/// negative and keep all functions at zero: the conditions of Karush, Kuhn and Tucker for every set
+/// of fields that take part.
 fn shortest(fields: &[Vec<f64>], rates: &[Vec<f64>], k: usize) -> Option<Vec<f64>> {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let mut best: Option<(f64, Vec<f64>)> = None;
@@ -167,8 +178,10 @@ fn shortest(fields: &[Vec<f64>], rates: &[Vec<f64>], k: usize) -> Option<Vec<f64
         let mut all = vec![0.0; fields.len()];
         part.iter().zip(weights).for_each(|(v, w)| all[*v] = *w);
         let n = fields[0].len();
-        let velocity: Vec<f64> = (0..n).map(|i| all.iter().zip(fields).map(|(w, f)| w * f[i]).sum()).collect();
-        let off: f64 = (0..k).map(|r| all.iter().zip(rates).map(|(w, f)| w * f[r]).sum::<f64>().abs()).sum();
+        let velocity: Vec<f64> =
+            (0..n).map(|i| all.iter().zip(fields).map(|(w, f)| w * f[i]).sum()).collect();
+        let off: f64 =
+            (0..k).map(|r| all.iter().zip(rates).map(|(w, f)| w * f[r]).sum::<f64>().abs()).sum();
         let size = rates.iter().flatten().fold(0.0_f64, |most, v| most.max(v.abs()));
         let length = dot(&velocity, &velocity);
         if off <= 1e-10 * size && best.as_ref().is_none_or(|(least, _)| length < *least) {
@@ -178,8 +191,8 @@ fn shortest(fields: &[Vec<f64>], rates: &[Vec<f64>], k: usize) -> Option<Vec<f64
     best.map(|(_, weights)| weights)
 }
 
-/// The point of the convex hull of some vectors that is nearest to zero: weight is moved between the two vectors that gain most by it (Wolfe 1970; Mitchell, Demyanov &
-/// Malozemov 1974).
+/// The point of the convex hull of some vectors that is nearest to zero: weight is moved between
+/// the two vectors that gain most by it (Wolfe 1970; Mitchell, Demyanov & Malozemov 1974).
 pub(crate) fn nearest_of_hull(vectors: &[Vec<f64>]) -> Vec<f64> {
     const MOST_MOVES: usize = 5000;
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
@@ -227,7 +240,8 @@ pub(crate) fn possibilities(k: usize, mut consistent: impl FnMut(&[Way]) -> bool
     found
 }
 
-/// Groups of functions that depend on each other: `coupled(i, j)` says whether the side of j changes the derivative of i.
+/// Groups of functions that depend on each other: `coupled(i, j)` says whether the side of j
+/// changes the derivative of i.
 pub(crate) fn groups(k: usize, coupled: impl Fn(usize, usize) -> bool) -> Vec<Vec<usize>> {
     let mut group: Vec<usize> = (0..k).collect();
     for i in 0..k {

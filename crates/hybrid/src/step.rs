@@ -1,5 +1,6 @@
-//! Steps for any number of states: Dormand & Prince's method of order 5 (1980) with the continuous extension of order 4 (Hairer, Norsett & Wanner 1993,
-//! sec. II.6), for stiff motion Radau IIA of order 5 with its collocation polynomial (Hairer & Wanner 1996, sec. IV.8), and Taylor series.
+//! Steps for any number of states: Dormand & Prince's method of order 5 (1980) with the continuous
+//! extension of order 4 (Hairer, Norsett & Wanner 1993, sec. II.6), for stiff motion Radau IIA of
+//! order 5 with its collocation polynomial (Hairer & Wanner 1996, sec. IV.8), and Taylor series.
 
 use twofold_num::linear::solve_any;
 
@@ -14,8 +15,15 @@ pub(crate) const A: [[f64; 6]; 7] = [
     [9017.0 / 3168.0, -355.0 / 33.0, 46732.0 / 5247.0, 49.0 / 176.0, -5103.0 / 18656.0, 0.0],
     [35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0],
 ];
-pub(crate) const E: [f64; 7] =
-    [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339_200.0, 22.0 / 525.0, -1.0 / 40.0];
+pub(crate) const E: [f64; 7] = [
+    71.0 / 57600.0,
+    0.0,
+    -71.0 / 16695.0,
+    71.0 / 1920.0,
+    -17253.0 / 339_200.0,
+    22.0 / 525.0,
+    -1.0 / 40.0,
+];
 const D: [f64; 7] = [
     -12_715_105_075.0 / 11_282_082_432.0,
     0.0,
@@ -32,7 +40,8 @@ const REAL_EIGENVALUE: f64 = 3.637_834_252_744_496;
 /// Writes the derivatives at a time and state.
 pub(crate) type RightHandSide<'a> = dyn FnMut(f64, &[f64], &mut [f64]) + 'a;
 
-/// By so much of what a step's error is measured by the derivative of a series may miss the field, times the step.
+/// By so much of what a step's error is measured by the derivative of a series may miss the field,
+/// times the step.
 const LARGEST_DEFECT: f64 = 20.0;
 
 /// The series of the motion where a step begins.
@@ -46,7 +55,8 @@ pub(crate) struct Series {
     pub noise: Vec<f64>,
     /// What rounding leaves of what is followed beside the states.
     pub rounding: Vec<f64>,
-    /// How far the derivative of the series is from the field in the middle and at the end, times the step.
+    /// How far the derivative of the series is from the field in the middle and at the end, times
+    /// the step.
     defect: Vec<f64>,
 }
 
@@ -142,7 +152,8 @@ impl Step {
         }
     }
 
-    /// A step of the series, with a look at the field in its middle and at its end (the defect: Enright 1989).
+    /// A step of the series, with a look at the field in its middle and at its end (the defect:
+    /// Enright 1989).
     fn take_series(&mut self, h: f64, series: &mut Series, rhs: &mut RightHandSide<'_>) {
         let n = self.x.len();
         series.scaled.resize(series.terms.len(), Vec::new());
@@ -165,7 +176,8 @@ impl Step {
             let middle = h * self.k[1][i] - horner_slope(&series.scaled[i], 0.5);
             let end = h * self.k[6][i] - horner_slope(&series.scaled[i], 1.0);
             // The larger one; not-a-number if one is none.
-            series.defect[i] = if middle.abs() > end.abs() { middle.abs() } else { end.abs() + 0.0 * middle };
+            series.defect[i] =
+                if middle.abs() > end.abs() { middle.abs() } else { end.abs() + 0.0 * middle };
         }
         for s in 2..6 {
             let (done, open) = self.k.split_at_mut(s);
@@ -175,17 +187,29 @@ impl Step {
 
     /// What the error falls by with the step's length, as a power.
     pub fn power(&self) -> f64 {
-        self.series.as_ref().and_then(|series| series.terms.first()).map_or(5.0, |c| (c.len() - 1) as f64)
+        self.series
+            .as_ref()
+            .and_then(|series| series.terms.first())
+            .map_or(5.0, |c| (c.len() - 1) as f64)
     }
 
-    /// A step of Radau IIA: simplified Newton iterations for the three stages at once; false if they do not settle.
+    /// A step of Radau IIA: simplified Newton iterations for the three stages at once; false if
+    /// they do not settle.
     fn take_implicit(&mut self, h: f64, jacobian: &[f64], rhs: &mut RightHandSide<'_>) -> bool {
         let n = self.x.len();
         let root = 6.0_f64.sqrt();
         let c = [0.1 * (4.0 - root), 0.1 * (4.0 + root), 1.0];
         let a = [
-            [(88.0 - 7.0 * root) / 360.0, (296.0 - 169.0 * root) / 1800.0, (-2.0 + 3.0 * root) / 225.0],
-            [(296.0 + 169.0 * root) / 1800.0, (88.0 + 7.0 * root) / 360.0, (-2.0 - 3.0 * root) / 225.0],
+            [
+                (88.0 - 7.0 * root) / 360.0,
+                (296.0 - 169.0 * root) / 1800.0,
+                (-2.0 + 3.0 * root) / 225.0,
+            ],
+            [
+                (296.0 + 169.0 * root) / 1800.0,
+                (88.0 + 7.0 * root) / 360.0,
+                (-2.0 - 3.0 * root) / 225.0,
+            ],
             [(16.0 - root) / 36.0, (16.0 + root) / 36.0, 1.0 / 9.0],
         ];
         let m = 3 * n;
@@ -248,12 +272,14 @@ impl Step {
             }
         }
         let gamma = 1.0 / REAL_EIGENVALUE;
-        let e = [gamma / 3.0 * (-13.0 - 7.0 * root), gamma / 3.0 * (-13.0 + 7.0 * root), -gamma / 3.0];
+        let e =
+            [gamma / 3.0 * (-13.0 - 7.0 * root), gamma / 3.0 * (-13.0 + 7.0 * root), -gamma / 3.0];
         let (mut system, mut right) = (vec![0.0; n * n], vec![0.0; n]);
         for i in 0..n {
             right[i] = gamma * h * self.k[0][i] + (0..3).map(|s| e[s] * z[s * n + i]).sum::<f64>();
             for j in 0..n {
-                system[i * n + j] = if i == j { 1.0 } else { 0.0 } - gamma * h * jacobian[i * n + j];
+                system[i * n + j] =
+                    if i == j { 1.0 } else { 0.0 } - gamma * h * jacobian[i * n + j];
             }
         }
         let Some(estimate) = solve_any(&system, &right, 0.0) else { return false };
@@ -264,7 +290,8 @@ impl Step {
         true
     }
 
-    /// The error estimate in units of `scale`, the root of the mean square; not-a-number if the step is none.
+    /// The error estimate in units of `scale`, the root of the mean square; not-a-number if the
+    /// step is none.
     pub fn error(&self, scale: &dyn Fn(usize) -> f64) -> f64 {
         let n = self.x.len();
         let mut sum = 0.0;
@@ -274,7 +301,8 @@ impl Step {
                 let noise = 4.0 * self.h * series.noise[i];
                 let last = c[c.len() - 1].abs().max(c[c.len() - 2].abs()) / (scale(i) + noise);
                 // Rounding of the field is no error of the series.
-                let rounding = 64.0 * f64::EPSILON * self.h * (self.k[1][i].abs() + self.k[6][i].abs());
+                let rounding =
+                    64.0 * f64::EPSILON * self.h * (self.k[1][i].abs() + self.k[6][i].abs());
                 let defect = series.defect[i] / (LARGEST_DEFECT * scale(i) + noise + rounding);
                 if !(last <= f64::MAX && defect <= f64::MAX && self.y[i].is_finite()) {
                     return f64::NAN;
@@ -299,7 +327,9 @@ impl Step {
         let rest = 1.0 - theta;
         let [a, b, c, d] = &self.extension;
         if let Some(series) = &self.series {
-            out.iter_mut().zip(&series.scaled).for_each(|(out, c)| *out = horner_slope(c, theta) / self.h);
+            out.iter_mut()
+                .zip(&series.scaled)
+                .for_each(|(out, c)| *out = horner_slope(c, theta) / self.h);
             return;
         }
         if self.jacobian.is_some() {
@@ -322,7 +352,13 @@ impl Step {
         let [a, b, c, d] = self.extension.each_ref().map(|e| e[i]);
         let x = self.x[i];
         if self.jacobian.is_some() {
-            return [x, x + 0.25 * a, x + 0.5 * a + b / 6.0, x + 0.75 * a + 0.5 * b + 0.25 * c, x + a + b + c];
+            return [
+                x,
+                x + 0.25 * a,
+                x + 0.5 * a + b / 6.0,
+                x + 0.75 * a + 0.5 * b + 0.25 * c,
+                x + a + b + c,
+            ];
         }
         let first = x + 0.25 * (a + b);
         let third = x + 0.75 * a + 0.25 * (b + c);
@@ -359,7 +395,8 @@ mod tests {
     fn bernstein_coefficients_are_those_of_the_continuous_extension() {
         for jacobian in [None, Some(vec![-0.3])] {
             let mut step = Step::new(1);
-            let mut rhs = |t: f64, x: &[f64], out: &mut [f64]| out[0] = -0.3 * x[0] + (3.0 * t).cos() + t * t;
+            let mut rhs =
+                |t: f64, x: &[f64], out: &mut [f64]| out[0] = -0.3 * x[0] + (3.0 * t).cos() + t * t;
             (step.t, step.x[0], step.jacobian) = (0.2, 1.5, jacobian);
             let mut first = [0.0];
             rhs(0.2, &[1.5], &mut first);

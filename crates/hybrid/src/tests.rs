@@ -34,7 +34,8 @@ fn shipped(name: &str) -> Model {
     let text = twofold_system::library::general(name).unwrap();
     let mut model = model(text);
     for (table, entry) in model.definition().tables().to_vec() {
-        model = model.with_table(&table, twofold_system::library::table(&entry.file).unwrap()).unwrap();
+        model =
+            model.with_table(&table, twofold_system::library::table(&entry.file).unwrap()).unwrap();
     }
     model
 }
@@ -44,7 +45,10 @@ fn every_general_system_that_ships_is_read_and_followed() {
     for name in twofold_system::library::general_names() {
         let model = shipped(name);
         assert_eq!(model.definition().name(), name);
-        assert!(!model.definition().title().is_empty() && !model.definition().document().references.is_empty());
+        assert!(
+            !model.definition().title().is_empty()
+                && !model.definition().document().references.is_empty()
+        );
         let t_end = match name {
             "buck-ramp" => 0.01,
             "cuk-converter" => 0.001,
@@ -66,7 +70,9 @@ fn a_ball_comes_to_rest_when_its_impacts_accumulate() {
     near(outcome.x[0], 0.0, 1e-15);
     assert_eq!(outcome.x[1], 0.0);
     // Without a word about what comes after: it ends there, with a bound that holds.
-    let text = twofold_system::library::general("bouncing-ball").unwrap().replace("after_zeno = \"stick\"\n", "");
+    let text = twofold_system::library::general("bouncing-ball")
+        .unwrap()
+        .replace("after_zeno = \"stick\"\n", "");
     let Ending::Zeno { event, t, error } = run(&model(&text), 10.0).1.unwrap().ending else {
         panic!("no accumulation")
     };
@@ -81,13 +87,17 @@ fn a_run_without_rows_says_its_time_and_can_be_ended() {
     let section = twofold_system::Expression::parse_general("x - 2", &["x", "v"]).unwrap();
     let options = Options { t_end: 1e6, record: Record::Section(section), ..Options::default() };
     let times = std::cell::RefCell::new(Vec::new());
-    let outcome = crate::follow_watched(&model, &options, &mut |_| panic!("no row is there"), &|t| {
-        times.borrow_mut().push(t);
-        t < 100.0
-    });
+    let outcome =
+        crate::follow_watched(&model, &options, &mut |_| panic!("no row is there"), &|t| {
+            times.borrow_mut().push(t);
+            t < 100.0
+        });
     assert_eq!(outcome.unwrap().ending, Ending::Interrupted);
     let times = times.into_inner();
-    assert!(times.len() > 10 && times.is_sorted() && (100.0..150.0).contains(times.last().unwrap()), "{times:?}");
+    assert!(
+        times.len() > 10 && times.is_sorted() && (100.0..150.0).contains(times.last().unwrap()),
+        "{times:?}"
+    );
 }
 
 /// Inelastic impacts rest at once; a table that moves lets go where it falls faster than the ball.
@@ -95,14 +105,17 @@ fn a_run_without_rows_says_its_time_and_can_be_ended() {
 fn contacts_open_where_the_surface_falls_away() {
     let ball = |r: &str| {
         format!(
-            "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-1']\n[let]\ntable = '0.5*sin(2*t)'\n[[event]]\nwhen = 'x - table'\ndirection = 'down'\n\
+            "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-1']\n[let]\ntable = \
+                '0.5*sin(2*t)'\n[[event]]\nwhen = 'x - table'\ndirection = 'down'\n\
              set = {{ v = 'cos(2*t) - {r}*(v - cos(2*t))' }}\nafter_zeno = 'stick'"
         )
     };
-    // At rest the ball moves with the table and leaves where the table's acceleration, -2 sin(2 t), falls below -1: 2 t = pi/6 (mod 2 pi).
+    // At rest the ball moves with the table and leaves where the table's acceleration, -2 sin(2 t),
+    // falls below -1: 2 t = pi/6 (mod 2 pi).
     let model = model(&ball("0"));
     let mut rows = Vec::new();
-    let options = Options { t_end: 5.0, record: Record::Times { every: 0.01 }, ..Options::default() };
+    let options =
+        Options { t_end: 5.0, record: Record::Times { every: 0.01 }, ..Options::default() };
     follow(&model, &options, &mut |p| {
         rows.push((p.t, p.x[0], p.x[1], p.event.map(str::to_owned)));
         true
@@ -110,7 +123,9 @@ fn contacts_open_where_the_surface_falls_away() {
     .unwrap();
     let resting: Vec<f64> = rows
         .iter()
-        .filter(|(t, x, v, _)| (x - 0.5 * (2.0 * t).sin()).abs() < 1e-9 && (v - (2.0 * t).cos()).abs() < 1e-9)
+        .filter(|(t, x, v, _)| {
+            (x - 0.5 * (2.0 * t).sin()).abs() < 1e-9 && (v - (2.0 * t).cos()).abs() < 1e-9
+        })
         .map(|(t, ..)| *t)
         .collect();
     assert!(resting.len() > 20, "{resting:?}");
@@ -136,7 +151,8 @@ fn a_thermostat_has_its_period() {
 fn sliding_control_decays_as_its_line_says() {
     let model = shipped("sliding-mode-control");
     let mut rows = Vec::new();
-    let options = Options { t_end: 8.0, record: Record::Times { every: 1.0 }, ..Options::default() };
+    let options =
+        Options { t_end: 8.0, record: Record::Times { every: 1.0 }, ..Options::default() };
     follow(&model, &options, &mut |p| {
         rows.push((p.x[0], p.x[1], p.signs.to_owned()));
         true
@@ -149,7 +165,8 @@ fn sliding_control_decays_as_its_line_says() {
     }
 }
 
-/// McGeer (1990): just after an impact w^2 = c^2 4 (g/l) sin(alpha) sin(slope)/(1 - c^2), c = cos(2 alpha).
+/// McGeer (1990): just after an impact w^2 = c^2 4 (g/l) sin(alpha) sin(slope)/(1 - c^2), c = cos(2
+/// alpha).
 #[test]
 fn a_rimless_wheel_walks_with_its_speed() {
     let model = shipped("rimless-wheel");
@@ -166,15 +183,20 @@ fn a_rimless_wheel_walks_with_its_speed() {
     near(after, (c * c * 4.0 * 9.81 * alpha.sin() * slope.sin() / (1.0 - c * c)).sqrt(), 1e-8);
 }
 
-/// The steady amplitude without a wall is 1/sqrt((1 - w^2)^2 + (2 zeta w)^2): a wall a little farther is never met, a little nearer is.
+/// The steady amplitude without a wall is 1/sqrt((1 - w^2)^2 + (2 zeta w)^2): a wall a little
+/// farther is never met, a little nearer is.
 #[test]
 fn a_wall_beyond_the_amplitude_is_not_met() {
     let (w, zeta) = (2.8_f64, 0.05_f64);
     let amplitude = 1.0 / ((1.0 - w * w).powi(2) + (2.0 * zeta * w).powi(2)).sqrt();
     let phase = (2.0 * zeta * w).atan2(1.0 - w * w);
-    let start = format!("start = [{:e}, {:e}]", amplitude * phase.cos(), amplitude * w * phase.sin());
-    let text = twofold_system::library::general("impact-oscillator").unwrap().replace("start = [0, 0]", &start);
-    let impacts = |wall: f64| run(&model(&text).with("wall", wall).unwrap(), 100.0).1.unwrap().events;
+    let start =
+        format!("start = [{:e}, {:e}]", amplitude * phase.cos(), amplitude * w * phase.sin());
+    let text = twofold_system::library::general("impact-oscillator")
+        .unwrap()
+        .replace("start = [0, 0]", &start);
+    let impacts =
+        |wall: f64| run(&model(&text).with("wall", wall).unwrap(), 100.0).1.unwrap().events;
     assert_eq!(impacts(amplitude * (1.0 + 1e-7)), 0);
     assert!(impacts(amplitude * (1.0 - 1e-7)) > 0);
 }
@@ -182,7 +204,10 @@ fn a_wall_beyond_the_amplitude_is_not_met() {
 /// SciPy 1.17.1: DOP853 with rtol 1e-12 from switch to switch by its events.
 #[test]
 fn numbers_are_scipys() {
-    let x = end("states = ['x', 'v']\nstart = [0, 0]\nf = ['v', '-x + 0.5*sin(t) - 0.3*sign(v - 0.1)']", 5.0);
+    let x = end(
+        "states = ['x', 'v']\nstart = [0, 0]\nf = ['v', '-x + 0.5*sin(t) - 0.3*sign(v - 0.1)']",
+        5.0,
+    );
     near(x[0], 0.01399237, 1e-8);
     near(x[1], -0.5056829, 1e-7);
 }
@@ -228,13 +253,16 @@ fn what_is_thinner_than_a_step_is_seen() {
     }
 }
 
-/// Systems in other units move the same way: states by any factor, switching functions by any positive number.
+/// Systems in other units move the same way: states by any factor, switching functions by any
+/// positive number.
 #[test]
 fn units_change_nothing() {
     let text = |unit: f64, scale: f64| {
         format!(
-            "states = ['x', 'v']\nstart = [{:e}, 0]\nf = ['v', '-x - {unit:e}*0.3*sign({scale:e}*(v - {unit:e}*0.1)) + {unit:e}*sin(2*t)']\n\
-             [[event]]\nwhen = '{scale:e}*(x - {unit:e}*1.2)'\ndirection = 'up'\nset = {{ v = '-0.7*v' }}",
+            "states = ['x', 'v']\nstart = [{:e}, 0]\nf = ['v', '-x - \
+                {unit:e}*0.3*sign({scale:e}*(v - {unit:e}*0.1)) + {unit:e}*sin(2*t)']\n\
+             [[event]]\nwhen = '{scale:e}*(x - {unit:e}*1.2)'\ndirection = 'up'\nset = {{ v = \
+             '-0.7*v' }}",
             unit * 0.5
         )
     };
@@ -252,14 +280,18 @@ fn units_change_nothing() {
 fn what_is_not_decided_is_said_with_the_ways() {
     let text = "states = ['x', 'y']\nstart = [0, 0]\nf = ['sign(x)', '1']";
     let error = run(&model(text), 1.0).1.unwrap_err();
-    assert!(error.to_string().contains("x = 0") && error.to_string().contains("+ or - or 0"), "{error}");
+    assert!(
+        error.to_string().contains("x = 0") && error.to_string().contains("+ or - or 0"),
+        "{error}"
+    );
     for (exit, want) in [(Exit::Plus, 1.0), (Exit::Minus, -1.0)] {
         let options = Options { t_end: 1.0, exit, ..Options::default() };
         near(follow(&model(text), &options, &mut |_| true).unwrap().x[0], want, 1e-12);
     }
 }
 
-/// Two relays that know nothing of each other, met together: each does what it does alone (twisting, corner, sliding on both).
+/// Two relays that know nothing of each other, met together: each does what it does alone
+/// (twisting, corner, sliding on both).
 #[test]
 fn surfaces_that_are_met_together_are_decided_together() {
     let x = end("states = ['x', 'y']\nstart = [1, 1]\nf = ['-sign(x)', '-sign(y)']", 3.0);
@@ -270,7 +302,8 @@ fn surfaces_that_are_met_together_are_decided_together() {
     near(x[1], -(2.0 - 1.0 / 3.0), 1e-12);
     // Sliding on x = 0 meets y = 0 and slides on both.
     let x = end(
-        "states = ['x', 'y', 'z']\nstart = [0.5, 2, 0]\nf = ['-sign(x) + 0.5', '-sign(y)', 'sign(x) + sign(y)']",
+        "states = ['x', 'y', 'z']\nstart = [0.5, 2, 0]\nf = ['-sign(x) + 0.5', '-sign(y)', \
+            'sign(x) + sign(y)']",
         5.0,
     );
     assert!(x[0].abs() < 1e-14 && x[1].abs() < 1e-14, "{x:?}");
@@ -278,20 +311,29 @@ fn surfaces_that_are_met_together_are_decided_together() {
     near(x[2], 2.0 + 1.5 + 1.5, 1e-9);
 }
 
-/// A block in a chain sticks or not, whatever its hundred neighbours do; nothing is done for each pair.
+/// A block in a chain sticks or not, whatever its hundred neighbours do; nothing is done for each
+/// pair.
 #[test]
 fn fifty_blocks_on_a_belt() {
     let n = 50;
-    let states: Vec<String> = (0..n).map(|i| format!("'x{i}'")).chain((0..n).map(|i| format!("'v{i}'"))).collect();
-    let start: Vec<String> =
-        (0..n).map(|i| format!("{}", 0.01 * f64::from(i))).chain((0..n).map(|_| "0".into())).collect();
+    let states: Vec<String> =
+        (0..n).map(|i| format!("'x{i}'")).chain((0..n).map(|i| format!("'v{i}'"))).collect();
+    let start: Vec<String> = (0..n)
+        .map(|i| format!("{}", 0.01 * f64::from(i)))
+        .chain((0..n).map(|_| "0".into()))
+        .collect();
     let mut f: Vec<String> = (0..n).map(|i| format!("'v{i}'")).collect();
     for i in 0..n {
         let left = if i > 0 { format!("x{} - x{i}", i - 1) } else { format!("-x{i}") };
         let right = if i + 1 < n { format!(" + x{} - x{i}", i + 1) } else { String::new() };
         f.push(format!("'{left}{right} - 0.5*sign(v{i} - 0.1) - 0.05*v{i}'"));
     }
-    let text = format!("states = [{}]\nstart = [{}]\nf = [{}]", states.join(", "), start.join(", "), f.join(", "));
+    let text = format!(
+        "states = [{}]\nstart = [{}]\nf = [{}]",
+        states.join(", "),
+        start.join(", "),
+        f.join(", ")
+    );
     let x = end(&text, 2.0);
     // The middle moves with the belt from the time v = 0.1 is reached, at about 0.2.
     near(x[n as usize + 25], 0.1, 1e-12);
@@ -303,7 +345,8 @@ fn events_happen_in_the_files_order_one_after_the_other() {
     let text = "states = ['x', 'y']\nstart = [0, 0]\nf = ['1', '0']\n\
         [[event]]\nname = 'a'\nwhen = 'x - 1'\nset = { x = 'y - 5', y = 'x + 10' }\n\
         [[event]]\nname = 'b'\nwhen = 'x - 1'\nset = { y = 'y + 1' }\n\
-        [[event]]\nname = 'c'\nat = [2, 3]\n[[event]]\nname = 'd'\nevery = 1\n[[event]]\nname = 'e'\nwhen = 'x > -3'\nstop = true";
+        [[event]]\nname = 'c'\nat = [2, 3]\n[[event]]\nname = 'd'\nevery = 1\n[[event]]\nname = \
+        'e'\nwhen = 'x > -3'\nstop = true";
     let (events, outcome) = run(&model(text), 9.0);
     let outcome = outcome.unwrap();
     let names: Vec<&str> = events.iter().map(|(_, e)| e.as_str()).collect();
@@ -318,21 +361,26 @@ fn events_happen_in_the_files_order_one_after_the_other() {
 /// What is zero at the start happens when it is next met.
 #[test]
 fn an_event_that_is_zero_at_the_start_waits() {
-    let text = "states = ['x', 'v']\nstart = [0, 1]\nf = ['v', '-x']\n[[event]]\nwhen = 'x'\nstop = true";
+    let text =
+        "states = ['x', 'v']\nstart = [0, 1]\nf = ['v', '-x']\n[[event]]\nwhen = 'x'\nstop = true";
     near(run(&model(text), 9.0).1.unwrap().t, std::f64::consts::PI, 1e-9);
 }
 
 #[test]
 fn the_end_of_a_domain_is_named() {
-    let error = run(&model("states = ['x']\nstart = [4]\nf = ['-sqrt(x) - 1']"), 5.0).1.unwrap_err();
+    let error =
+        run(&model("states = ['x']\nstart = [4]\nf = ['-sqrt(x) - 1']"), 5.0).1.unwrap_err();
     let HybridError::Domain { t, what, .. } = error else { panic!("{error}") };
     near(t, 2.0 * (2.0 - 3.0_f64.ln()), 1e-8);
     assert!(what.contains("square root") && what.contains("-sqrt(x) - 1"), "{what}");
-    for (text, said) in
-        [("-x^(1/3) - 1", "an odd root of one is sign(x)*abs(x)^(1/3)"), ("log(x) - 9", "the logarithm of")]
-    {
-        let error =
-            run(&model(&format!("states = ['x']\nstart = [4]\nf = ['{text}']")), 50.0).1.unwrap_err().to_string();
+    for (text, said) in [
+        ("-x^(1/3) - 1", "an odd root of one is sign(x)*abs(x)^(1/3)"),
+        ("log(x) - 9", "the logarithm of"),
+    ] {
+        let error = run(&model(&format!("states = ['x']\nstart = [4]\nf = ['{text}']")), 50.0)
+            .1
+            .unwrap_err()
+            .to_string();
         assert!(error.contains(said) && error.contains(text), "{error}");
     }
     // A branch that motion never reaches is never computed.
@@ -350,24 +398,75 @@ fn errors_point_into_the_file() {
         ("states = ['x']\nf = ['x', '1']", "2:5", "2 expressions for 1 states", ""),
         ("states = ['x']\nf = ['y']", "2:7", "unknown name `y`", ""),
         ("states = ['t']\nf = ['1']", "1:11", "meaning of its own", ""),
-        ("states = ['x']\nf = ['1']\n[[event]]\nset = { x = '0' }", "3:1", "not said when", "when, at or every"),
-        ("states = ['x']\nf = ['1']\n[[event]]\nwhen = 'x'\nset = { y = '0' }", "5:13", "no state `y`", "states are x"),
-        ("states = ['x']\nf = ['1']\n[[event]]\nwhen = 'x > 1'\ndirection = 'up'", "5:13", "becomes true", ""),
-        ("states = ['x']\nf = ['1']\n[[event]]\nwhen = 'x'\nmode = 'on'", "5:8", "no mode `on`", ""),
-        ("states = ['x']\nf = ['1']\n[[event]]\nwhen = 'x'\nafter_zeno = 'stick'", "5:14", "sets one state", ""),
-        ("states = ['x']\nf = [true]", "2:5", "a number is wanted", ""),
-        ("states = ['x']\nf = ['1']\n[parameters]\ng = { value = 1, aboev = 0 }", "4:5", "value, above, below", ""),
-        ("states = ['x']\nstart = [1, 2]\nf = ['1']", "2:9", "2 numbers for 1 states", "one for each"),
-        ("states = ['x']\nf = ['1']\nh = 'x'\nplus = ['1']\nminus = ['1']", "3:5", "given twice", "one of f"),
-        ("states = ['x']\nf = ['1']\nevnt = 3", "3:1", "unknown field `evnt`", "did you mean `event`?"),
         (
-            "states = ['x']\nf = ['wind']\n[tables.wind]\nfile = '../wind.csv'\ntime = 't'\ncolumn = 'v'",
+            "states = ['x']\nf = ['1']\n[[event]]\nset = { x = '0' }",
+            "3:1",
+            "not said when",
+            "when, at or every",
+        ),
+        (
+            "states = ['x']\nf = ['1']\n[[event]]\nwhen = 'x'\nset = { y = '0' }",
+            "5:13",
+            "no state `y`",
+            "states are x",
+        ),
+        (
+            "states = ['x']\nf = ['1']\n[[event]]\nwhen = 'x > 1'\ndirection = 'up'",
+            "5:13",
+            "becomes true",
+            "",
+        ),
+        (
+            "states = ['x']\nf = ['1']\n[[event]]\nwhen = 'x'\nmode = 'on'",
+            "5:8",
+            "no mode `on`",
+            "",
+        ),
+        (
+            "states = ['x']\nf = ['1']\n[[event]]\nwhen = 'x'\nafter_zeno = 'stick'",
+            "5:14",
+            "sets one state",
+            "",
+        ),
+        ("states = ['x']\nf = [true]", "2:5", "a number is wanted", ""),
+        (
+            "states = ['x']\nf = ['1']\n[parameters]\ng = { value = 1, aboev = 0 }",
+            "4:5",
+            "value, above, below",
+            "",
+        ),
+        (
+            "states = ['x']\nstart = [1, 2]\nf = ['1']",
+            "2:9",
+            "2 numbers for 1 states",
+            "one for each",
+        ),
+        (
+            "states = ['x']\nf = ['1']\nh = 'x'\nplus = ['1']\nminus = ['1']",
+            "3:5",
+            "given twice",
+            "one of f",
+        ),
+        (
+            "states = ['x']\nf = ['1']\nevnt = 3",
+            "3:1",
+            "unknown field `evnt`",
+            "did you mean `event`?",
+        ),
+        (
+            "states = ['x']\nf = ['wind']\n[tables.wind]\nfile = '../wind.csv'\ntime = 't'\ncolumn \
+                = 'v'",
             "4:8",
             "beside the system's",
             "",
         ),
         ("states = ['x']\nf = ['a']\n[let]\na = 'b'\nb = 'a'", "4:5", "depends on itself", ""),
-        ("states = ['x']\nf = ['1']\n[parameters]\na = 't'", "4:5", "does not depend on the time", ""),
+        (
+            "states = ['x']\nf = ['1']\n[parameters]\na = 't'",
+            "4:5",
+            "does not depend on the time",
+            "",
+        ),
     ] {
         let error = Definition::from_toml(text, "f").expect_err(text);
         let found = format!("{}:{}", error.line, error.column);
@@ -383,12 +482,15 @@ fn rests_are_found_with_their_stability() {
     use crate::rests::rests;
     // Two foci and a saddle of a double well.
     let well = model("states = ['x', 'v']\nf = ['v', 'x - x^3 - 0.2*v']");
-    let kinds: Vec<String> = rests(&well, &[(-2.0, 2.0); 2]).unwrap().iter().map(|r| r.kind()).collect();
+    let kinds: Vec<String> =
+        rests(&well, &[(-2.0, 2.0); 2]).unwrap().iter().map(|r| r.kind()).collect();
     assert_eq!(kinds, ["stable focus", "saddle", "stable focus"]);
-    // Sliding on v = 0.2 with x' = 0.2: no rest there, but those of both fields, which are not on their own sides.
+    // Sliding on v = 0.2 with x' = 0.2: no rest there, but those of both fields, which are not on
+    // their own sides.
     let block = "states = ['x', 'v']\nf = ['v', '-x - sign(v - 0.2)']";
     assert!(rests(&model(block), &[(-3.0, 3.0); 2]).unwrap().iter().all(|r| r.on.is_empty()));
-    // On x = 0: fields (1, y - 1) below and (-1, y + 3) above: halves cancel in x, so y' = y + 1, which vanishes at -1 and grows.
+    // On x = 0: fields (1, y - 1) below and (-1, y + 3) above: halves cancel in x, so y' = y + 1,
+    // which vanishes at -1 and grows.
     let planar = model("states = ['x', 'y']\nf = ['-sign(x)', 'y + 1 + 2*sign(x)']");
     let found = rests(&planar, &[(-3.0, 3.0); 2]).unwrap();
     assert_eq!(found.len(), 1, "{found:?}");
@@ -396,7 +498,12 @@ fn rests_are_found_with_their_stability() {
     near(found[0].eigenvalues[0][0], 1.0, 1e-9);
     assert_eq!((found[0].on[0].surface.as_str(), found[0].attracting), ("x", Some(true)));
     near(found[0].on[0].weight, 0.5, 1e-12);
-    assert!(rests(&model("states = ['x']\nf = ['sin(t)']"), &[(-1.0, 1.0)]).unwrap_err().to_string().contains("time"));
+    assert!(
+        rests(&model("states = ['x']\nf = ['sin(t)']"), &[(-1.0, 1.0)])
+            .unwrap_err()
+            .to_string()
+            .contains("time")
+    );
 }
 
 /// Multipliers and exponents against what formulas say, through crossing, sliding and resets.
@@ -404,30 +511,54 @@ fn rests_are_found_with_their_stability() {
 fn tangent_vectors_pass_switches_by_saltation_matrices() {
     use crate::motion::tangent::{Return, closed_orbit, exponents};
     let section = |text: &str| {
-        Record::Section(twofold_system::Expression::parse_general(text, &["x", "v", "a", "w", "T"]).unwrap())
+        Record::Section(
+            twofold_system::Expression::parse_general(text, &["x", "v", "a", "w", "T"]).unwrap(),
+        )
     };
-    // The wheel: w^2 after a step is c^2 (w^2 + const), so that the multiplier is c^2, c = cos(pi/4).
-    let options = Options { start: Some(vec![-0.3, 1.2]), record: section("a"), t_end: 50.0, ..Options::default() };
+    // The wheel: w^2 after a step is c^2 (w^2 + const), so that the multiplier is c^2, c =
+    // cos(pi/4).
+    let options = Options {
+        start: Some(vec![-0.3, 1.2]),
+        record: section("a"),
+        t_end: 50.0,
+        ..Options::default()
+    };
     let orbit = closed_orbit(&shipped("rimless-wheel"), &options, &Return::Crossings(1)).unwrap();
     assert_eq!(orbit.multipliers.len(), 1);
     near(orbit.multipliers[0][0], 0.5, 1e-8);
-    // A linear oscillator that loses half of its speed at a wall, driven so that a ball comes back: x'' = -1 with v -> -r v + u. One bounce: v -> r v + u.
+    // A linear oscillator that loses half of its speed at a wall, driven so that a ball comes back:
+    // x'' = -1 with v -> -r v + u. One bounce: v -> r v + u.
     let juggler = model(
-        "states = ['x', 'v']\nstart = [0, 1.9]\nf = ['v', '-1']\n[[event]]\nwhen = 'x'\ndirection = 'down'\nset = { v = '1 - 0.5*v' }",
+        "states = ['x', 'v']\nstart = [0, 1.9]\nf = ['v', '-1']\n[[event]]\nwhen = 'x'\ndirection \
+            = 'down'\nset = { v = '1 - 0.5*v' }",
     );
-    let options = Options { start: Some(vec![1.9, 0.1]), record: section("v - 0"), t_end: 50.0, ..Options::default() };
-    let orbit =
-        closed_orbit(&juggler, &Options { record: section("0 - v"), ..options }, &Return::Crossings(1)).unwrap();
+    let options = Options {
+        start: Some(vec![1.9, 0.1]),
+        record: section("v - 0"),
+        t_end: 50.0,
+        ..Options::default()
+    };
+    let orbit = closed_orbit(
+        &juggler,
+        &Options { record: section("0 - v"), ..options },
+        &Return::Crossings(1),
+    )
+    .unwrap();
     near(orbit.period, 4.0, 1e-9);
     near(orbit.multipliers[0][0], 0.5, 1e-7);
-    // x' = -x + a(t) with a relay that crosses: x'' + x' ... the exponent of a linear system with a switch in its input is its own eigenvalue.
-    let relay = model("states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-x - 0.2*v + sign(sin(t))']");
-    let found = exponents(&relay, &Options { t_end: 400.0, ..Options::default() }, 40.0, 2).unwrap();
+    // x' = -x + a(t) with a relay that crosses: x'' + x' ... the exponent of a linear system with a
+    // switch in its input is its own eigenvalue.
+    let relay =
+        model("states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-x - 0.2*v + sign(sin(t))']");
+    let found =
+        exponents(&relay, &Options { t_end: 400.0, ..Options::default() }, 40.0, 2).unwrap();
     near(found.values[0], -0.1, 2e-3);
     near(found.values[0] + found.values[1], -0.2, 1e-6);
-    // On the line of a sliding control neighbours approach at lambda; across it sliding takes them away.
+    // On the line of a sliding control neighbours approach at lambda; across it sliding takes them
+    // away.
     let control = shipped("sliding-mode-control");
-    let found = exponents(&control, &Options { t_end: 60.0, ..Options::default() }, 3.0, 2).unwrap();
+    let found =
+        exponents(&control, &Options { t_end: 60.0, ..Options::default() }, 3.0, 2).unwrap();
     near(found.values[0], -1.0, 1e-6);
     assert_eq!(found.values[1], f64::NEG_INFINITY);
     // Giaouris, Maity, Banerjee, Pickert & Zahawi (2008), sec. V: -0.8211 +- 0.0708i at 24 V.
@@ -435,22 +566,32 @@ fn tangent_vectors_pass_switches_by_saltation_matrices() {
     let orbit = closed_orbit(&shipped("buck-ramp"), &options, &Return::Period(400e-6)).unwrap();
     near(orbit.multipliers[0][0], -0.8211, 5e-5);
     near(orbit.multipliers[0][1].abs(), 0.0708, 5e-5);
-    // A forced oscillator's multipliers over one period are exp of its eigenvalues times the period.
+    // A forced oscillator's multipliers over one period are exp of its eigenvalues times the
+    // period.
     let period = 2.0 * std::f64::consts::PI;
     let options = Options { start: Some(vec![0.3, 0.2]), ..Options::default() };
     let orbit = closed_orbit(&relay, &options, &Return::Period(period)).unwrap();
     let size = (orbit.multipliers[0][0].powi(2) + orbit.multipliers[0][1].powi(2)).sqrt();
     near(size, (-0.1 * period).exp(), 1e-8);
     // Stick-slip: a piece of sliding forgets everything, and the multiplier is 0.
-    let block = model("states = ['x', 'v']\nstart = [0, 0]\nf = ['v', '-x + (1 - 0.3*(0.5 - v))*sign(0.5 - v)*1']");
-    let options = Options { start: Some(vec![0.0, 0.5]), record: section("x"), t_end: 60.0, ..Options::default() };
+    let block = model(
+        "states = ['x', 'v']\nstart = [0, 0]\nf = ['v', '-x + (1 - 0.3*(0.5 - v))*sign(0.5 - \
+            v)*1']",
+    );
+    let options = Options {
+        start: Some(vec![0.0, 0.5]),
+        record: section("x"),
+        t_end: 60.0,
+        ..Options::default()
+    };
     if let Ok(orbit) = closed_orbit(&block, &options, &Return::Crossings(1)) {
         near(orbit.multipliers[0][0], 0.0, 1e-9);
     }
 }
 
-/// The converter's orbit as matrix exponentials give it (SciPy's `expm`, Newton's method on the period), and its averages: E + v2 = v1 whatever the ripple,
-/// and without ripple v2 = E d/(1 - d), or E d/sqrt(K) where the diode blocks before the period ends (Cuk & Middlebrook 1977).
+/// The converter's orbit as matrix exponentials give it (SciPy's `expm`, Newton's method on the
+/// period), and its averages: E + v2 = v1 whatever the ripple, and without ripple v2 = E d/(1 - d),
+/// or E d/sqrt(K) where the diode blocks before the period ends (Cuk & Middlebrook 1977).
 #[test]
 fn a_cuk_converter_has_its_closed_orbits() {
     use crate::motion::tangent::{Return, closed_orbit};
@@ -459,26 +600,44 @@ fn a_cuk_converter_has_its_closed_orbits() {
         .replace("start = [", "start = [0, 0, ")
         .replace("states = [", "states = [\"a1\", \"a2\",")
         .replace("f = [", "f = [\"v1/period\", \"v2/period\",");
-    let always = [0.218_389_663_520_619_75, 20.150_423_570_475_724, 0.351_820_166_631_876_3, 7.995_275_864_182_7];
-    let partly =
-        [0.002_243_986_613_041_76, 25.590_378_587_232_767, -0.002_243_986_613_041_735_8, 13.572_417_655_863_98];
-    let sizes =
-        ([0.987_751_6, 0.987_751_6, 0.963_024_94, 0.963_024_94], [0.997_151_281, 0.997_151_281, 0.995_008_467, 0.0]);
-    let averages = ([19.998_721_264_603_635, 7.998_721_264_603_72], [25.580_796_932_456_376, 13.580_796_932_456_662]);
+    let always = [
+        0.218_389_663_520_619_75,
+        20.150_423_570_475_724,
+        0.351_820_166_631_876_3,
+        7.995_275_864_182_7,
+    ];
+    let partly = [
+        0.002_243_986_613_041_76,
+        25.590_378_587_232_767,
+        -0.002_243_986_613_041_735_8,
+        13.572_417_655_863_98,
+    ];
+    let sizes = (
+        [0.987_751_6, 0.987_751_6, 0.963_024_94, 0.963_024_94],
+        [0.997_151_281, 0.997_151_281, 0.995_008_467, 0.0],
+    );
+    let averages = (
+        [19.998_721_264_603_635, 7.998_721_264_603_72],
+        [25.580_796_932_456_376, 13.580_796_932_456_662],
+    );
     let ideal = (0.4 / 0.6, 0.4 / 0.125_f64.sqrt());
-    for (load, orbit, sizes, averages, ideal) in
-        [(20.0, always, sizes.0, averages.0, ideal.0), (400.0, partly, sizes.1, averages.1, ideal.1)]
-    {
+    for (load, orbit, sizes, averages, ideal) in [
+        (20.0, always, sizes.0, averages.0, ideal.0),
+        (400.0, partly, sizes.1, averages.1, ideal.1),
+    ] {
         let model = model(text).with("load", load).unwrap();
         // From a start beside it.
         let start = orbit.iter().map(|x| x * 1.001).collect();
         let options = Options { start: Some(start), ..Options::default() };
         let found = closed_orbit(&model, &options, &Return::Period(20e-6)).unwrap();
         found.x.iter().zip(orbit).for_each(|(x, want)| near(*x, want, 1e-8));
-        let mut of: Vec<f64> = found.multipliers.iter().map(|m| (m[0] * m[0] + m[1] * m[1]).sqrt()).collect();
+        let mut of: Vec<f64> =
+            found.multipliers.iter().map(|m| (m[0] * m[0] + m[1] * m[1]).sqrt()).collect();
         of.sort_by(|a, b| b.total_cmp(a));
         of.iter().zip(sizes).for_each(|(size, want)| near(*size, want, 1e-6));
-        let averaged = Model::new(Definition::from_toml(&averaged, "test.toml").unwrap()).with("load", load).unwrap();
+        let averaged = Model::new(Definition::from_toml(&averaged, "test.toml").unwrap())
+            .with("load", load)
+            .unwrap();
         let start = [0.0, 0.0].into_iter().chain(orbit).collect();
         let options = Options { t_end: 20e-6, start: Some(start), ..Options::default() };
         let end = follow(&averaged, &options, &mut |_| true).unwrap().x;
@@ -488,7 +647,8 @@ fn a_cuk_converter_has_its_closed_orbits() {
         near(end[1], 12.0 * ideal, 5e-4 * end[1]);
         end[2..].iter().zip(orbit).for_each(|(x, want)| near(*x, want, 1e-8));
         // Sliding ends where the ramp jumps back, ten times.
-        let options = Options { t_end: 10.0 * 20e-6, start: Some(orbit.to_vec()), ..Options::default() };
+        let options =
+            Options { t_end: 10.0 * 20e-6, start: Some(orbit.to_vec()), ..Options::default() };
         let end = follow(&model, &options, &mut |_| true).unwrap().x;
         end.iter().zip(orbit).for_each(|(x, want)| near(*x, want, 1e-8));
     }
@@ -503,10 +663,13 @@ fn tangent_vectors_agree_with_finite_differences() {
     let period = 2.0 * std::f64::consts::PI / 1.3;
     let model = model(text);
     let start = vec![0.2, 0.1];
-    // The derivative of the map over one period, by the first Newton step's matrix: multipliers of a closed orbit need one to exist.
-    let Ok(orbit) =
-        closed_orbit(&model, &Options { start: Some(start), ..Options::default() }, &Return::Period(period))
-    else {
+    // The derivative of the map over one period, by the first Newton step's matrix: multipliers of
+    // a closed orbit need one to exist.
+    let Ok(orbit) = closed_orbit(
+        &model,
+        &Options { start: Some(start), ..Options::default() },
+        &Return::Period(period),
+    ) else {
         panic!("no orbit")
     };
     let map = |x: Vec<f64>| {
@@ -524,18 +687,22 @@ fn tangent_vectors_agree_with_finite_differences() {
             matrix[i * 2 + j] = (up[i] - down[i]) / (2.0 * h);
         }
     }
-    let (trace, determinant) = (matrix[0] + matrix[3], matrix[0] * matrix[3] - matrix[1] * matrix[2]);
+    let (trace, determinant) =
+        (matrix[0] + matrix[3], matrix[0] * matrix[3] - matrix[1] * matrix[2]);
     let [a, b] = [orbit.multipliers[0], orbit.multipliers[1]];
     near(a[0] + b[0], trace, 1e-5);
     near(a[0] * b[0] - a[1] * b[1], determinant, 1e-5);
 }
 
-/// What left zero at one event is not zero at the next: a ball above another meets the floor and the other by turns.
+/// What left zero at one event is not zero at the next: a ball above another meets the floor and
+/// the other by turns.
 #[test]
 fn events_that_follow_each_other_are_told_apart() {
-    let text = "states = ['x1', 'v1', 'x2', 'v2']\nstart = [1, 0, 2, 0]\nf = ['v1', '-9.81', 'v2', '-9.81']\n\
+    let text = "states = ['x1', 'v1', 'x2', 'v2']\nstart = [1, 0, 2, 0]\nf = ['v1', '-9.81', 'v2', \
+        '-9.81']\n\
         [[event]]\nname = 'floor'\nwhen = 'x1'\ndirection = 'down'\nset = { v1 = '-v1' }\n\
-        [[event]]\nname = 'collide'\nwhen = 'x2 - x1'\ndirection = 'down'\nset = { v1 = 'v2', v2 = 'v1' }";
+        [[event]]\nname = 'collide'\nwhen = 'x2 - x1'\ndirection = 'down'\nset = { v1 = 'v2', v2 = \
+        'v1' }";
     let (events, outcome) = run(&model(text), 20.0);
     let x = outcome.unwrap().x;
     // Energy stays what it was, and the balls keep their order.
@@ -550,24 +717,33 @@ fn a_domain_may_end_at_a_switch() {
     let x = end("states = ['h']\nstart = [1]\nf = ['-sqrt(max(h, 0))']", 5.0);
     near(x[0], 0.0, 1e-12);
     // |x|^0.5 on both sides: x' = -1.5 sqrt(|x|) sign(x) - 1 from 1 crosses 0 at t = 4/3 (1 - 2/3 ln(5/2)).
-    let x = end("states = ['x', 't0']\nstart = [1, 0]\nf = ['-1.5*abs(x)^0.5*sign(x) - 1', 'x > 0']", 3.0);
+    let x = end(
+        "states = ['x', 't0']\nstart = [1, 0]\nf = ['-1.5*abs(x)^0.5*sign(x) - 1', 'x > 0']",
+        3.0,
+    );
     near(x[1], 4.0 / 3.0 * (1.0 - 2.0 / 3.0 * 2.5_f64.ln()), 1e-8);
     // It tends to where 1.5 sqrt(-x) = 1.
-    near(end("states = ['x']\nstart = [1]\nf = ['-1.5*abs(x)^0.5*sign(x) - 1']", 30.0)[0], -4.0 / 9.0, 1e-8);
+    near(
+        end("states = ['x']\nstart = [1]\nf = ['-1.5*abs(x)^0.5*sign(x) - 1']", 30.0)[0],
+        -4.0 / 9.0,
+        1e-8,
+    );
 }
 
 /// A condition may have a name.
 #[test]
 fn conditions_have_names() {
     let x = end(
-        "states = ['x']\nstart = [0]\nf = ['if(late and not cold, 2, 1) + late']\n[let]\nlate = 't > 1'\ncold = 'early'\nearly = 't < 2'",
+        "states = ['x']\nstart = [0]\nf = ['if(late and not cold, 2, 1) + late']\n[let]\nlate = 't \
+            > 1'\ncold = 'early'\nearly = 't < 2'",
         3.0,
     );
     // 1 to t = 1, 2 to t = 2, 3 to t = 3.
     near(x[0], 6.0, 1e-10);
 }
 
-/// Stiff modes and stiff sliding by the implicit method: a few steps where an explicit one needs a million.
+/// Stiff modes and stiff sliding by the implicit method: a few steps where an explicit one needs a
+/// million.
 #[test]
 fn stiff_motion_is_followed_by_the_implicit_method() {
     use crate::motion::Method;
@@ -596,31 +772,37 @@ fn stiff_motion_is_followed_by_the_implicit_method() {
     assert!(end(1e-8) < 1e-8 && end(1e-11) < 1e-11, "{} {}", end(1e-8), end(1e-11));
 }
 
-/// Dry friction against a relay: each turn loses a third of the last one's speed squared, and after infinitely many the block rests.
+/// Dry friction against a relay: each turn loses a third of the last one's speed squared, and after
+/// infinitely many the block rests.
 #[test]
 fn switches_that_accumulate_may_end_in_rest() {
-    // From (1, 0): x'' = -1/2 to v = -1 at x = 0, then -x'' = 3/2 ... the turns' times are a geometric series of ratio 1/sqrt(3).
+    // From (1, 0): x'' = -1/2 to v = -1 at x = 0, then -x'' = 3/2 ... the turns' times are a
+    // geometric series of ratio 1/sqrt(3).
     let text = "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-sign(x) - 0.5*sign(v)']";
     let mut rows = Vec::new();
-    let options = Options { t_end: 12.0, record: Record::Times { every: 1.0 }, ..Options::default() };
+    let options =
+        Options { t_end: 12.0, record: Record::Times { every: 1.0 }, ..Options::default() };
     let outcome = follow(&model(text), &options, &mut |p| {
         rows.push((p.t, p.x[0], p.x[1], p.signs.to_owned()));
         true
     })
     .unwrap();
     assert_eq!((outcome.ending, rows.len()), (Ending::Finished, 13));
-    // 2 to x = 0 at speed 1; then turns of duration v (2/3 + 2/sqrt(3)) each, v falling by 1/sqrt(3).
+    // 2 to x = 0 at speed 1; then turns of duration v (2/3 + 2/sqrt(3)) each, v falling by
+    // 1/sqrt(3).
     let q = 1.0 / 3.0_f64.sqrt();
     let rest = 2.0 + (2.0 / 3.0 + 2.0 * q) / (1.0 - q);
     assert!(
-        rows.iter().all(|(t, x, v, signs)| (*t > rest) == (*x == 0.0 && *v == 0.0 && signs == "00")),
+        rows.iter()
+            .all(|(t, x, v, signs)| (*t > rest) == (*x == 0.0 && *v == 0.0 && signs == "00")),
         "{rows:?} {rest}"
     );
 }
 
 #[test]
 fn a_ball_that_lies_on_the_floor_stays_there() {
-    let ball = "states = ['x', 'v']\nstart = [0, 0]\nf = ['v', '-1']\n[[event]]\nwhen = 'x'\ndirection = 'down'\nset = { v = '-0.5*v' }\nafter_zeno = 'stick'";
+    let ball = "states = ['x', 'v']\nstart = [0, 0]\nf = ['v', '-1']\n[[event]]\nwhen = \
+        'x'\ndirection = 'down'\nset = { v = '-0.5*v' }\nafter_zeno = 'stick'";
     assert_eq!(end(ball, 5.0), [0.0, 0.0]);
     // Lifted, it leaves.
     near(end(&ball.replace("'-1'", "'t - 1'"), 4.0)[0], 4.5, 1e-9);
@@ -636,34 +818,42 @@ fn mixtures_with_other_velocities_are_refused() {
         let text = format!("states = ['x', 'y', 'z']\nstart = [1, 0.8, 0]\nf = [{f}]");
         let error = run(&model(&text), 3.0).1.unwrap_err().to_string();
         assert!(
-            error.contains("x = 0") && error.contains("y = 0") && error.contains("different velocities"),
+            error.contains("x = 0")
+                && error.contains("y = 0")
+                && error.contains("different velocities"),
             "{error}"
         );
     }
 }
 
-/// On two relays with z' = 1 + sign(x) sign(y): equal weights give z' = 1, the shortest velocity of the hull is 0.
+/// On two relays with z' = 1 + sign(x) sign(y): equal weights give z' = 1, the shortest velocity of
+/// the hull is 0.
 #[test]
 fn a_rule_chooses_among_mixtures() {
     use crate::selection::Intersection;
-    let text = "states = ['x', 'y', 'z']\nstart = [1, 1, 0]\nf = ['-sign(x)', '-sign(y)', '1 + sign(x)*sign(y)']";
+    let text = "states = ['x', 'y', 'z']\nstart = [1, 1, 0]\nf = ['-sign(x)', '-sign(y)', '1 + \
+        sign(x)*sign(y)']";
     // z' = 2 until both are met at t = 1.
-    for (intersection, want) in [(Intersection::Bilinear, 2.0 + 2.0), (Intersection::HullLeastNorm, 2.0)] {
+    for (intersection, want) in
+        [(Intersection::Bilinear, 2.0 + 2.0), (Intersection::HullLeastNorm, 2.0)]
+    {
         let options = Options { t_end: 3.0, intersection, ..Options::default() };
         let x = follow(&model(text), &options, &mut |_| true).unwrap().x;
         near(x[2], want, 1e-9);
         assert!(x[0].abs() < 1e-12 && x[1].abs() < 1e-12);
     }
     // Coupled: the rule's weights solve the same equations.
-    let text =
-        "states = ['x', 'y']\nstart = [1, 1]\nf = ['-sign(x) - 0.5*sign(x)*sign(y)', '-sign(y) + 0.3*sign(x)*sign(y)']";
-    let options = Options { t_end: 4.0, intersection: Intersection::Bilinear, ..Options::default() };
+    let text = "states = ['x', 'y']\nstart = [1, 1]\nf = ['-sign(x) - 0.5*sign(x)*sign(y)', \
+        '-sign(y) + 0.3*sign(x)*sign(y)']";
+    let options =
+        Options { t_end: 4.0, intersection: Intersection::Bilinear, ..Options::default() };
     let x = follow(&model(text), &options, &mut |_| true).unwrap().x;
     assert!(x[0].abs() < 1e-12 && x[1].abs() < 1e-12, "{x:?}");
 }
 
-/// By the hierarchy the faster relay follows the slower one: with x' = -sign(x) + sign(y)/2 and x first, sign(x) is sign(y)/2 on average on either side
-/// of y = 0, and z' = sign(x) sign(y) is 1/2; with y' = -sign(y) - sign(x)/4 and y first it is -1/4; with equal rates it is 0.
+/// By the hierarchy the faster relay follows the slower one: with x' = -sign(x) + sign(y)/2 and x
+/// first, sign(x) is sign(y)/2 on average on either side of y = 0, and z' = sign(x) sign(y) is 1/2;
+/// with y' = -sign(y) - sign(x)/4 and y first it is -1/4; with equal rates it is 0.
 #[test]
 fn the_order_of_switches_decides() {
     use crate::selection::Intersection;
@@ -673,11 +863,16 @@ fn the_order_of_switches_decides() {
         Intersection::Order(names.iter().map(parse).collect())
     };
     let run = |text: &str, intersection: Intersection, t_end: f64| {
-        follow(&model(text), &Options { t_end, intersection, max_steps: 10_000, ..Options::default() }, &mut |_| true)
+        follow(
+            &model(text),
+            &Options { t_end, intersection, max_steps: 10_000, ..Options::default() },
+            &mut |_| true,
+        )
     };
     let text = "states = ['x', 'y', 'z']\nstart = [1, 1, 0]\n\
         f = ['-sign(x) + 0.5*sign(y)', '-sign(y) - 0.25*sign(x)', 'sign(x)*sign(y)']";
-    // y is met at t = 0.8 with x = 0.6 and z = 0.8, x from there at the speed -1.125 with z' = -0.25: z(4/3) = 2/3.
+    // y is met at t = 0.8 with x = 0.6 and z = 0.8, x from there at the speed -1.125 with z' =
+    // -0.25: z(4/3) = 2/3.
     for (rule, speed) in [
         (named(&["x", "y"]), 0.5),
         (named(&["-x", "y > 0"]), 0.5),
@@ -688,28 +883,36 @@ fn the_order_of_switches_decides() {
         near(x[2], 2.0 / 3.0 + 2.0 * speed, 1e-9);
         assert!(x[0].abs() < 1e-12 && x[1].abs() < 1e-12);
     }
-    // Three: sign(x) = sign(y)/2 and sign(y) = sign(w)/4 on average, or each with the average 0 of the one before it.
+    // Three: sign(x) = sign(y)/2 and sign(y) = sign(w)/4 on average, or each with the average 0 of
+    // the one before it.
     let three = "states = ['x', 'y', 'w', 'z']\nstart = [0, 0, 0, 0]\n\
-        f = ['-sign(x) + 0.5*sign(y)', '-sign(y) + 0.25*sign(w)', '-sign(w)', 'sign(x)*sign(y) + sign(y)*sign(w)']";
+        f = ['-sign(x) + 0.5*sign(y)', '-sign(y) + 0.25*sign(w)', '-sign(w)', 'sign(x)*sign(y) + \
+        sign(y)*sign(w)']";
     near(run(three, named(&["x", "y", "w"]), 1.0).unwrap().x[3], 0.75, 1e-12);
     near(run(three, named(&["w", "y", "x"]), 1.0).unwrap().x[3], 0.0, 1e-12);
-    // The slower one is left at t = 2 to y > 0; x is slid upon all the time: z(2) = (1 + 2)/2, z(4) = z(2) + 2, y(4) = 1.
+    // The slower one is left at t = 2 to y > 0; x is slid upon all the time: z(2) = (1 + 2)/2, z(4)
+    // = z(2) + 2, y(4) = 1.
     let leaves = "states = ['x', 'y', 'z']\nstart = [0, 0, 0]\n\
         f = ['-sign(x) + 0.5*sign(y)', '-sign(y) + 0.5*t', 'sign(x) + sign(x)*sign(y)']";
     let x = run(leaves, named(&["x", "y"]), 4.0).unwrap().x;
     near(x[1], 1.0, 1e-9);
     near(x[2], 3.5, 1e-9);
     // From t = 2 on x attracts for no side of y; the other order does not ask that.
-    let ends = text.replace("0.5*sign(y)", "(0.5 + 0.25*t)*sign(y)").replace("[1, 1, 0]", "[0, 0, 0]");
+    let ends =
+        text.replace("0.5*sign(y)", "(0.5 + 0.25*t)*sign(y)").replace("[1, 1, 0]", "[0, 0, 0]");
     let error = run(&ends, named(&["x", "y"]), 4.0).unwrap_err();
     let HybridError::Undecided { t, ref ways, .. } = error else { panic!("{error}") };
     near(t, 2.0, 1e-9);
     assert!(ways.contains("does not attract for each side"), "{ways}");
     near(run(&ends, named(&["y", "x"]), 4.0).unwrap().x[2], -1.0, 1e-9);
-    // Where all mixtures have one velocity the order is not asked: these turns have no surface that attracts for both sides of the other.
-    let turns = "states = ['x', 'y']\nstart = [0, 0]\nf = ['-sign(x) - 2*sign(y)', '2*sign(x) - sign(y)']";
+    // Where all mixtures have one velocity the order is not asked: these turns have no surface that
+    // attracts for both sides of the other.
+    let turns =
+        "states = ['x', 'y']\nstart = [0, 0]\nf = ['-sign(x) - 2*sign(y)', '2*sign(x) - sign(y)']";
     assert_eq!(run(turns, named(&["x", "y"]), 1.0).unwrap().x, [0.0, 0.0]);
-    for (names, said) in [(&["x"][..], "does not name y = 0"), (&["x", "z"], "`z` is no"), (&["x", "-x"], "twice")] {
+    for (names, said) in
+        [(&["x"][..], "does not name y = 0"), (&["x", "z"], "`z` is no"), (&["x", "-x"], "twice")]
+    {
         let error = run(text, named(names), 4.0).unwrap_err().to_string();
         assert!(error.contains(said), "{error}");
     }
@@ -742,7 +945,8 @@ fn conditions_that_hold_briefly_are_met() {
 /// A ball at rest stays so whatever else happens; two balls may rest at once.
 #[test]
 fn contacts_outlast_other_events() {
-    let text = "states = ['x', 'v', 'y', 'w', 'n']\nstart = [1, 0, 2, 0, 0]\nf = ['v', '-1', 'w', '-1', '0']\n\
+    let text = "states = ['x', 'v', 'y', 'w', 'n']\nstart = [1, 0, 2, 0, 0]\nf = ['v', '-1', 'w', \
+        '-1', '0']\n\
         [[event]]\nwhen = 'x'\ndirection = 'down'\nset = { v = '-0.5*v' }\nafter_zeno = 'stick'\n\
         [[event]]\nwhen = 'y'\ndirection = 'down'\nset = { w = '-0.5*w' }\nafter_zeno = 'stick'\n\
         [[event]]\nat = [8, 12]\nset = { n = 'n + 1' }\n[[event]]\nat = 14\nset = { v = 1 }";
@@ -751,11 +955,14 @@ fn contacts_outlast_other_events() {
     assert!(x[2].abs() < 1e-9 && x[3] == 0.0 && x[4] == 2.0, "{x:?}");
 }
 
-/// Alur & Henzinger's tanks: the inflow goes to the one that is empty, by turns that shorten without end.
+/// Alur & Henzinger's tanks: the inflow goes to the one that is empty, by turns that shorten
+/// without end.
 #[test]
 fn turns_that_shorten_without_end_are_named() {
-    let text = "states = ['a', 'b']\nstart = [1, 1]\n[modes.left]\nf = ['0.75 - 0.5', '-0.5']\n[modes.right]\nf = ['-0.5', '0.75 - 0.5']\n\
-        [[event]]\nwhen = 'b'\ndirection = 'down'\nmode = 'right'\n[[event]]\nwhen = 'a'\ndirection = 'down'\nmode = 'left'";
+    let text = "states = ['a', 'b']\nstart = [1, 1]\n[modes.left]\nf = ['0.75 - 0.5', \
+        '-0.5']\n[modes.right]\nf = ['-0.5', '0.75 - 0.5']\n\
+        [[event]]\nwhen = 'b'\ndirection = 'down'\nmode = 'right'\n[[event]]\nwhen = \
+        'a'\ndirection = 'down'\nmode = 'left'";
     let outcome = run(&model(text), 20.0).1.unwrap();
     // The sum falls by 1/4 a unit of time.
     let Ending::Zeno { t, error, .. } = outcome.ending else { panic!("{outcome:?}") };
@@ -771,10 +978,12 @@ fn crossings_can_be_counted() {
     assert_eq!(end(&text.replace("'down'", "'up'"), 20.0)[2], 3.0);
 }
 
-/// The reset leaves the expression at zero, at rest and pressed upwards, in a mode in which the event does not fire.
+/// The reset leaves the expression at zero, at rest and pressed upwards, in a mode in which the
+/// event does not fire.
 #[test]
 fn an_event_of_the_other_mode_does_not_fire_again() {
-    let text = "states = ['x', 'v']\nstart = [-1, 1]\n[modes.a]\nf = ['v', '1']\n[modes.b]\nf = ['v', '1']\n\
+    let text = "states = ['x', 'v']\nstart = [-1, 1]\n[modes.a]\nf = ['v', '1']\n[modes.b]\nf = \
+        ['v', '1']\n\
         [[event]]\nfrom = 'a'\nwhen = 'x'\ndirection = 'up'\nmode = 'b'\nset = { v = 0 }";
     let met = 3.0_f64.sqrt() - 1.0;
     near(end(text, 3.0)[0], (3.0 - met) * (3.0 - met) / 2.0, 1e-9);
@@ -782,22 +991,32 @@ fn an_event_of_the_other_mode_does_not_fire_again() {
 
 #[test]
 fn what_an_event_makes_true_happens_at_once() {
-    // A counter ends the run; two modes that send motion back to where it came from happen without end.
-    let text = "states = ['x', 'n']\nstart = [0, 0]\nf = ['1', '0']\n[[event]]\nevery = 1\nset = { n = 'n + 1' }\n[[event]]\nname = 'three'\nwhen = 'n > 2.5'\nstop = true";
+    // A counter ends the run; two modes that send motion back to where it came from happen without
+    // end.
+    let text = "states = ['x', 'n']\nstart = [0, 0]\nf = ['1', '0']\n[[event]]\nevery = 1\nset = { \
+        n = 'n + 1' }\n[[event]]\nname = 'three'\nwhen = 'n > 2.5'\nstop = true";
     let outcome = run(&model(text), 9.0).1.unwrap();
     assert_eq!((outcome.ending, outcome.t), (Ending::Stopped("three".into()), 3.0));
-    let text = "states = ['x']\nstart = [0]\n[modes.a]\nf = ['1']\n[modes.b]\nf = ['-1']\n[[event]]\nwhen = 'x > 1'\nmode = 'b'\n[[event]]\nwhen = 'x < 1'\nmode = 'a'";
-    let Ending::Zeno { t, .. } = run(&model(text), 5.0).1.unwrap().ending else { panic!("it goes on") };
+    let text = "states = ['x']\nstart = [0]\n[modes.a]\nf = ['1']\n[modes.b]\nf = \
+        ['-1']\n[[event]]\nwhen = 'x > 1'\nmode = 'b'\n[[event]]\nwhen = 'x < 1'\nmode = 'a'";
+    let Ending::Zeno { t, .. } = run(&model(text), 5.0).1.unwrap().ending else {
+        panic!("it goes on")
+    };
     near(t, 1.0, 1e-12);
     // A condition's impacts accumulate as an expression's do.
-    let text = "states = ['q', 'v']\nstart = [1, 0]\nf = ['v', '-2']\n[[event]]\nwhen = 'q < 0'\nset = { v = '-0.5*v', q = 0 }";
-    let Ending::Zeno { t, .. } = run(&model(text), 5.0).1.unwrap().ending else { panic!("it goes on") };
+    let text = "states = ['q', 'v']\nstart = [1, 0]\nf = ['v', '-2']\n[[event]]\nwhen = 'q < \
+        0'\nset = { v = '-0.5*v', q = 0 }";
+    let Ending::Zeno { t, .. } = run(&model(text), 5.0).1.unwrap().ending else {
+        panic!("it goes on")
+    };
     near(t, 3.0, 1e-9);
     // A reset to zero within rounding is one to zero.
-    let text = "states = ['x']\nstart = [0.5]\nf = ['1']\n[[event]]\nwhen = 'x - 1'\nset = { x = 'x - 1' }\n[[event]]\nwhen = 'x'\nset = { x = 'x + 1' }";
+    let text = "states = ['x']\nstart = [0.5]\nf = ['1']\n[[event]]\nwhen = 'x - 1'\nset = { x = \
+        'x - 1' }\n[[event]]\nwhen = 'x'\nset = { x = 'x + 1' }";
     near(end(text, 5.2)[0], 0.7, 1e-9);
     let mut times = Vec::new();
-    let options = Options { t_end: 1.2, record: Record::Times { every: 0.4 }, ..Options::default() };
+    let options =
+        Options { t_end: 1.2, record: Record::Times { every: 0.4 }, ..Options::default() };
     follow(&model("states = ['x']\nstart = [0]\nf = ['1']"), &options, &mut |p| {
         times.push(p.t);
         true
@@ -806,7 +1025,8 @@ fn what_an_event_makes_true_happens_at_once() {
     assert_eq!(times, [0.0, 0.4, 0.8, 1.2]);
 }
 
-/// A relay's orbit through the origin: there the state itself says nothing of how large the orbit is.
+/// A relay's orbit through the origin: there the state itself says nothing of how large the orbit
+/// is.
 #[test]
 fn an_orbit_closes_on_a_section_through_the_origin() {
     let relay = model(
@@ -816,11 +1036,15 @@ fn an_orbit_closes_on_a_section_through_the_origin() {
     );
     // Rising or falling, the first mode or the other.
     for section in ["x", "0 - x"] {
-        let section =
-            crate::motion::Record::Section(twofold_system::Expression::parse_general(section, &["x"]).unwrap());
+        let section = crate::motion::Record::Section(
+            twofold_system::Expression::parse_general(section, &["x"]).unwrap(),
+        );
         let options = Options { record: section, t_end: 50.0, ..Options::default() };
-        let found =
-            crate::motion::tangent::closed_orbit(&relay, &options, &crate::motion::tangent::Return::Crossings(1));
+        let found = crate::motion::tangent::closed_orbit(
+            &relay,
+            &options,
+            &crate::motion::tangent::Return::Crossings(1),
+        );
         let period = 2.0 * (1.1_f64 / 0.9).ln();
         assert!((found.unwrap().period - period).abs() < 1e-9);
     }
@@ -831,24 +1055,32 @@ fn last(text: &str, t_end: f64) -> f64 {
     *end(text, t_end).last().unwrap()
 }
 
-/// Dips of a smooth function that are far narrower than a step: pulses, events, sliding between two surfaces.
+/// Dips of a smooth function that are far narrower than a step: pulses, events, sliding between two
+/// surfaces.
 #[test]
 fn narrow_dips_are_not_stepped_over() {
     for w in [1e-3, 1e-4, 1e-5] {
-        let pulse = format!("states = ['x', 'y']\nstart = [0, 0]\nf = ['1', 'if((x - pi)^2 < {w:e}^2, 1/{w:e}, 0)']");
+        let pulse = format!(
+            "states = ['x', 'y']\nstart = [0, 0]\nf = ['1', 'if((x - pi)^2 < {w:e}^2, 1/{w:e}, 0)']"
+        );
         near(last(&pulse, 10.0), 2.0, 1e-7);
         let event = format!(
-            "states = ['x', 'n']\nstart = [0, 0]\nf = ['1', '0']\n[[event]]\nwhen = '((x - 1)/{w:e})^2 - 1'\nset = {{ n = 'n + 1' }}"
+            "states = ['x', 'n']\nstart = [0, 0]\nf = ['1', '0']\n[[event]]\nwhen = '((x - \
+                1)/{w:e})^2 - 1'\nset = {{ n = 'n + 1' }}"
         );
         near(last(&event, 2.0), 2.0, 0.0);
     }
-    let times =
-        "states = ['n']\nstart = [0]\nf = ['0']\n[[event]]\nwhen = 'cos(t) - (1 - 1e-8)'\nset = { n = 'n + 1' }";
+    let times = "states = ['n']\nstart = [0]\nf = ['0']\n[[event]]\nwhen = 'cos(t) - (1 - \
+        1e-8)'\nset = { n = 'n + 1' }";
     near(last(times, 20.0), 7.0, 0.0);
     let between = "states = ['x']\nstart = [1]\nf = ['0.25 - sign(x^2 - 1e-8)']";
     near(last(between, 3.0), 1e-4, 1e-12);
     // As wide as a hundred million digits of the time.
-    near(last("states = ['x']\nstart = [0]\nf = ['if(abs(t - pi) < 1e-9, 1e9, 0)']", 10.0), 2.0, 1e-6);
+    near(
+        last("states = ['x']\nstart = [0]\nf = ['if(abs(t - pi) < 1e-9, 1e9, 0)']", 10.0),
+        2.0,
+        1e-6,
+    );
 }
 
 #[test]
@@ -856,18 +1088,31 @@ fn a_division_by_zero_is_not_crossed() {
     let ends = |text: &str, t_end: f64, t: f64, place: &str| match run(&model(text), t_end).1 {
         Err(HybridError::Domain { t: at, what, .. }) => {
             near(at, t, 1e-8);
-            assert!(what.contains("a division by a number that comes to zero") && what.contains(place), "{what}");
+            assert!(
+                what.contains("a division by a number that comes to zero") && what.contains(place),
+                "{what}"
+            );
         }
         other => panic!("{other:?}\n{text}"),
     };
-    // Free fall onto a centre; a quotient that a cube root would carry through; a pole of the tangent.
+    // Free fall onto a centre; a quotient that a cube root would carry through; a pole of the
+    // tangent.
     let fall = std::f64::consts::PI / 8.0_f64.sqrt();
-    ends("states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-1/x^2']", 1.2, fall, "equation of v, `-1/x^2`");
+    ends(
+        "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-1/x^2']",
+        1.2,
+        fall,
+        "equation of v, `-1/x^2`",
+    );
     ends("states = ['x']\nstart = [2]\nf = ['-1/x^2']", 2.8, 8.0 / 3.0, "`-1/x^2`");
     ends("states = ['x']\nstart = [1]\nf = ['-1/x']", 3.0, 0.5, "`-1/x`");
     ends("states = ['x']\nstart = [1]\nf = ['tan(x)']", 0.3, -1.0_f64.sin().ln(), "`tan(x)`");
     // What is continued through zero is followed.
-    near(end("states = ['x', 'y']\nstart = [-1, 0]\nf = ['1', 'sin(x)/x']", 2.0)[1], 2.0 * 0.946_083_070_367_183, 1e-9);
+    near(
+        end("states = ['x', 'y']\nstart = [-1, 0]\nf = ['1', 'sin(x)/x']", 2.0)[1],
+        2.0 * 0.946_083_070_367_183,
+        1e-9,
+    );
 }
 
 /// An odd root comes to rest at zero: x = (1 - 2 t/3)^1.5.
@@ -883,7 +1128,8 @@ fn an_odd_root_comes_to_rest() {
 fn a_ball_rests_on_any_floor() {
     for floor in [-0.7, 0.3, 1.555112, -3.082559, 1e6] {
         let text = format!(
-            "states = ['x', 'v']\nstart = ['{floor} + 1', 0]\nf = ['v', '-1']\n[[event]]\nwhen = 'x - ({floor})'\ndirection = 'down'\nset = {{ v = '-0.5*v' }}\nafter_zeno = 'stick'"
+            "states = ['x', 'v']\nstart = ['{floor} + 1', 0]\nf = ['v', '-1']\n[[event]]\nwhen = \
+                'x - ({floor})'\ndirection = 'down'\nset = {{ v = '-0.5*v' }}\nafter_zeno = 'stick'"
         );
         let x = end(&text, 10.0);
         near(x[0], floor, 4.0 * f64::EPSILON * floor.abs());
@@ -891,7 +1137,9 @@ fn a_ball_rests_on_any_floor() {
     }
     for speed in [0.1, 0.5, -0.3, 3.0] {
         let text = format!(
-            "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-1']\n[[event]]\nwhen = 'x - {speed}*t'\ndirection = 'down'\nset = {{ v = '{speed} - 0.5*(v - {speed})' }}\nafter_zeno = 'stick'"
+            "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-1']\n[[event]]\nwhen = 'x - \
+                {speed}*t'\ndirection = 'down'\nset = {{ v = '{speed} - 0.5*(v - {speed})' \
+                }}\nafter_zeno = 'stick'"
         );
         let x = end(&text, 12.0);
         near(x[0], 12.0 * speed, 1e-10);
@@ -907,20 +1155,27 @@ fn a_ball_rests_on_any_floor() {
     }
 }
 
-/// A condition that a reset makes false again is met anew where it becomes true, and so is another event of the same zero.
+/// A condition that a reset makes false again is met anew where it becomes true, and so is another
+/// event of the same zero.
 #[test]
 fn conditions_are_met_again_after_resets() {
     let saw = |rate: f64, start: f64| {
-        format!("states = ['x']\nstart = [{start}]\nf = ['{rate}']\n[[event]]\nwhen = 'x > 1'\nset = {{ x = '0' }}")
+        format!(
+            "states = ['x']\nstart = [{start}]\nf = ['{rate}']\n[[event]]\nwhen = 'x > 1'\nset = \
+                {{ x = '0' }}"
+        )
     };
     for (rate, start) in [(1.0, 0.3), (2.0, 0.3), (0.7, 0.0), (3.0, 0.5)] {
         let passed: f64 = start + 9.6 * rate;
         near(last(&saw(rate, start), 9.6), passed - passed.floor(), 1e-12);
     }
-    let twins = "states = ['x', 'n', 'm']\nstart = [0, 0, 0]\nf = ['1', '0', '0']\n[[event]]\nwhen = 'x > 1'\nset = { x = 'x - 2', m = 'm + 1' }\n[[event]]\nwhen = 'x - 1'\nset = { n = 'n + 1' }";
+    let twins = "states = ['x', 'n', 'm']\nstart = [0, 0, 0]\nf = ['1', '0', '0']\n[[event]]\nwhen \
+        = 'x > 1'\nset = { x = 'x - 2', m = 'm + 1' }\n[[event]]\nwhen = 'x - 1'\nset = { n = 'n + \
+        1' }";
     assert_eq!(end(twins, 60.5)[1..], [30.0, 30.0]);
     // The surface of a switch stays where it is.
-    let slides = "states = ['q', 'n']\nstart = [0, 0]\nf = ['if(q < 1, 1, -1)', '1']\n[[event]]\nwhen = 'n > 2'\nset = { q = 'q + 1', n = '0' }";
+    let slides = "states = ['q', 'n']\nstart = [0, 0]\nf = ['if(q < 1, 1, -1)', \
+        '1']\n[[event]]\nwhen = 'n > 2'\nset = { q = 'q + 1', n = '0' }";
     near(end(slides, 10.5)[0], 1.5, 1e-12);
 }
 
@@ -929,23 +1184,33 @@ fn conditions_are_met_again_after_resets() {
 fn counters_are_compared_as_they_are_written() {
     let count = |condition: &str| {
         let text = format!(
-            "states = ['q', 'n']\nstart = [0, 0]\nf = ['1', '0']\n[[event]]\nwhen = 'q > 1 and {condition}'\nset = {{ q = 'q - 1', n = 'n + 1' }}"
+            "states = ['q', 'n']\nstart = [0, 0]\nf = ['1', '0']\n[[event]]\nwhen = 'q > 1 and \
+                {condition}'\nset = {{ q = 'q - 1', n = 'n + 1' }}"
         );
         last(&text, 20.5)
     };
-    for (condition, most) in [("n < 5", 5.0), ("n <= 5", 6.0), ("not n >= 5", 5.0), ("5 > n", 5.0), ("not n > 5", 6.0)]
+    for (condition, most) in
+        [("n < 5", 5.0), ("n <= 5", 6.0), ("not n >= 5", 5.0), ("5 > n", 5.0), ("not n > 5", 6.0)]
     {
         near(count(condition), most, 0.0);
     }
-    near(last("states = ['n', 'y']\nstart = [5, 0]\nf = ['0', 'if(n >= 5, 1, 0)']", 1.0), 1.0, 1e-15);
+    near(
+        last("states = ['n', 'y']\nstart = [5, 0]\nf = ['0', 'if(n >= 5, 1, 0)']", 1.0),
+        1.0,
+        1e-15,
+    );
     near(last("states = ['n', 'y']\nstart = [5, 0]\nf = ['0', 'if(n > 5, 1, 0)']", 1.0), 0.0, 0.0);
 }
 
-/// One surface however it is written: 1.75 is 4/3 + 0.25*5/3, with the mean sign 0.25 of the sliding.
+/// One surface however it is written: 1.75 is 4/3 + 0.25*5/3, with the mean sign 0.25 of the
+/// sliding.
 #[test]
 fn one_surface_is_one_switching_function() {
-    let y =
-        |switch: &str| format!("states = ['x', 'y', 'z']\nstart = [1, 0, 1]\nf = ['0.25 - sign(x)', '{switch}', '1']");
+    let y = |switch: &str| {
+        format!(
+            "states = ['x', 'y', 'z']\nstart = [1, 0, 1]\nf = ['0.25 - sign(x)', '{switch}', '1']"
+        )
+    };
     for switch in [
         "sign(x)",
         "sign(2*x)",
@@ -958,11 +1223,12 @@ fn one_surface_is_one_switching_function() {
     ] {
         near(end(&y(switch), 3.0)[1], 1.75, 1e-12);
     }
-    let moving = "states = ['x', 'y']\nstart = [1, 0]\nf = ['0.25 - sign(x - 0.1*t)', 'sign(10*x - t)']";
+    let moving =
+        "states = ['x', 'y']\nstart = [1, 0]\nf = ['0.25 - sign(x - 0.1*t)', 'sign(10*x - t)']";
     near(end(moving, 3.0)[0], 0.3, 1e-12);
     // Near to each other is not the same, in any units; and what only vanishes there is refused.
-    let far =
-        "states = ['x', 'y']\nstart = [-0.999995e12, 0]\nf = ['0', 'sign(1e-12*x + 1) + sign(1.00001e-12*x + 1)']";
+    let far = "states = ['x', 'y']\nstart = [-0.999995e12, 0]\nf = ['0', 'sign(1e-12*x + 1) + \
+        sign(1.00001e-12*x + 1)']";
     near(last(far, 1.0), 0.0, 0.0);
     near(end(&y("sign(x + 1e-9)"), 3.0)[1], 3.0, 1e-8);
     for switch in ["sign(x*z)", "sign(x + abs(x)/2)"] {
@@ -980,16 +1246,26 @@ fn rounding_is_no_motion() {
     near(last(friction, 3.0), hold.cos() - 3.0_f64.cos() - 0.2 * (3.0 - hold), 1e-9);
     for t in [1e3, 1e5] {
         let options = Options { t_start: t, t_end: t + 3.0, ..Options::default() };
-        let late =
-            follow(&model(&format!("states = ['x']\nstart = [0]\nf = ['t - {t}']")), &options, &mut |_| true).unwrap();
+        let late = follow(
+            &model(&format!("states = ['x']\nstart = [0]\nf = ['t - {t}']")),
+            &options,
+            &mut |_| true,
+        )
+        .unwrap();
         near(late.x[0], 4.5, 1e-8);
     }
     let text = |f: &str| {
         format!(
-            "states = ['x']\nstart = [0]\nf = ['{f}']\n[tables.u]\nfile = 'u.csv'\ntime = 't'\ncolumn = 'y'\ninterpolation = 'previous'"
+            "states = ['x']\nstart = [0]\nf = ['{f}']\n[tables.u]\nfile = 'u.csv'\ntime = \
+                't'\ncolumn = 'y'\ninterpolation = 'previous'"
         )
     };
-    for (f, want) in [("max(u, 0.5)", 7.5), ("abs(u)", 10.5), ("sign(u + x*0)", 0.0), ("if(u > 0.5, 1, -1)", 0.0)] {
+    for (f, want) in [
+        ("max(u, 0.5)", 7.5),
+        ("abs(u)", 10.5),
+        ("sign(u + x*0)", 0.0),
+        ("if(u > 0.5, 1, -1)", 0.0),
+    ] {
         let table = model(&text(f)).with_table("u", "t,y\n0,-1\n5,1.1\n10,0\n").unwrap();
         let want = if f == "max(u, 0.5)" { 8.0 } else { want };
         near(run(&table, 10.0).1.unwrap().x[0], want, 1e-12);
@@ -1003,7 +1279,8 @@ fn a_linear_oscillator_closes_on_any_section() {
     let circle = model("states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-x']");
     for section in ["x - 0.5", "v - 0.5", "x + v"] {
         let section = twofold_system::Expression::parse_general(section, &["x", "v"]).unwrap();
-        let options = Options { record: Record::Section(section), t_end: 100.0, ..Options::default() };
+        let options =
+            Options { record: Record::Section(section), t_end: 100.0, ..Options::default() };
         let found = closed_orbit(&circle, &options, &Return::Crossings(1)).unwrap();
         near(found.period, 2.0 * std::f64::consts::PI, 1e-8);
         near(found.multipliers[0][0], 1.0, 1e-6);
@@ -1019,19 +1296,25 @@ fn stability_is_said_where_it_is_decided() {
     };
     for f in ["-abs(x)", "if(x > 0, -x, 2*x)"] {
         let found = kinds(&format!("states = ['x']\nf = ['{f}']"), &[(-1.0, 1.0)]);
-        assert!(!found.is_empty() && found.iter().all(|k| k.starts_with("boundary equilibrium")), "{f}: {found:?}");
+        assert!(
+            !found.is_empty() && found.iter().all(|k| k.starts_with("boundary equilibrium")),
+            "{f}: {found:?}"
+        );
     }
     let double = kinds("states = ['x']\nf = ['x^2']", &[(-10.0, 10.0)]);
     assert!(double.iter().all(|k| k == "not decided by the linearised motion"), "{double:?}");
     assert_eq!(kinds("states = ['x']\nf = ['-0.001*x']", &[(-10.0, 10.0)]), ["stable node"]);
 }
 
-/// Rests that fill a curve are one row with its ends; those on several surfaces have the weights of a mixture, or of more dimensions.
+/// Rests that fill a curve are one row with its ends; those on several surfaces have the weights of
+/// a mixture, or of more dimensions.
 #[test]
 fn rests_on_curves_and_on_several_surfaces() {
     use crate::rests::rests;
-    let find = |text: &str, half: f64, n: usize| rests(&model(text), &vec![(-half, half); n]).unwrap();
-    // A block within friction: x from -1/2 to 1/2 at v = 0, to which neighbours come; no row for the ends, which are zeros of a field.
+    let find =
+        |text: &str, half: f64, n: usize| rests(&model(text), &vec![(-half, half); n]).unwrap();
+    // A block within friction: x from -1/2 to 1/2 at v = 0, to which neighbours come; no row for
+    // the ends, which are zeros of a field.
     let block = find("states = ['x', 'v']\nf = ['v', '-x - 0.5*sign(v)']", 3.0, 2);
     let [stuck] = &block[..] else { panic!("{} rows", block.len()) };
     let [from, to] = stuck.family.as_ref().unwrap().ends.as_ref().unwrap();
@@ -1050,33 +1333,43 @@ fn rests_on_curves_and_on_several_surfaces() {
     let ring = find("states = ['x', 'y']\nf = ['x*(1 - x^2 - y^2)', 'y*(1 - x^2 - y^2)']", 3.0, 2);
     let closed = ring.iter().find_map(|r| r.family.clone()).unwrap();
     assert_eq!((closed.dimension, closed.ends, ring.len()), (1, None, 2));
-    // A corner of two relays: -s + 0.3 = 0 and -u - 0.2 s = 0, so that s = 0.3 and u = -0.06; weights are (1 + s)/2.
-    let corner = find("states = ['x', 'y']\nf = ['-sign(x) + 0.3', '-sign(y) - 0.2*sign(x)']", 3.0, 2);
+    // A corner of two relays: -s + 0.3 = 0 and -u - 0.2 s = 0, so that s = 0.3 and u = -0.06;
+    // weights are (1 + s)/2.
+    let corner =
+        find("states = ['x', 'y']\nf = ['-sign(x) + 0.3', '-sign(y) - 0.2*sign(x)']", 3.0, 2);
     let [rest] = &corner[..] else { panic!("{} rows", corner.len()) };
     (near(rest.on[0].weight, 0.65, 1e-12), near(rest.on[1].weight, 0.47, 1e-12));
     assert_eq!((rest.kind().as_str(), rest.attracting), ("stable", Some(true)));
-    // Relays that work against each other: det W < 0 repels; of one that turns (W = [1, 4; -4, -2], det > 0) the speeds decide.
-    let saddle = find("states = ['x', 'y']\nf = ['-sign(x) - 2*sign(y)', '-2*sign(x) - sign(y)']", 3.0, 2);
+    // Relays that work against each other: det W < 0 repels; of one that turns (W = [1, 4; -4, -2],
+    // det > 0) the speeds decide.
+    let saddle =
+        find("states = ['x', 'y']\nf = ['-sign(x) - 2*sign(y)', '-2*sign(x) - sign(y)']", 3.0, 2);
     assert_eq!(saddle.iter().map(|r| r.kind()).collect::<Vec<_>>(), ["unstable"]);
-    let open = find("states = ['x', 'y']\nf = ['sign(x) + 4*sign(y)', '-4*sign(x) - 2*sign(y)']", 3.0, 2);
+    let open =
+        find("states = ['x', 'y']\nf = ['sign(x) + 4*sign(y)', '-4*sign(x) - 2*sign(y)']", 3.0, 2);
     assert_eq!(open[0].kind(), "decided by how fast each surface switches");
-    // A third state along the corner: z' = -z + s/2 - 0.4 u with s = 0.3 z, u = 0.1: z = -0.04/0.85, eigenvalue -0.85.
+    // A third state along the corner: z' = -z + s/2 - 0.4 u with s = 0.3 z, u = 0.1: z =
+    // -0.04/0.85, eigenvalue -0.85.
     let edge = find(
-        "states = ['x', 'y', 'z']\nf = ['-sign(x) + 0.3*z', '-sign(y) + 0.1', '-z + 0.5*sign(x) - 0.4*sign(y)']",
+        "states = ['x', 'y', 'z']\nf = ['-sign(x) + 0.3*z', '-sign(y) + 0.1', '-z + 0.5*sign(x) - \
+            0.4*sign(y)']",
         3.0,
         3,
     );
     let [rest] = &edge[..] else { panic!("{} rows", edge.len()) };
     (near(rest.x[2], -0.04 / 0.85, 1e-12), near(rest.eigenvalues[0][0], -0.85, 1e-9));
     // Two blocks that friction holds: a set of two dimensions on both surfaces.
-    let blocks =
-        "states = ['x1', 'v1', 'x2', 'v2']\nf = ['v1', '-2*x1 + x2 - 0.5*sign(v1)', 'v2', 'x1 - 2*x2 - 0.5*sign(v2)']";
+    let blocks = "states = ['x1', 'v1', 'x2', 'v2']\nf = ['v1', '-2*x1 + x2 - 0.5*sign(v1)', 'v2', \
+        'x1 - 2*x2 - 0.5*sign(v2)']";
     let held = find(blocks, 3.0, 4);
     // The curves where one of them is about to slide are its edges.
-    let sets: Vec<_> = held.iter().map(|r| (r.on.len(), r.family.as_ref().map(|f| f.dimension))).collect();
+    let sets: Vec<_> =
+        held.iter().map(|r| (r.on.len(), r.family.as_ref().map(|f| f.dimension))).collect();
     assert_eq!(sets, [(2, Some(2))]);
     // A thermostat: each mode's rest lies behind the event that leaves it.
-    let thermostat = "states = ['T']\n[modes.on]\nf = ['30 - T']\n[modes.off]\nf = ['10 - T']\n[[event]]\nname = 'warm'\nwhen = 'T > 22'\nfrom = 'on'\nmode = 'off'\n[[event]]\nname = 'cold'\nwhen = 'T - 18'\ndirection = 'down'\nfrom = 'off'\nmode = 'on'";
+    let thermostat = "states = ['T']\n[modes.on]\nf = ['30 - T']\n[modes.off]\nf = ['10 - \
+        T']\n[[event]]\nname = 'warm'\nwhen = 'T > 22'\nfrom = 'on'\nmode = 'off'\n[[event]]\nname \
+        = 'cold'\nwhen = 'T - 18'\ndirection = 'down'\nfrom = 'off'\nmode = 'on'";
     let behind: Vec<_> = find(thermostat, 40.0, 1).into_iter().map(|r| r.behind.unwrap()).collect();
     assert_eq!(behind, ["warm", "cold"]);
     // In units a million times smaller.
@@ -1084,22 +1377,30 @@ fn rests_on_curves_and_on_several_surfaces() {
     near(small[0].family.as_ref().unwrap().ends.as_ref().unwrap()[1][0], 0.5e-6, 1e-15);
 }
 
-/// A pole is no zero, for events, sections and switches, wherever it is met together with others; a quotient has the sign of the product.
+/// A pole is no zero, for events, sections and switches, wherever it is met together with others; a
+/// quotient has the sign of the product.
 #[test]
 fn poles_are_no_zeros() {
     let count = |when: &str, t_end: f64| {
         let text = format!(
-            "states = ['x', 'n']\nstart = [0.1, 0]\nf = ['1', '0']\n[[event]]\nwhen = '{when}'\ndirection = 'both'\nset = {{ n = 'n + 1' }}"
+            "states = ['x', 'n']\nstart = [0.1, 0]\nf = ['1', '0']\n[[event]]\nwhen = \
+                '{when}'\ndirection = 'both'\nset = {{ n = 'n + 1' }}"
         );
         last(&text, t_end)
     };
     // tan x = 1 at seven places of (0.1, 20.1).
-    for (when, want) in
-        [("tan(x) - 1", 7.0), ("1/(x - 3)", 0.0), ("1/(x - 3) + 2", 1.0), ("1/tan(x)", 6.0), ("x/(x - 3) - 5", 1.0)]
-    {
+    for (when, want) in [
+        ("tan(x) - 1", 7.0),
+        ("1/(x - 3)", 0.0),
+        ("1/(x - 3) + 2", 1.0),
+        ("1/tan(x)", 6.0),
+        ("x/(x - 3) - 5", 1.0),
+    ] {
         near(count(when, 20.0), want, 0.0);
     }
-    let both = "states = ['x', 'n', 'm']\nstart = [0.1, 0, 0]\nf = ['1', '0', '0']\n[[event]]\nwhen = 'tan(x)'\ndirection = 'up'\nset = { n = 'n + 1' }\n[[event]]\nwhen = '1/tan(x) + 1/(x - 2)'\ndirection = 'both'\nset = { m = 'm + 1' }";
+    let both = "states = ['x', 'n', 'm']\nstart = [0.1, 0, 0]\nf = ['1', '0', \
+        '0']\n[[event]]\nwhen = 'tan(x)'\ndirection = 'up'\nset = { n = 'n + 1' }\n[[event]]\nwhen \
+        = '1/tan(x) + 1/(x - 2)'\ndirection = 'both'\nset = { m = 'm + 1' }";
     near(end(both, 20.0)[1], 6.0 + 1.0, 0.0);
     near(end(both, 20.0)[2], 7.0, 0.0);
     let section = twofold_system::Expression::parse_general("tan(x)", &["x"]).unwrap();
@@ -1111,32 +1412,42 @@ fn poles_are_no_zeros() {
     })
     .unwrap();
     assert_eq!(rows, 6);
-    for (switch, want) in [("sign(1/(x - 1))", 1.0), ("sign(x/(x - 1))", 1.0), ("if(2/(x - 1)^3 > 0, 1, -1)", 1.0)] {
-        near(last(&format!("states = ['x', 'y']\nstart = [0, 0]\nf = ['1', '{switch}']"), 3.0), want, 1e-12);
+    for (switch, want) in
+        [("sign(1/(x - 1))", 1.0), ("sign(x/(x - 1))", 1.0), ("if(2/(x - 1)^3 > 0, 1, -1)", 1.0)]
+    {
+        near(
+            last(&format!("states = ['x', 'y']\nstart = [0, 0]\nf = ['1', '{switch}']"), 3.0),
+            want,
+            1e-12,
+        );
     }
 }
 
 /// Several events of one moment see each other's work, also in derivatives.
 #[test]
 fn events_of_one_moment_see_each_other() {
-    let text = "states = ['x', 'n']\nstart = [0, 0]\nf = ['1', '0']\n[[event]]\nwhen = 'x - 1'\nset = { x = '0', n = 'n + 1' }\n[[event]]\nwhen = 'x - 1'\nset = { n = 'n + 10' }";
+    let text = "states = ['x', 'n']\nstart = [0, 0]\nf = ['1', '0']\n[[event]]\nwhen = 'x - \
+        1'\nset = { x = '0', n = 'n + 1' }\n[[event]]\nwhen = 'x - 1'\nset = { n = 'n + 10' }";
     near(last(text, 10.5), 110.0, 0.0);
     // Both at t = 1: first doubled, then the square; d((2x)^2)/dx = 8x.
-    let timed = "states = ['x']\nstart = [3]\nf = ['0']\n[[event]]\nat = 1\nset = { x = '2*x' }\n[[event]]\nevery = 1\nset = { x = 'x^2' }";
+    let timed = "states = ['x']\nstart = [3]\nf = ['0']\n[[event]]\nat = 1\nset = { x = '2*x' \
+        }\n[[event]]\nevery = 1\nset = { x = 'x^2' }";
     near(last(timed, 1.5), 36.0, 0.0);
     let options = Options { t_end: 1.5, ..Options::default() };
     let found = crate::motion::sensitivity::sensitivities(&model(timed), &options, &[]).unwrap();
     near(found.by_start[0][0], 24.0, 1e-8);
 }
 
-/// A field that runs along the surface which the other one leads to: the time-optimal control of a double integrator (Pontryagin et al. 1962), in any
-/// units, and its rest; rests that are reached in finite time; the rest at a corner of max(|x|, |y|).
+/// A field that runs along the surface which the other one leads to: the time-optimal control of a
+/// double integrator (Pontryagin et al. 1962), in any units, and its rest; rests that are reached
+/// in finite time; the rest at a corner of max(|x|, |y|).
 #[test]
 fn motion_along_a_switching_curve_and_into_rest() {
     for (unit, time) in [(1.0, 1.0), (1e-9, 1.0), (1e6, 1e-3)] {
         let (speed, force) = (unit / time, unit / (time * time));
         let text = format!(
-            "states = ['x', 'v']\nstart = [{unit:e}, {speed:e}]\nf = ['v', '-{force:e}*sign(x + v*abs(v)/{:e})']",
+            "states = ['x', 'v']\nstart = [{unit:e}, {speed:e}]\nf = ['v', '-{force:e}*sign(x + \
+                v*abs(v)/{:e})']",
             2.0 * force
         );
         // From (1, 1) the curve is met at v = -sqrt(3/2), and (0, 0) at t = 1 + 2 sqrt(3/2).
@@ -1148,19 +1459,29 @@ fn motion_along_a_switching_curve_and_into_rest() {
         assert!(rest[0].abs() < 1e-12 * unit && rest[1].abs() < 1e-12 * speed, "{rest:?}");
     }
     // Tangent to second order only: it is slid upon from x = 0 on, or left there.
-    near(last("states = ['x', 'y']\nstart = [-1, 1]\nf = ['1', 'if(y > 0, -1, x^3)']", 2.0), 0.0, 1e-15);
-    near(last("states = ['x', 'y']\nstart = [-1, 1]\nf = ['1', 'if(y > 0, -1, -x^3)']", 2.0), -0.25, 1e-12);
+    near(
+        last("states = ['x', 'y']\nstart = [-1, 1]\nf = ['1', 'if(y > 0, -1, x^3)']", 2.0),
+        0.0,
+        1e-15,
+    );
+    near(
+        last("states = ['x', 'y']\nstart = [-1, 1]\nf = ['1', 'if(y > 0, -1, -x^3)']", 2.0),
+        -0.25,
+        1e-12,
+    );
     for text in [
         "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-2*sign(v + sqrt(2*abs(x))*sign(x)*0.9)']",
-        "states = ['x', 'v']\nstart = [1, 0]\nf = ['-1.5*sqrt(abs(x))*sign(x) + v', '-1.1*sign(x)']",
-        "states = ['x', 'v']\nstart = [1, 0.4]\nf = ['-if(abs(x) > abs(v), sign(x), 0)', '-if(abs(x) > abs(v), 0, sign(v))']",
+        "states = ['x', 'v']\nstart = [1, 0]\nf = ['-1.5*sqrt(abs(x))*sign(x) + v', \
+            '-1.1*sign(x)']",
+        "states = ['x', 'v']\nstart = [1, 0.4]\nf = ['-if(abs(x) > abs(v), sign(x), 0)', \
+            '-if(abs(x) > abs(v), 0, sign(v))']",
     ] {
         let x = end(text, 5.0);
         assert!(x.iter().all(|v| v.abs() < 1e-12), "{text}: {x:?}");
     }
     // A kick in time is not overslept: from (1, 0) at t = 3 the control is -1 for a unit of time.
-    let kicked =
-        "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-sign(x + v*abs(v)/2)']\n[[event]]\nat = 3\nset = { x = '1' }";
+    let kicked = "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-sign(x + \
+        v*abs(v)/2)']\n[[event]]\nat = 3\nset = { x = '1' }";
     near(end(kicked, 4.0)[0], 0.5, 1e-12);
     let counted = kicked.replace("x = '1'", "x = 'x'").replace("at = 3", "every = 0.75");
     assert!(end(&counted, 4.0)[0].abs() < 1e-12);
@@ -1171,7 +1492,11 @@ fn motion_along_a_switching_curve_and_into_rest() {
 fn a_late_start_is_followed() {
     for t in [1e4, 1e6, 1e8] {
         let options = Options { t_start: t, t_end: t + 3.0, ..Options::default() };
-        let found = follow(&model("states = ['x']\nstart = [0]\nf = ['mod(t, 1)']"), &options, &mut |_| true).unwrap();
+        let found =
+            follow(&model("states = ['x']\nstart = [0]\nf = ['mod(t, 1)']"), &options, &mut |_| {
+                true
+            })
+            .unwrap();
         near(found.x[0], 1.5, 1e-15 * t + 1e-9);
         assert!(found.steps < 100);
     }
@@ -1216,8 +1541,8 @@ fn series_agree_with_dormand_and_prince_on_all_that_ships() {
 #[test]
 fn series_reach_the_last_digits() {
     let end = |text: &str, t_end: f64| {
-        let outcome =
-            follow(&model(text), &taylor(t_end, 1e-15), &mut |_| true).unwrap_or_else(|e| panic!("{text}\n{e}"));
+        let outcome = follow(&model(text), &taylor(t_end, 1e-15), &mut |_| true)
+            .unwrap_or_else(|e| panic!("{text}\n{e}"));
         assert_eq!(outcome.ending, Ending::Finished);
         outcome
     };
@@ -1236,7 +1561,8 @@ fn series_reach_the_last_digits() {
     let outcome = end(wall, 100.0);
     near(outcome.x[0], 100.0_f64.cos().abs(), 1e-13);
     // A condition that is no sum of states: x^2 passes 1/2 at pi/4.
-    let count = "states = ['x', 'v', 'n', 's']\nstart = [1, 0, 0, 0]\nf = ['v', '-x', '0', 'if(x^2 > 1/2, 1, 0)']";
+    let count = "states = ['x', 'v', 'n', 's']\nstart = [1, 0, 0, 0]\nf = ['v', '-x', '0', 'if(x^2 \
+        > 1/2, 1, 0)']";
     let outcome = end(count, 10.0 * std::f64::consts::PI);
     near(outcome.x[3], 5.0 * std::f64::consts::PI, 1e-13);
     // Sliding with an exponential on the line, with the disturbance taken away.
@@ -1244,7 +1570,8 @@ fn series_reach_the_last_digits() {
     let outcome = end(control, 5.0);
     near(outcome.x[0], (-5.0_f64).exp(), 1e-15);
     // Two relays that see each other, one slid upon in each order.
-    let two = "states = ['x', 'y', 'z']\nstart = [0, 0, 0]\nf = ['cos(t) - 2*sign(x) - 0.5*sign(y)', 'sin(t) - 3*sign(y) + 0.5*sign(x)', 'cos(t) + x + y']";
+    let two = "states = ['x', 'y', 'z']\nstart = [0, 0, 0]\nf = ['cos(t) - 2*sign(x) - \
+        0.5*sign(y)', 'sin(t) - 3*sign(y) + 0.5*sign(x)', 'cos(t) + x + y']";
     near(end(two, 3.0).x[2], 3.0_f64.sin(), 2e-15);
     // A staircase, and a ramp in time.
     let stairs = "states = ['x', 'y']\nstart = [0, 0]\nf = ['floor(10*t)/10', 'mod(t, 0.3)']";
@@ -1271,18 +1598,25 @@ fn series_reach_the_last_digits() {
 /// What has no series is refused by name.
 #[test]
 fn motion_without_a_series_is_refused() {
-    let fails = |text: &str, options: Options| follow(&model(text), &options, &mut |_| true).unwrap_err().to_string();
+    let fails = |text: &str, options: Options| {
+        follow(&model(text), &options, &mut |_| true).unwrap_err().to_string()
+    };
     let root = "states = ['x']\nstart = [0]\nf = ['1 + x^0.5']";
     let said = fails(root, taylor(1.0, 1e-10));
-    assert!(said.contains("no Taylor series in x, `1 + x^0.5`") && said.contains("--method dopri5"), "{said}");
-    let rule =
-        "states = ['x', 'y', 'z']\nstart = [0, 0, 0]\nf = ['-sign(x) + 0.5*sign(y)', '-sign(y)', 'sign(x)*sign(y)']";
-    let options = Options { intersection: crate::selection::Intersection::Bilinear, ..taylor(1.0, 1e-10) };
+    assert!(
+        said.contains("no Taylor series in x, `1 + x^0.5`") && said.contains("--method dopri5"),
+        "{said}"
+    );
+    let rule = "states = ['x', 'y', 'z']\nstart = [0, 0, 0]\nf = ['-sign(x) + 0.5*sign(y)', \
+        '-sign(y)', 'sign(x)*sign(y)']";
+    let options =
+        Options { intersection: crate::selection::Intersection::Bilinear, ..taylor(1.0, 1e-10) };
     let said = fails(rule, options);
     assert!(said.contains("chosen at every point anew") && said.contains("dopri5"), "{said}");
     // Nor is a pole of what is sought crossed, though the motion goes on.
     let said = fails(
-        "states = ['x']\nstart = [0.1]\nf = ['1']\n[[event]]\nwhen = 'tan(x) - 1'\nset = { x = 'x' }",
+        "states = ['x']\nstart = [0.1]\nf = ['1']\n[[event]]\nwhen = 'tan(x) - 1'\nset = { x = 'x' \
+            }",
         taylor(3.0, 1e-10),
     );
     assert!(said.contains("pole") && said.contains("t = 1.47"), "{said}");
@@ -1292,11 +1626,17 @@ fn motion_without_a_series_is_refused() {
     // A thin tanh in 65 shapes.
     let names: Vec<String> = (0..65).map(|i| format!("'x{i}'")).collect();
     let fields: Vec<String> = (0..65).map(|i| format!("'tanh({i} - x{i})'")).collect();
-    let many = format!("states = [{}]\nstart = [{}0]\nf = [{}]", names.join(","), "0,".repeat(64), fields.join(","));
+    let many = format!(
+        "states = [{}]\nstart = [{}0]\nf = [{}]",
+        names.join(","),
+        "0,".repeat(64),
+        fields.join(",")
+    );
     assert!(fails(&many, taylor(1.0, 1e-10)).contains("more than 64 different tanh"));
 }
 
-/// Switches of motion that is simpler than what decides them: steps are as short as the weights of sliding and the events ask.
+/// Switches of motion that is simpler than what decides them: steps are as short as the weights of
+/// sliding and the events ask.
 #[test]
 fn series_of_what_is_sought_bound_the_steps() {
     let both = |text: &str, t_end: f64| {
@@ -1312,7 +1652,8 @@ fn series_of_what_is_sought_bound_the_steps() {
     // On v = 0.1 the motion is a straight line, until the drive pulls it off; in large units, too.
     for unit in [1.0, 1e12] {
         let text = format!(
-            "states = ['x', 'v']\nstart = [{:e}, 0]\nf = ['v', '-x - {unit:e}*0.3*sign(v - {unit:e}*0.1) + {unit:e}*sin(2*t)']\n\
+            "states = ['x', 'v']\nstart = [{:e}, 0]\nf = ['v', '-x - {unit:e}*0.3*sign(v - \
+                {unit:e}*0.1) + {unit:e}*sin(2*t)']\n\
              [[event]]\nwhen = 'x - {unit:e}*1.2'\ndirection = 'up'\nset = {{ v = '-0.7*v' }}",
             0.5 * unit
         );
@@ -1320,7 +1661,8 @@ fn series_of_what_is_sought_bound_the_steps() {
     }
     // Sliding that ends again and again, each time once.
     both(
-        "states = ['x', 'y', 'z']\nstart = [1.912, 1.868, -0.014]\nf = ['-1.85*cos(3*t) - 1.71*sign(x) - 0.7*x', '0.186*tanh(2*z) - 0.472*x - 0.7*y', '-0.94*atan(x) - 0.7*z']",
+        "states = ['x', 'y', 'z']\nstart = [1.912, 1.868, -0.014]\nf = ['-1.85*cos(3*t) - \
+            1.71*sign(x) - 0.7*x', '0.186*tanh(2*z) - 0.472*x - 0.7*y', '-0.94*atan(x) - 0.7*z']",
         6.0,
     );
     // Counted waves, a dip that is met for a moment, a curve.
@@ -1342,12 +1684,15 @@ fn series_of_what_is_sought_bound_the_steps() {
 #[test]
 fn a_flat_zero_is_met_once() {
     // x = cos t passes zero ten times in 30; the event's expression rises there each time.
-    let text = "states = ['x', 'v', 'm']\nstart = [1, 0, 0]\nf = ['v', '-x', '0']\n[[event]]\nwhen = 'x^3*v + 0.2*x^8'\ndirection = 'up'\nset = { m = 'm + t' }";
+    let text = "states = ['x', 'v', 'm']\nstart = [1, 0, 0]\nf = ['v', '-x', '0']\n[[event]]\nwhen \
+        = 'x^3*v + 0.2*x^8'\ndirection = 'up'\nset = { m = 'm + t' }";
     near(end(text, 30.0)[2], 50.0 * std::f64::consts::PI, 1e-6);
-    let cubes = "states = ['x', 'n']\nstart = [-1, 0]\nf = ['1', '0']\n[[event]]\nwhen = '(x + 0.5)^5*(x - 0.5)^3'\ndirection = 'both'\nset = { n = 'n + 1' }";
+    let cubes = "states = ['x', 'n']\nstart = [-1, 0]\nf = ['1', '0']\n[[event]]\nwhen = '(x + \
+        0.5)^5*(x - 0.5)^3'\ndirection = 'both'\nset = { n = 'n + 1' }";
     near(last(cubes, 2.0), 2.0, 0.0);
     // What is touched is not passed, even where it is zero to the last digit.
-    let touched = "states = ['x', 'v', 'y']\nstart = [1, 0, 0]\nf = ['v', '-x', 'if(x^2*(2 + v) > 0, 1, 0)']";
+    let touched =
+        "states = ['x', 'v', 'y']\nstart = [1, 0, 0]\nf = ['v', '-x', 'if(x^2*(2 + v) > 0, 1, 0)']";
     near(end(touched, 20.0)[2], 20.0, 1e-9);
     near(last("states = ['x', 'y']\nstart = [-1, 0]\nf = ['1', 'sign(3*x^2)']", 2.0), 2.0, 1e-12);
 }

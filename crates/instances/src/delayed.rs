@@ -50,7 +50,12 @@ fn late_orbit<P: PiecewiseSmooth<N> + Clone, const N: usize>(
 ) -> Result<Result<Summary<N>, Failure>, DelayError> {
     let How { method, tolerance, order, options, .. } = *how;
     let delayed = Delayed { sides: Sides::new(system, data), switch, x0 };
-    delayed.with_stepper(method, order, tolerance, Waiting { field: &Own, x0, options, observer, monitor })
+    delayed.with_stepper(
+        method,
+        order,
+        tolerance,
+        Waiting { field: &Own, x0, options, observer, monitor },
+    )
 }
 
 macro_rules! late {

@@ -12,7 +12,8 @@ pub type Section<const N: usize> = End<SectionRecorder<N>, N>;
 
 /// Equations of `N` states whose orbits run side by side.
 pub trait Lanes<const N: usize> {
-    /// The sections of orbits, as [`ensemble_in_vectors`] gives them; each in a recorder as `section` is.
+    /// The sections of orbits, as [`ensemble_in_vectors`] gives them; each in a recorder as
+    /// `section` is.
     fn sections(
         &self,
         set: InstructionSet,
@@ -77,8 +78,13 @@ macro_rules! exponents {
 
 exponents!(2 4, 3 6, 4 8);
 
-/// The smoothed equation of the paper's system, if `system` is that: compiled, it gives the same bits sooner.
-pub fn smoothed_in_lanes(system: &System, transition: Transition, eps: f64) -> Option<impl Lanes<3>> {
+/// The smoothed equation of the paper's system, if `system` is that: compiled, it gives the same
+/// bits sooner.
+pub fn smoothed_in_lanes(
+    system: &System,
+    transition: Transition,
+    eps: f64,
+) -> Option<impl Lanes<3>> {
     match system.compiled() {
         Some(Compiled::Caricature(system)) => Some(Smoothed { system, transition, eps }),
         _ => None,

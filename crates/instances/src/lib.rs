@@ -5,8 +5,9 @@
 //! compiler has to write. Here are the pairs that the program needs, behind traits; the crates
 //! above call them, and are compiled without them.
 //!
-//! Equations are a file's, recorded as a program ([`BoundField`], [`Bound`]), in one to eight states (nine with a hysteretic phi). The paper's
-//! own are there as Rust code, too, which gives the same bits sooner: [`smoothed`], [`hysteretic`], [`late`] and [`sliding`] choose.
+//! Equations are a file's, recorded as a program ([`BoundField`], [`Bound`]), in one to eight
+//! states (nine with a hysteretic phi). The paper's own are there as Rust code, too, which gives
+//! the same bits sooner: [`smoothed`], [`hysteretic`], [`late`] and [`sliding`] choose.
 #![forbid(unsafe_code)]
 
 mod delayed;

@@ -8,8 +8,8 @@ use twofold_analyse::limit::{
 };
 use twofold_integrate::Monitor;
 use twofold_integrate::filippov::{
-    ExitRule, Faces, FilippovError, FilippovObserver, FilippovOptions, FilippovSummary, Funnel, FunnelGrid, funnel,
-    run_two_surfaces, run_watched,
+    ExitRule, Faces, FilippovError, FilippovObserver, FilippovOptions, FilippovSummary, Funnel,
+    FunnelGrid, funnel, run_two_surfaces, run_watched,
 };
 use twofold_system::{BindError, Bound, Caricature, Compiled, System};
 
@@ -116,13 +116,18 @@ pub trait Visited: Motions<3> {
     ///
     /// # Errors
     /// As there.
-    fn after_visit(&self, question: &AfterVisitQuestion, crossing: Crossing<'_>) -> Result<AfterVisit, FilippovError>;
+    fn after_visit(
+        &self,
+        question: &AfterVisitQuestion,
+        crossing: Crossing<'_>,
+    ) -> Result<AfterVisit, FilippovError>;
 }
 
 macro_rules! visited {
     ($($system:ty),*) => {
         $(impl Visited for $system {
-            fn convergence(&self, question: &ConvergenceQuestion) -> Result<Convergence, FilippovError> {
+            fn convergence(&self, question: &ConvergenceQuestion) -> Result<Convergence,
+                FilippovError> {
                 convergence(self, question)
             }
             fn after_visit(

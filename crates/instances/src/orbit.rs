@@ -4,12 +4,12 @@ use nalgebra::SVector;
 use twofold_analyse::digits::{Digits, DigitsQuestion, digits};
 use twofold_analyse::passage::{PassageAnswer, PassageQuestion, passage};
 use twofold_integrate::{
-    DriveOptions, Failure, MOST_STATES, Method, Monitor, Observer, PRECISIONS, Stepper, Summary, Tolerance,
-    WithStepper, drive, with_extended,
+    DriveOptions, Failure, MOST_STATES, Method, Monitor, Observer, PRECISIONS, Stepper, Summary,
+    Tolerance, WithStepper, drive, with_extended,
 };
 use twofold_system::{
-    BindError, BoundField, Caricature, Compiled, Field, Hysteretic, Relaxation, Smoothed, System, Transition,
-    VectorField,
+    BindError, BoundField, Caricature, Compiled, Field, Hysteretic, Relaxation, Smoothed, System,
+    Transition, VectorField,
 };
 
 /// The method of an orbit, and its options.
@@ -19,7 +19,8 @@ pub struct How {
     pub method: Method,
     /// Of a step's local error.
     pub tolerance: Tolerance,
-    /// Bits of the numbers of [`Method::TaylorExtended`], one of [`PRECISIONS`]; the first if absent.
+    /// Bits of the numbers of [`Method::TaylorExtended`], one of [`PRECISIONS`]; the first if
+    /// absent.
     pub precision: Option<u16>,
     /// Degree of its series; the one that the tolerance asks for if absent.
     pub order: Option<u16>,
@@ -83,7 +84,8 @@ fn orbit_of_many<F: VectorField<N>, const N: usize>(
     monitor: &dyn Monitor,
 ) -> Result<Summary<N>, Failure> {
     let How { method, tolerance, options, .. } = *how;
-    let found = method.with_common_stepper(tolerance, Waiting { field, x0, options, observer, monitor });
+    let found =
+        method.with_common_stepper(tolerance, Waiting { field, x0, options, observer, monitor });
     found.unwrap_or_else(|| {
         let why = format!("it has {N} states, and the method is there for up to {MOST_STATES}");
         Err(Failure::NotApplicable { method: method.name(), why })
@@ -142,7 +144,8 @@ pub trait Visits: Orbits<3> {
 macro_rules! visits {
     ($($field:ty),*) => {
         $(impl Visits for $field {
-            fn passage(&self, eps: f64, question: &PassageQuestion) -> Result<PassageAnswer, Failure> {
+            fn passage(&self, eps: f64, question: &PassageQuestion) -> Result<PassageAnswer,
+                Failure> {
                 passage(self, eps, question)
             }
             fn digits(&self, question: &DigitsQuestion) -> Result<Digits, Failure> {
@@ -158,7 +161,11 @@ visits!(BoundField<3>, Smoothed<Caricature>);
 ///
 /// # Errors
 /// If it has not three.
-pub fn smoothed(system: &System, transition: Transition, eps: f64) -> Result<Box<dyn Visits>, BindError> {
+pub fn smoothed(
+    system: &System,
+    transition: Transition,
+    eps: f64,
+) -> Result<Box<dyn Visits>, BindError> {
     Ok(match system.compiled() {
         Some(Compiled::Caricature(system)) => Box::new(Smoothed { system, transition, eps }),
         _ => Box::new(Field::smoothed(system, transition, eps).bind::<3>()?),
@@ -176,7 +183,9 @@ pub fn hysteretic(
     relaxation: Relaxation,
 ) -> Result<Box<dyn Orbits<4>>, BindError> {
     Ok(match system.compiled() {
-        Some(Compiled::Caricature(system)) => Box::new(Hysteretic { system, eps, eps_prime, relaxation }),
+        Some(Compiled::Caricature(system)) => {
+            Box::new(Hysteretic { system, eps, eps_prime, relaxation })
+        }
         _ => Box::new(Field::hysteretic(system, eps, eps_prime, relaxation).bind::<4>()?),
     })
 }

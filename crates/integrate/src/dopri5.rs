@@ -1,11 +1,15 @@
-//! Dormand-Prince 5(4): the explicit Runge-Kutta pair RK5(4)7M of Dormand & Prince (1980), with the dense output and
-//! step control of Hairer, Norsett & Wanner, Solving ODEs I (2nd ed. 1993), secs II.4-II.6.
+//! Dormand-Prince 5(4): the explicit Runge-Kutta pair RK5(4)7M of Dormand & Prince (1980), with the
+//! dense output and step control of Hairer, Norsett & Wanner, Solving ODEs I (2nd ed. 1993), secs
+//! II.4-II.6.
 
 use nalgebra::SVector;
 
 use super::guard::Redoable;
 use super::starting_step::starting_step;
-use super::step::{Driven, DrivenStepper, Failure, Interpolant, Statistics, Steady, Step, Stepper, Tolerance, finite};
+use super::step::{
+    Driven, DrivenStepper, Failure, Interpolant, Statistics, Steady, Step, Stepper, Tolerance,
+    finite,
+};
 use twofold_num::elementary::{rough_exp2, rough_log2, sqrt};
 use twofold_system::VectorField;
 
@@ -30,7 +34,8 @@ pub(super) mod tableau {
     pub const A63: f64 = 46732.0 / 5247.0;
     pub const A64: f64 = 49.0 / 176.0;
     pub const A65: f64 = -5103.0 / 18656.0;
-    // The seventh stage is the fifth-order solution itself: its derivative is the next step's first ("fsal").
+    // The seventh stage is the fifth-order solution itself: its derivative is the next step's first
+    // ("fsal").
     pub const A71: f64 = 35.0 / 384.0;
     pub const A73: f64 = 500.0 / 1113.0;
     pub const A74: f64 = 125.0 / 192.0;
@@ -43,7 +48,8 @@ pub(super) mod tableau {
     pub const E5: f64 = -17253.0 / 339200.0;
     pub const E6: f64 = 22.0 / 525.0;
     pub const E7: f64 = -1.0 / 40.0;
-    // Dense output of fourth order, Hairer et al. (1993), eq. (II.6.12) in the arrangement of their DOPRI5.
+    // Dense output of fourth order, Hairer et al. (1993), eq. (II.6.12) in the arrangement of their
+    // DOPRI5.
     pub const D1: f64 = -12715105075.0 / 11282082432.0;
     pub const D3: f64 = 87487479700.0 / 32700410799.0;
     pub const D4: f64 = -10690763975.0 / 1880347072.0;
@@ -53,8 +59,9 @@ pub(super) mod tableau {
 }
 use tableau::*;
 
-/// Step control, Hairer et al. (1993), sec. IV.2 (PI control after Gustafsson 1991): h_new = h safety err^-alpha err_old^beta. Errors are
-/// kept squared, as the norm's sum gives them, and their powers are made of one logarithm a step.
+/// Step control, Hairer et al. (1993), sec. IV.2 (PI control after Gustafsson 1991): h_new = h
+/// safety err^-alpha err_old^beta. Errors are kept squared, as the norm's sum gives them, and their
+/// powers are made of one logarithm a step.
 pub(super) mod control {
     pub const SAFETY: f64 = 0.9;
     pub const BETA: f64 = 0.04;
@@ -69,8 +76,9 @@ pub(super) mod control {
     pub const GROW: f64 = 10.0;
 }
 
-/// Detection of stiffness, Hairer & Wanner (1996), sec. IV.2, with the numbers of their DOPRI5: stages 6 and 7 belong to one time, so
-/// h |k7 - k6| / |x7 - x6| estimates h |lambda|, which is near the boundary of the stability region where that bounds the step.
+/// Detection of stiffness, Hairer & Wanner (1996), sec. IV.2, with the numbers of their DOPRI5:
+/// stages 6 and 7 belong to one time, so h |k7 - k6| / |x7 - x6| estimates h |lambda|, which is
+/// near the boundary of the stability region where that bounds the step.
 mod stiffness {
     /// The boundary of the stability region on the negative axis.
     pub const BOUNDARY: f64 = 3.25;
@@ -105,8 +113,8 @@ pub struct Dopri5<const N: usize> {
     inside: u32,
 }
 
-/// The interpolant of one step, Hairer et al. (1993), sec. II.6: what it is made of. Most steps are never looked into, so its
-/// coefficients are computed when asked for.
+/// The interpolant of one step, Hairer et al. (1993), sec. II.6: what it is made of. Most steps are
+/// never looked into, so its coefficients are computed when asked for.
 #[derive(Clone, Debug)]
 pub(super) struct Dense<const N: usize> {
     pub(super) h: f64,
@@ -127,7 +135,8 @@ impl<const N: usize> Interpolant<N> for Dense<N> {
         x0 + (r2 + (r3 + (r4 + r5 * one_minus) * theta) * one_minus) * theta
     }
     fn coordinate(&self, theta: f64, i: usize) -> f64 {
-        let (h, x0, [k1, k3, k4, k5, k6, k7]) = (self.h, self.x0[i], self.k.each_ref().map(|k| k[i]));
+        let (h, x0, [k1, k3, k4, k5, k6, k7]) =
+            (self.h, self.x0[i], self.k.each_ref().map(|k| k[i]));
         let one_minus = 1.0 - theta;
         let r2 = self.x1[i] - x0;
         let r3 = k1 * h - r2;
@@ -178,16 +187,21 @@ impl<const N: usize> Dopri5<N> {
         }
     }
 
-    /// Whether the steps are bounded by stability, not by accuracy: an implicit method is then better.
+    /// Whether the steps are bounded by stability, not by accuracy: an implicit method is then
+    /// better.
     pub fn is_stiff(&self) -> bool {
         self.at_boundary >= stiffness::AT_IT
     }
 
-    /// Looks at a step for [`Dopri5::is_stiff`]: the differences of its last two stages and of their derivatives times h.
+    /// Looks at a step for [`Dopri5::is_stiff`]: the differences of its last two stages and of
+    /// their derivatives times h.
     fn look_for_stiffness(&mut self, apart: &SVector<f64, N>, derivatives: &SVector<f64, N>) {
         let x1 = self.x;
-        let [states, derivatives] = [apart, derivatives].map(|d| self.mean_square(d, |i| x1[i].abs()));
-        if states > stiffness::ROUNDING && derivatives > stiffness::BOUNDARY * stiffness::BOUNDARY * states {
+        let [states, derivatives] =
+            [apart, derivatives].map(|d| self.mean_square(d, |i| x1[i].abs()));
+        if states > stiffness::ROUNDING
+            && derivatives > stiffness::BOUNDARY * stiffness::BOUNDARY * states
+        {
             (self.at_boundary, self.inside) = (self.at_boundary + 1, 0);
         } else {
             self.inside += 1;
@@ -235,23 +249,41 @@ impl<const N: usize> Dopri5<N> {
                 return Err(Failure::StepUnderflow { t: t0, h, state: Failure::state(&x0) });
             }
             let t1 = if last { self.t_end } else { t0 + h };
-            // Each sum ends with the derivative that was computed last: nothing but it is waited for.
+            // Each sum ends with the derivative that was computed last: nothing but it is waited
+            // for.
             let k2 = field.eval(t0 + h * C2, &(x0 + k1 * (h * A21)));
             let k3 = field.eval(t0 + h * C3, &(x0 + k1 * (h * A31) + k2 * (h * A32)));
-            let k4 = field.eval(t0 + h * C4, &(x0 + k1 * (h * A41) + k2 * (h * A42) + k3 * (h * A43)));
+            let k4 =
+                field.eval(t0 + h * C4, &(x0 + k1 * (h * A41) + k2 * (h * A42) + k3 * (h * A43)));
             let x5 = x0 + k1 * (h * A51) + k2 * (h * A52) + k3 * (h * A53) + k4 * (h * A54);
             let k5 = field.eval(t0 + h * C5, &x5);
-            let x6 = x0 + k1 * (h * A61) + k2 * (h * A62) + k3 * (h * A63) + k4 * (h * A64) + k5 * (h * A65);
+            let x6 = x0
+                + k1 * (h * A61)
+                + k2 * (h * A62)
+                + k3 * (h * A63)
+                + k4 * (h * A64)
+                + k5 * (h * A65);
             let k6 = field.eval(t1, &x6);
             // The increment by itself: one rounding at the size of the state, not five.
-            let x1 = x0 + (k1 * (h * A71) + k3 * (h * A73) + k4 * (h * A74) + k5 * (h * A75) + k6 * (h * A76));
+            let x1 = x0
+                + (k1 * (h * A71)
+                    + k3 * (h * A73)
+                    + k4 * (h * A74)
+                    + k5 * (h * A75)
+                    + k6 * (h * A76));
             let k7 = field.eval(t1, &x1);
             self.statistics.evaluations += 6;
 
-            let e = k1 * (h * E1) + k3 * (h * E3) + k4 * (h * E4) + k5 * (h * E5) + k6 * (h * E6) + k7 * (h * E7);
+            let e = k1 * (h * E1)
+                + k3 * (h * E3)
+                + k4 * (h * E4)
+                + k5 * (h * E5)
+                + k6 * (h * E6)
+                + k7 * (h * E7);
             let square = self.mean_square(&e, |i| x0[i].abs().max(x1[i].abs()));
             if !square.is_finite() || !finite(&x1) || !finite(&k7) {
-                // A trial point may leave the domain although the orbit does not: retry much shorter, then give up.
+                // A trial point may leave the domain although the orbit does not: retry much
+                // shorter, then give up.
                 self.statistics.rejected += 1;
                 self.h = h * 0.1;
                 rejected_before = true;
@@ -262,9 +294,10 @@ impl<const N: usize> Dopri5<N> {
             }
             let log = rough_log2(square.max(control::LEAST_SQUARE));
             if square <= 1.0 {
-                let factor = (rough_exp2(0.5 * (control::ALPHA * log - control::BETA * self.last_log))
-                    / control::SAFETY)
-                    .clamp(1.0 / control::GROW, 1.0 / control::SHRINK);
+                let factor =
+                    (rough_exp2(0.5 * (control::ALPHA * log - control::BETA * self.last_log))
+                        / control::SAFETY)
+                        .clamp(1.0 / control::GROW, 1.0 / control::SHRINK);
                 let mut next = h / factor;
                 if rejected_before {
                     next = next.min(h);

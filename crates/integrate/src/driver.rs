@@ -14,7 +14,8 @@ pub trait Observer<const N: usize> {
     fn step(&mut self, step: &Step<'_, N>) -> Flow;
     /// The state jumped at time `t` (a kick).
     fn kick(&mut self, _t: f64, _before: &SVector<f64, N>, _after: &SVector<f64, N>) {}
-    /// Of runs side by side that carry a vector along ([`Carried`](super::ensemble::Carried)): its length was `length`, and is 1 again.
+    /// Of runs side by side that carry a vector along ([`Carried`](super::ensemble::Carried)): its
+    /// length was `length`, and is 1 again.
     fn rescaled(&mut self, _t: f64, _length: f64) {}
     /// Of the same: one of their stops is reached, in the state `x`.
     fn stopped(&mut self, _t: f64, _x: &SVector<f64, N>) {}
@@ -54,14 +55,21 @@ pub struct DriveOptions {
     pub step_cap: StepCap,
     /// Most steps of the whole run; with them it ends as [`StopReason::StepBudget`].
     pub max_steps: u64,
-    /// How many leading components of the state a kick perturbs: the states of the system, but not a hysteretic phi.
+    /// How many leading components of the state a kick perturbs: the states of the system, but not
+    /// a hysteretic phi.
     pub kicked_states: usize,
 }
 
 impl DriveOptions {
     /// Straight to `t_end`: no restarts, no kicks, steps as long and as many as the method wants.
     pub fn to(t_end: f64) -> Self {
-        Self { t_end, schedule: Schedule::default(), step_cap: StepCap::None, max_steps: u64::MAX, kicked_states: 3 }
+        Self {
+            t_end,
+            schedule: Schedule::default(),
+            step_cap: StepCap::None,
+            max_steps: u64::MAX,
+            kicked_states: 3,
+        }
     }
 }
 
@@ -85,12 +93,15 @@ impl<const N: usize> Summary<N> {
     /// This summary, unless the budget of steps ended the run.
     ///
     /// # Errors
-    /// [`Failure::TooManySteps`], for callers to whom a run cut short by its budget is worth nothing.
+    /// [`Failure::TooManySteps`], for callers to whom a run cut short by its budget is worth
+    /// nothing.
     pub fn within_budget(self) -> Result<Self, Failure> {
         match self.stop {
-            StopReason::StepBudget => {
-                Err(Failure::TooManySteps { t: self.t, limit: self.statistics.steps, state: Failure::state(&self.x) })
-            }
+            StopReason::StepBudget => Err(Failure::TooManySteps {
+                t: self.t,
+                limit: self.statistics.steps,
+                state: Failure::state(&self.x),
+            }),
             _ => Ok(self),
         }
     }
@@ -99,7 +110,8 @@ impl<const N: usize> Summary<N> {
 /// Runs `stepper` from (0, x0) over `options`.
 ///
 /// # Errors
-/// What the method could not do. Running out of steps is no error but a [`StopReason`]: what was observed until then stands.
+/// What the method could not do. Running out of steps is no error but a [`StopReason`]: what was
+/// observed until then stands.
 pub fn drive<const N: usize, F, M>(
     field: &F,
     x0: SVector<f64, N>,
@@ -115,10 +127,18 @@ where
     drive_any(&mut Pair { field, stepper }, x0, options, observer, monitor)
 }
 
-/// A method with its equation: what the loop asks of both, whichever they are, so that it is compiled once a dimension.
+/// A method with its equation: what the loop asks of both, whichever they are, so that it is
+/// compiled once a dimension.
 trait Driving<const N: usize> {
     /// [`Stepper::restart`], or [`Stepper::restart_again`].
-    fn restart(&mut self, again: bool, t: f64, x: SVector<f64, N>, t_end: f64, max_step: f64) -> Result<(), Failure>;
+    fn restart(
+        &mut self,
+        again: bool,
+        t: f64,
+        x: SVector<f64, N>,
+        t_end: f64,
+        max_step: f64,
+    ) -> Result<(), Failure>;
     /// [`Stepper::step`].
     fn step(&mut self) -> Result<Step<'_, N>, Failure>;
     /// [`Stepper::statistics`].
@@ -133,7 +153,14 @@ struct Pair<'a, F, M> {
 }
 
 impl<F: VectorField<N>, M: Stepper<N>, const N: usize> Driving<N> for Pair<'_, F, M> {
-    fn restart(&mut self, again: bool, t: f64, x: SVector<f64, N>, t_end: f64, max_step: f64) -> Result<(), Failure> {
+    fn restart(
+        &mut self,
+        again: bool,
+        t: f64,
+        x: SVector<f64, N>,
+        t_end: f64,
+        max_step: f64,
+    ) -> Result<(), Failure> {
         if again {
             self.stepper.restart_again(self.field, t, x, t_end, max_step)
         } else {
@@ -170,7 +197,8 @@ fn drive_any<const N: usize>(
         let again = std::mem::replace(&mut begun, true);
         pair.restart(again, t, x, segment.end, longest).map_err(|f| pair.diagnosed(f))?;
         while t < segment.end {
-            // Looked at where it was made: `?` would move it, in other pieces than it was written in, which waits until all are written.
+            // Looked at where it was made: `?` would move it, in other pieces than it was written
+            // in, which waits until all are written.
             let flow = match &pair.step() {
                 Ok(step) => {
                     (t, x) = (step.t1, step.x1);
@@ -240,7 +268,11 @@ mod tests {
         }
     }
 
-    fn run(options: DriveOptions, observer: &mut dyn Observer<2>, monitor: &dyn Monitor) -> Summary<2> {
+    fn run(
+        options: DriveOptions,
+        observer: &mut dyn Observer<2>,
+        monitor: &dyn Monitor,
+    ) -> Summary<2> {
         let mut stepper = Dopri5::new(Tolerance { rtol: 1e-9, atol: 1e-9 });
         drive(&Turning, vector![1.0, 0.0], &options, &mut stepper, observer, monitor).unwrap()
     }
@@ -255,32 +287,48 @@ mod tests {
         assert_eq!((seen.stop, seen.statistics.steps), (StopReason::Observer, 7));
         assert!(seen.t < 10.0 && seen.most_steps_in_segment == 7);
         // Three segments, the last of them hardly begun.
-        let often =
-            DriveOptions { schedule: Schedule { restart_every: Some(1.0), kick: None }, ..DriveOptions::to(10.0) };
+        let often = DriveOptions {
+            schedule: Schedule { restart_every: Some(1.0), kick: None },
+            ..DriveOptions::to(10.0)
+        };
         let first = run(DriveOptions { t_end: 1.0, ..often }, &mut Ignore, &()).statistics.steps;
-        let second = run(DriveOptions { t_end: 2.0, ..often }, &mut Ignore, &()).statistics.steps - first;
+        let second =
+            run(DriveOptions { t_end: 2.0, ..often }, &mut Ignore, &()).statistics.steps - first;
         let third = run(often, &mut After(first + second + 1), &());
-        assert_eq!((third.stop, third.most_steps_in_segment), (StopReason::Observer, first.max(second)));
+        assert_eq!(
+            (third.stop, third.most_steps_in_segment),
+            (StopReason::Observer, first.max(second))
+        );
 
         let poor = run(DriveOptions { max_steps: 5, ..DriveOptions::to(10.0) }, &mut Ignore, &());
         assert_eq!((poor.stop, poor.statistics.steps), (StopReason::StepBudget, 5));
         assert!(matches!(poor.within_budget(), Err(Failure::TooManySteps { limit: 5, .. })));
 
         let refuses = Refuses(AtomicBool::new(false));
-        let cut =
-            run(DriveOptions { step_cap: StepCap::Absolute(1e-3), ..DriveOptions::to(10.0) }, &mut Ignore, &refuses);
+        let cut = run(
+            DriveOptions { step_cap: StepCap::Absolute(1e-3), ..DriveOptions::to(10.0) },
+            &mut Ignore,
+            &refuses,
+        );
         assert_eq!((cut.stop, cut.statistics.steps), (StopReason::Cancelled, 4096));
         assert!(cut.clone().within_budget().is_ok(), "only the budget is an error");
 
-        // A budget that is just enough is enough, and a monitor that refuses at the very end has cut nothing short.
-        let just =
-            run(DriveOptions { max_steps: whole.statistics.steps, ..DriveOptions::to(10.0) }, &mut Ignore, &refuses);
+        // A budget that is just enough is enough, and a monitor that refuses at the very end has
+        // cut nothing short.
+        let just = run(
+            DriveOptions { max_steps: whole.statistics.steps, ..DriveOptions::to(10.0) },
+            &mut Ignore,
+            &refuses,
+        );
         assert_eq!(just.stop, StopReason::EndTime);
         assert_eq!(just.x, whole.x);
 
         // Neither has one that is asked when the last step is the 4096th.
-        let last =
-            run(DriveOptions { step_cap: StepCap::Absolute(1e-3), ..DriveOptions::to(cut.t) }, &mut Ignore, &refuses);
+        let last = run(
+            DriveOptions { step_cap: StepCap::Absolute(1e-3), ..DriveOptions::to(cut.t) },
+            &mut Ignore,
+            &refuses,
+        );
         assert_eq!((last.stop, last.statistics.steps, last.t), (StopReason::EndTime, 4096, cut.t));
     }
 
@@ -297,8 +345,10 @@ mod tests {
     fn what_is_counted_was_done() {
         let field = Counted(Default::default());
         let mut stepper = Dopri5::new(Tolerance { rtol: 1e-6, atol: 1e-6 });
-        let options =
-            DriveOptions { schedule: Schedule { restart_every: Some(30.0), kick: None }, ..DriveOptions::to(100.0) };
+        let options = DriveOptions {
+            schedule: Schedule { restart_every: Some(30.0), kick: None },
+            ..DriveOptions::to(100.0)
+        };
         let mut seen = Lengths::default();
         let end = drive(&field, vector![2.0, 0.0], &options, &mut stepper, &mut seen, &()).unwrap();
         let s = &end.statistics;

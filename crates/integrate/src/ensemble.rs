@@ -1,5 +1,6 @@
-//! Many independent runs at once, of one equation or of equations that differ in numbers alone ([`ParameterBatch`](twofold_system::ParameterBatch)), side by side
-//! in the lanes of vector registers, by Dormand-Prince 5(4).
+//! Many independent runs at once, of one equation or of equations that differ in numbers alone
+//! ([`ParameterBatch`](twofold_system::ParameterBatch)), side by side in the lanes of vector
+//! registers, by Dormand-Prince 5(4).
 //!
 //! Each lane has its own time, step size, schedule and end, accepts and rejects steps by itself,
 //! and receives the next run when its own has ended. A run's result does not depend on its
@@ -7,10 +8,11 @@
 //! [`drive`](super::drive) with [`Guarded`](super::Guarded) [`Dopri5`], because every operation is
 //! the same, in the same order (tests/it/ensemble.rs).
 //!
-//! The instruction set is chosen when the program runs ([`InstructionSet`]). It decides how many lanes an instruction takes and nothing else:
-//! no operation is fused, none reordered.
+//! The instruction set is chosen when the program runs ([`InstructionSet`]). It decides how many
+//! lanes an instruction takes and nothing else: no operation is fused, none reordered.
 
-// Loops by number over registers and components: iterators and closures may stay calls, compiled for the wrong instruction set.
+// Loops by number over registers and components: iterators and closures may stay calls, compiled
+// for the wrong instruction set.
 #![allow(clippy::needless_range_loop)]
 
 use nalgebra::SVector;
@@ -81,8 +83,9 @@ pub struct Common<'a, const N: usize> {
     pub tolerances: Tolerances<'a>,
     /// The plane that observers monitor; without one they receive kicks only.
     pub plane: Option<SectionPlane>,
-    /// A corner for each run, which ends as if its observer had stopped it ([`StopReason::Observer`]) at the first step's end where each component of
-    /// the state is above the corner's.
+    /// A corner for each run, which ends as if its observer had stopped it
+    /// ([`StopReason::Observer`]) at the first step's end where each component of the state is
+    /// above the corner's.
     pub corners: Option<&'a [SVector<f64, N>]>,
     /// A vector that each run carries along, as part of its state.
     pub carried: Option<Carried<'a>>,
@@ -99,7 +102,8 @@ pub struct Carried<'a> {
     pub first: usize,
     /// The least and the greatest length that a step may leave it with.
     pub range: [f64; 2],
-    /// When methods start anew, in place of the schedules' restarts and kicks: increasing times, the last of them the end.
+    /// When methods start anew, in place of the schedules' restarts and kicks: increasing times,
+    /// the last of them the end.
     pub stops: &'a [f64],
 }
 
@@ -167,7 +171,8 @@ where
     ensemble_with(InstructionSet::best(), equations, runs, tolerance, plane, observer)
 }
 
-/// [`ensemble()`] with the instructions `set`; with [`InstructionSet::best`] if this machine has not got it.
+/// [`ensemble()`] with the instructions `set`; with [`InstructionSet::best`] if this machine has
+/// not got it.
 pub fn ensemble_with<E, O, const N: usize>(
     set: InstructionSet,
     equations: &E,
@@ -181,7 +186,13 @@ where
     O: Observer<N>,
 {
     let mut ends: Vec<Option<End<O, N>>> = runs.iter().map(|_| None).collect();
-    let common = Common { tolerances: Tolerances::All(tolerance), plane, corners: None, carried: None, monitor: &() };
+    let common = Common {
+        tolerances: Tolerances::All(tolerance),
+        plane,
+        corners: None,
+        carried: None,
+        monitor: &(),
+    };
     ensemble_watched(set, equations, runs, common, observer, &mut |run, end| ends[run] = Some(end));
     ends.into_iter().flatten().collect()
 }
@@ -237,15 +248,22 @@ struct All<'a, E, O, M: Fn(usize) -> O, const N: usize, const K: usize> {
     finished: &'a mut dyn FnMut(usize, End<O, N>),
 }
 
-impl<'a, E: BatchedField<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize> All<'a, E, O, M, N, 1> {
-    /// Computes all by these vector instructions, or by this machine's best; gives itself back if there are none.
+impl<'a, E: BatchedField<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize>
+    All<'a, E, O, M, N, 1>
+{
+    /// Computes all by these vector instructions, or by this machine's best; gives itself back if
+    /// there are none.
     fn in_vectors(self, set: InstructionSet) -> Option<Self> {
         match if set.is_here() { set } else { InstructionSet::best() } {
             // No other processor has wider registers here.
             #[cfg(target_arch = "x86_64")]
-            InstructionSet::Avx2 if let Some(set) = pulp::x86::V3::try_new() => self.side_by_side(set),
+            InstructionSet::Avx2 if let Some(set) = pulp::x86::V3::try_new() => {
+                self.side_by_side(set)
+            }
             #[cfg(target_arch = "x86_64")]
-            InstructionSet::Avx512 if let Some(set) = pulp::x86::V4::try_new() => self.side_by_side(set),
+            InstructionSet::Avx512 if let Some(set) = pulp::x86::V4::try_new() => {
+                self.side_by_side(set)
+            }
             _ => return Some(self),
         }
         None
@@ -253,10 +271,13 @@ impl<'a, E: BatchedField<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize> 
 }
 
 #[cfg(target_arch = "x86_64")]
-impl<'a, E: BatchedField<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize> All<'a, E, O, M, N, 1> {
-    /// By as many registers at a time as suit the number of runs: while one waits for a quotient the others go on, and of four none waits long,
-    /// but they take 1.6 times as long as two for a step. That pays where runs fill their lanes at least twice, and states
-    /// are few: six are no faster with four.
+impl<'a, E: BatchedField<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize>
+    All<'a, E, O, M, N, 1>
+{
+    /// By as many registers at a time as suit the number of runs: while one waits for a quotient
+    /// the others go on, and of four none waits long, but they take 1.6 times as long as two for a
+    /// step. That pays where runs fill their lanes at least twice, and states are few: six are no
+    /// faster with four.
     fn side_by_side<S: Simd>(self, set: S) {
         if const { N <= 4 } && self.runs.len() >= 2 * 4 * S::F64_LANES {
             set.vectorize(self.in_registers::<4>());
@@ -290,16 +311,30 @@ impl<E: BatchedField<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize, cons
             for l in 0..width {
                 while state.lanes[l].is_none() {
                     let Some(run) = waiting.next() else { break };
-                    state.give(l, equations.numbers(run), common.corners.map(|corners| &corners[run]));
+                    state.give(
+                        l,
+                        equations.numbers(run),
+                        common.corners.map(|corners| &corners[run]),
+                    );
                     let tolerance = common.tolerances.of(run);
                     let segments: Box<dyn Iterator<Item = Segment>> = match common.carried {
-                        None => Box::new(runs[run].options.schedule.segments(0.0, runs[run].options.t_end)),
+                        None => Box::new(
+                            runs[run].options.schedule.segments(0.0, runs[run].options.t_end),
+                        ),
                         Some(Carried { stops, .. }) => {
                             let stops = Vec::from(stops);
                             Box::new(stops.into_iter().map(|end| Segment { end, kick: false }))
                         }
                     };
-                    if let Some(end) = state.begin(l, equations, run, &runs[run], segments, tolerance, observer(run)) {
+                    if let Some(end) = state.begin(
+                        l,
+                        equations,
+                        run,
+                        &runs[run],
+                        segments,
+                        tolerance,
+                        observer(run),
+                    ) {
                         finished(run, end);
                     }
                 }
@@ -345,7 +380,10 @@ impl<O, const N: usize> Lane<O, N> {
     fn missed(&mut self, step: &Step<'_, N>, tolerance: Tolerance) -> Result<bool, Failure> {
         let Some(gates) = &mut self.gates else { return Ok(false) };
         let missed = gates.missed(step, tolerance)?;
-        missed.map(|times| self.stages.go_through((step.t0, &step.x0), times)).transpose().map(|done| done.is_some())
+        missed
+            .map(|times| self.stages.go_through((step.t0, &step.x0), times))
+            .transpose()
+            .map(|done| done.is_some())
     }
 }
 
@@ -367,7 +405,8 @@ struct State<S: Simd, O, const N: usize, const K: usize> {
     x: [[S::f64s; K]; N],
     fsal: [[S::f64s; K]; N],
     corner: [[S::f64s; K]; N],
-    /// What can hide in steps: [`Plain`](super::guard::Plain)'s fields; never anything if `flat` is -infinity, and always something if it is NaN.
+    /// What can hide in steps: [`Plain`](super::guard::Plain)'s fields; never anything if `flat` is
+    /// -infinity, and always something if it is NaN.
     slopes: [[S::f64s; K]; N],
     offset: [S::f64s; K],
     flat: [S::f64s; K],
@@ -561,12 +600,14 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
         let last = remaining.at_most(of(self.h) * number(1.000_000_1), set);
         let h = last.select(remaining, of(self.h));
 
-        let mut f = Derivative { set, equations, numbers: &self.numbers, scratch: &mut self.scratch };
+        let mut f =
+            Derivative { set, equations, numbers: &self.numbers, scratch: &mut self.scratch };
         let k2 = f.at(&advanced(&x0, h, [(&k1, A21)]));
         let k3 = f.at(&advanced(&x0, h, [(&k1, A31), (&k2, A32)]));
         let k4 = f.at(&advanced(&x0, h, [(&k1, A41), (&k2, A42), (&k3, A43)]));
         let k5 = f.at(&advanced(&x0, h, [(&k1, A51), (&k2, A52), (&k3, A53), (&k4, A54)]));
-        let k6 = f.at(&advanced(&x0, h, [(&k1, A61), (&k2, A62), (&k3, A63), (&k4, A64), (&k5, A65)]));
+        let k6 =
+            f.at(&advanced(&x0, h, [(&k1, A61), (&k2, A62), (&k3, A63), (&k4, A64), (&k5, A65)]));
         let mut x1 = combined(h, (&k1, A71), [(&k3, A73), (&k4, A74), (&k5, A75), (&k6, A76)]);
         for i in 0..N {
             x1[i] = x0[i] + x1[i];
@@ -592,9 +633,11 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
         let accepted = sound.and(square.at_most(number(1.0), set));
 
         let log = rough_log2(larger(square, number(control::LEAST_SQUARE)));
-        let after_success = number(0.5) * (number(control::ALPHA) * log - number(control::BETA) * of(self.last_log));
+        let after_success = number(0.5)
+            * (number(control::ALPHA) * log - number(control::BETA) * of(self.last_log));
         let after_failure = number(0.5 * control::ALPHA) * log;
-        let factor = rough_exp2(accepted.select(after_success, after_failure)) / number(control::SAFETY);
+        let factor =
+            rough_exp2(accepted.select(after_success, after_failure)) / number(control::SAFETY);
         let factor = smaller(factor, number(1.0 / control::SHRINK));
         let least = accepted.select(number(1.0 / control::GROW), factor);
         let next = h / larger(factor, least);
@@ -607,7 +650,8 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
         let t1 = last.select(of(self.t_end), t0 + h);
         self.h = next.parts();
         self.t = accepted.select(t1, t0).parts();
-        self.last_log = accepted.select(larger(log, number(control::LEAST_LOG)), of(self.last_log)).parts();
+        self.last_log =
+            accepted.select(larger(log, number(control::LEAST_LOG)), of(self.last_log)).parts();
         self.rejected_before = accepted.select(zero, one).parts();
         let steps = of(self.steps) + accepted.select(one, zero);
         self.steps = steps.parts();
@@ -618,7 +662,10 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
         }
 
         // What few do.
-        let tiny = h.size().at_most(t0.size() * number(f64::EPSILON), set).or(h.less(number(f64::MIN_POSITIVE), set));
+        let tiny = h
+            .size()
+            .at_most(t0.size() * number(f64::EPSILON), set)
+            .or(h.less(number(f64::MIN_POSITIVE), set));
         let ended = accepted.and(last.or(of(self.max_steps).at_most(steps, set)));
         let unsound = sound.select(zero, one).size();
         let mut noted = tiny.or(ended).or(number(0.5).less(unsound, set));
@@ -628,7 +675,8 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
                 let slope = of(self.slopes[i]);
                 w0 += slope * x0[i];
                 w1 += slope * x1[i];
-                bend += slope.size() * reach(x0[i], x1[i], h, [k1[i], k3[i], k4[i], k5[i], k6[i], k7[i]], set);
+                bend += slope.size()
+                    * reach(x0[i], x1[i], h, [k1[i], k3[i], k4[i], k5[i], k6[i], k7[i]], set);
             }
         }
         let flat = of(self.flat);
@@ -642,7 +690,15 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
         noted = noted.or(hiding);
         let mut met = None;
         if let Some(SectionPlane { coordinate, value }) = common.plane {
-            let may = may_meet(coordinate, number(value), h, &x0, &x1, [&k1, &k3, &k4, &k5, &k6, &k7], set);
+            let may = may_meet(
+                coordinate,
+                number(value),
+                h,
+                &x0,
+                &x1,
+                [&k1, &k3, &k4, &k5, &k6, &k7],
+                set,
+            );
             let may = may.and(accepted);
             met = Some(may.select(one, zero).parts());
             noted = noted.or(may);
@@ -692,7 +748,8 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
         self.attend(equations, common, &seen, finished)
     }
 
-    /// The scalar part of a step, for the lanes that need one. Says whether a lane has become empty.
+    /// The scalar part of a step, for the lanes that need one. Says whether a lane has become
+    /// empty.
     #[inline(never)]
     fn attend<E: BatchedField<N>>(
         &mut self,
@@ -788,7 +845,8 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
         let stop = if flow == Flow::Stop {
             Some(StopReason::Observer)
         } else {
-            (steps >= lane.options.max_steps as f64 && t1 < lane.options.t_end).then_some(StopReason::StepBudget)
+            (steps >= lane.options.max_steps as f64 && t1 < lane.options.t_end)
+                .then_some(StopReason::StepBudget)
         };
         if stop.is_some() || last {
             lane.most_steps_in_segment = lane.most_steps_in_segment.max(steps - lane.steps_before);
@@ -854,11 +912,15 @@ impl<E, S: Simd, const K: usize> Derivative<'_, E, S, K> {
         E: BatchedField<N>,
     {
         let Self { set, equations, numbers, ref mut scratch } = *self;
-        vector(set, &set.vectorize(Field { set, equations, numbers, scratch, x: Aligned(bare(x)) }).0)
+        vector(
+            set,
+            &set.vectorize(Field { set, equations, numbers, scratch, x: Aligned(bare(x)) }).0,
+        )
     }
 }
 
-/// f at the state `x`: a function of its own in the instruction set, so that the equation is compiled once and not for every stage.
+/// f at the state `x`: a function of its own in the instruction set, so that the equation is
+/// compiled once and not for every stage.
 struct Field<'a, E, S: Simd, const N: usize, const K: usize> {
     set: S,
     equations: &'a E,
@@ -867,7 +929,9 @@ struct Field<'a, E, S: Simd, const N: usize, const K: usize> {
     x: Aligned<[[S::f64s; K]; N]>,
 }
 
-impl<E: BatchedField<N>, S: Simd, const N: usize, const K: usize> WithSimd for Field<'_, E, S, N, K> {
+impl<E: BatchedField<N>, S: Simd, const N: usize, const K: usize> WithSimd
+    for Field<'_, E, S, N, K>
+{
     type Output = Aligned<[[S::f64s; K]; N]>;
     #[inline(always)]
     fn with_simd<T: Simd>(self, _: T) -> Self::Output {
@@ -878,7 +942,10 @@ impl<E: BatchedField<N>, S: Simd, const N: usize, const K: usize> WithSimd for F
 
 /// A vector of the registers.
 #[inline(always)]
-fn vector<S: Simd, const N: usize, const K: usize>(set: S, parts: &[[S::f64s; K]; N]) -> SVector<Registers<S, K>, N> {
+fn vector<S: Simd, const N: usize, const K: usize>(
+    set: S,
+    parts: &[[S::f64s; K]; N],
+) -> SVector<Registers<S, K>, N> {
     let mut v = SVector::<Registers<S, K>, N>::from_element(Registers::splat(set, 0.0));
     for i in 0..N {
         v[i] = Registers::new(set, parts[i]);
@@ -888,7 +955,9 @@ fn vector<S: Simd, const N: usize, const K: usize>(set: S, parts: &[[S::f64s; K]
 
 /// The registers of a vector.
 #[inline(always)]
-fn bare<S: Simd, const N: usize, const K: usize>(v: &SVector<Registers<S, K>, N>) -> [[S::f64s; K]; N] {
+fn bare<S: Simd, const N: usize, const K: usize>(
+    v: &SVector<Registers<S, K>, N>,
+) -> [[S::f64s; K]; N] {
     let mut parts = [v[0].parts(); N];
     for i in 0..N {
         parts[i] = v[i].parts();
@@ -896,7 +965,8 @@ fn bare<S: Simd, const N: usize, const K: usize>(v: &SVector<Registers<S, K>, N>
     parts
 }
 
-/// Where the step may meet the plane: as [`CrossingFinder::through_plane`](super::roots::CrossingFinder::through_plane) decides it.
+/// Where the step may meet the plane: as
+/// [`CrossingFinder::through_plane`](super::roots::CrossingFinder::through_plane) decides it.
 #[inline(always)]
 fn may_meet<S: Simd, const N: usize, const K: usize>(
     coordinate: usize,
@@ -920,19 +990,27 @@ fn may_meet<S: Simd, const N: usize, const K: usize>(
     };
     let number = |value: f64| Registers::<S, K>::splat(set, value);
     let (a, b) = (component(x0), component(x1));
-    let k = [component(k[0]), component(k[1]), component(k[2]), component(k[3]), component(k[4]), component(k[5])];
+    let k = [
+        component(k[0]),
+        component(k[1]),
+        component(k[2]),
+        component(k[3]),
+        component(k[4]),
+        component(k[5]),
+    ];
     let reach = reach(a, b, h, k, set);
     let (h0, h1) = (a - value, b - value);
     let margin = number(1e-12) * (h0.size() + h1.size() + value.size() + reach);
     let nearer = h0.size().less(h1.size(), set).select(h0.size(), h1.size());
     let clear = (reach + margin).less(nearer, set);
-    let same = zero.less(h0, set).and(zero.less(h1, set)).or(h0.less(zero, set).and(h1.less(zero, set)));
+    let same =
+        zero.less(h0, set).and(zero.less(h1, set)).or(h0.less(zero, set).and(h1.less(zero, set)));
     let far = clear.and(same).select(number(1.0), zero);
     far.less(number(0.5), set)
 }
 
-/// How far one coordinate may leave the range between its values `a` and `b` at a step's ends: as [`Dense`]'s
-/// [`reach`](super::step::Interpolant::reach) bounds it.
+/// How far one coordinate may leave the range between its values `a` and `b` at a step's ends: as
+/// [`Dense`]'s [`reach`](super::step::Interpolant::reach) bounds it.
 #[inline(always)]
 fn reach<S: Simd, const K: usize>(
     a: Registers<S, K>,
@@ -945,8 +1023,13 @@ fn reach<S: Simd, const K: usize>(
     let r2 = b - a;
     let r3 = k1 * h - r2;
     let r3_and_r4 = r2 - k7 * h;
-    let r5 =
-        (k1 * number(D1) + k3 * number(D3) + k4 * number(D4) + k5 * number(D5) + k6 * number(D6) + k7 * number(D7)) * h;
+    let r5 = (k1 * number(D1)
+        + k3 * number(D3)
+        + k4 * number(D4)
+        + k5 * number(D5)
+        + k6 * number(D6)
+        + k7 * number(D7))
+        * h;
     let larger = r3.size().less(r3_and_r4.size(), set).select(r3_and_r4.size(), r3.size());
     number(0.25) * (larger + number(0.25) * r5.size())
 }

@@ -58,12 +58,17 @@ impl Range {
 
     /// The largest absolute value, and the smallest.
     fn sizes(self) -> (f64, f64) {
-        let least = if self.low <= 0.0 && self.high >= 0.0 { 0.0 } else { self.low.abs().min(self.high.abs()) };
+        let least = if self.low <= 0.0 && self.high >= 0.0 {
+            0.0
+        } else {
+            self.low.abs().min(self.high.abs())
+        };
         (self.low.abs().max(self.high.abs()), least)
     }
 }
 
-/// A number along a step: its values at the step's ends, and a bound on how far it leaves the chord between them (up to a few roundings).
+/// A number along a step: its values at the step's ends, and a bound on how far it leaves the chord
+/// between them (up to a few roundings).
 #[derive(Clone, Copy, Debug)]
 struct Along {
     ends: [f64; 2],
@@ -106,7 +111,8 @@ impl Along {
         Self::new(ends, 0.25 * self.change() * other.change() + bent)
     }
 
-    /// A function of it, with bounds on its slope and curvature in the range, and on how far it leaves any value that it takes there.
+    /// A function of it, with bounds on its slope and curvature in the range, and on how far it
+    /// leaves any value that it takes there.
     fn through(self, f: impl Fn(f64) -> f64, slope: f64, curvature: f64, most: f64) -> Self {
         let change = self.change();
         let bend = 0.125 * curvature * change * change + slope * self.bend;
@@ -134,7 +140,8 @@ enum Gate {
     Step(f64),
     Sign,
     Exp,
-    /// A quotient's divisor, the argument of a root, a logarithm or an arc tangent: smooth in its own scale.
+    /// A quotient's divisor, the argument of a root, a logarithm or an arc tangent: smooth in its
+    /// own scale.
     Scale,
     /// Sine and cosine.
     Wave,
@@ -158,18 +165,23 @@ const SMALL_FACTOR: f64 = 8.0;
 impl Gate {
     fn of(operation: Operation, (base, exponent): (Node, u32)) -> Option<(Self, Node)> {
         match operation {
-            Operation::Mul(..) if exponent >= HIGH_POWER => Some((Self::Power(f64::from(exponent)), base)),
+            Operation::Mul(..) if exponent >= HIGH_POWER => {
+                Some((Self::Power(f64::from(exponent)), base))
+            }
             Operation::Tanh(a) => Some((Self::Step(TANH_FLAT), a)),
             Operation::Erf(a) => Some((Self::Step(ERF_FLAT), a)),
             Operation::Sign(a) => Some((Self::Sign, a)),
             Operation::Exp(a) => Some((Self::Exp, a)),
-            Operation::Div(_, a) | Operation::Sqrt(a) | Operation::Ln(a) | Operation::Atan(a) => Some((Self::Scale, a)),
+            Operation::Div(_, a) | Operation::Sqrt(a) | Operation::Ln(a) | Operation::Atan(a) => {
+                Some((Self::Scale, a))
+            }
             Operation::Sin(a) | Operation::Cos(a) => Some((Self::Wave, a)),
             _ => None,
         }
     }
 
-    /// Whether it passes what it passes only once, from its value at one end of the step to that at the other.
+    /// Whether it passes what it passes only once, from its value at one end of the step to that at
+    /// the other.
     fn is_passed_once(self, w: Along) -> bool {
         let (_, least) = w.range().sizes();
         match self {
@@ -195,7 +207,8 @@ impl Gate {
     }
 }
 
-/// The only gate of an equation, where its argument is a linear function of the state: offset + slopes . x.
+/// The only gate of an equation, where its argument is a linear function of the state: offset +
+/// slopes . x.
 #[derive(Clone, Debug)]
 pub(super) struct Plain {
     pub(super) slopes: Vec<f64>,
@@ -213,7 +226,8 @@ impl Plain {
         for operation in &tape.operations()[..=argument] {
             let of = |a: Node| slopes[a].as_ref();
             let is_fixed = |a: Node| of(a).is_some_and(|s| s.iter().all(|v| *v == 0.0));
-            let scaled = |a: Node, by: f64| of(a).map(|s| s.iter().map(|v| v * by).collect::<Vec<f64>>());
+            let scaled =
+                |a: Node, by: f64| of(a).map(|s| s.iter().map(|v| v * by).collect::<Vec<f64>>());
             let sum = |a: Node, b: Node, sign: f64| -> Option<Vec<f64>> {
                 Some(of(a)?.iter().zip(of(b)?).map(|(a, b)| a + sign * b).collect())
             };
@@ -237,8 +251,8 @@ impl Plain {
         Some(Self { slopes, offset: fixed[argument], flat })
     }
 
-    /// Whether nothing can be hidden in the step, as far as little work shows: a sufficient condition, with the operations and the order of
-    /// those in [`ensemble`](super::ensemble).
+    /// Whether nothing can be hidden in the step, as far as little work shows: a sufficient
+    /// condition, with the operations and the order of those in [`ensemble`](super::ensemble).
     fn hides_nothing<const N: usize>(&self, step: &Step<'_, N>) -> bool {
         let (mut w0, mut w1, mut bend) = (self.offset, self.offset, 0.0);
         for (i, slope) in self.slopes.iter().enumerate().filter(|(_, slope)| **slope != 0.0) {
@@ -272,7 +286,8 @@ impl Gates {
         let operations = tape.operations();
         let mut moves = vec![false; operations.len()];
         for (node, operation) in operations.iter().enumerate() {
-            moves[node] = matches!(operation, Operation::Variable(_)) || operation.arguments().any(|a| moves[a]);
+            moves[node] = matches!(operation, Operation::Variable(_))
+                || operation.arguments().any(|a| moves[a]);
         }
         let (live, powers) = (tape.needed(), tape.powers());
         let mut gates: Vec<(Gate, Node)> = Vec::new();
@@ -293,7 +308,9 @@ impl Gates {
                 operations[node].arguments().for_each(|a| for_gates[a] = true);
             }
         }
-        let list = |wanted: &[bool]| (0..operations.len()).filter(|node| wanted[*node] && moves[*node]).collect();
+        let list = |wanted: &[bool]| {
+            (0..operations.len()).filter(|node| wanted[*node] && moves[*node]).collect()
+        };
         let needed = [list(&for_gates), list(&live)];
         let fixed = tape.values(&vec![0.0; tape.variables()]);
         let along = fixed.iter().map(|v| Along::constant(*v)).collect();
@@ -309,7 +326,8 @@ impl Gates {
         self.plain.as_ref()
     }
 
-    /// Whether nothing can be hidden in a step with these states: all gates are quiet, or all but one that is passed once.
+    /// Whether nothing can be hidden in a step with these states: all gates are quiet, or all but
+    /// one that is passed once.
     fn hide_nothing(&mut self, x: impl Fn(usize) -> Along) -> bool {
         let operations = self.tape.operations();
         for node in &self.needed[0] {
@@ -340,11 +358,18 @@ impl Gates {
                 }
                 Operation::Sqrt(a) => {
                     let root = Elementary::sqrt(v[a].range().low.max(0.0));
-                    v[a].through(Elementary::sqrt, 0.5 / root, 0.25 / (root * root * root), f64::INFINITY)
+                    v[a].through(
+                        Elementary::sqrt,
+                        0.5 / root,
+                        0.25 / (root * root * root),
+                        f64::INFINITY,
+                    )
                 }
                 Operation::Sin(a) => v[a].through(Elementary::sin, 1.0, 1.0, 2.0),
                 Operation::Cos(a) => v[a].through(Elementary::cos, 1.0, 1.0, 2.0),
-                Operation::Atan(a) => v[a].through(Elementary::atan, 1.0, 0.65, std::f64::consts::PI),
+                Operation::Atan(a) => {
+                    v[a].through(Elementary::atan, 1.0, 0.65, std::f64::consts::PI)
+                }
             };
             self.along[*node] = along;
         }
@@ -365,7 +390,9 @@ impl Gates {
             let v = &self.values;
             self.values[*node] = match operations[*node] {
                 Operation::Variable(i) => x[i],
-                Operation::Constant(_) | Operation::Parameter(_) | Operation::Pi => self.fixed[*node],
+                Operation::Constant(_) | Operation::Parameter(_) | Operation::Pi => {
+                    self.fixed[*node]
+                }
                 Operation::Add(a, b) => v[a] + v[b],
                 Operation::Sub(a, b) => v[a] - v[b],
                 Operation::Mul(a, b) => v[a] * v[b],
@@ -396,7 +423,8 @@ impl Gates {
         SVector::from_fn(|i, _| self.values[self.tape.outputs()[i]])
     }
 
-    /// Whether all gates are quiet between five equidistant samples of their arguments, which are smooth but where another gate is not quiet.
+    /// Whether all gates are quiet between five equidistant samples of their arguments, which are
+    /// smooth but where another gate is not quiet.
     fn are_quiet_between(&self, samples: [&[f64]; 5]) -> bool {
         self.gates.iter().enumerate().all(|(i, (gate, _))| {
             let w = samples.map(|s| s[i]);
@@ -420,7 +448,8 @@ struct Missed {
 const FINEST: f64 = 1e-12;
 /// Most parts of a step that are looked at; a step with more is made in shorter ones.
 const MOST_PARTS: usize = 4000;
-/// What a step has missed is allowed to be so many times the tolerance: what its error estimate does not show.
+/// What a step has missed is allowed to be so many times the tolerance: what its error estimate
+/// does not show.
 const ALLOWED: f64 = 20.0;
 /// The right-hand side is outside what the method saw if by so much of its variation there.
 const OUTSIDE: f64 = 0.1;
@@ -433,7 +462,8 @@ struct Piece {
 }
 
 impl Gates {
-    /// From when to when the step has missed something, if it has. A step that the domain of the equation does not hold is an error.
+    /// From when to when the step has missed something, if it has. A step that the domain of the
+    /// equation does not hold is an error.
     pub(super) fn missed<const N: usize>(
         &mut self,
         step: &Step<'_, N>,
@@ -455,10 +485,20 @@ impl Gates {
 
     #[cold]
     #[inline(never)]
-    fn searched<const N: usize>(&mut self, step: &Step<'_, N>, tolerance: Tolerance) -> Option<Missed> {
+    fn searched<const N: usize>(
+        &mut self,
+        step: &Step<'_, N>,
+        tolerance: Tolerance,
+    ) -> Option<Missed> {
         let at = |gates: &mut Self, theta: f64| gates.arguments(step.at(theta).as_slice());
-        let five = |from: f64, to: f64| std::array::from_fn::<f64, 5, _>(|k| from + 0.25 * k as f64 * (to - from));
-        let mut open = vec![Piece { from: 0.0, to: 1.0, samples: five(0.0, 1.0).map(|theta| at(self, theta)) }];
+        let five = |from: f64, to: f64| {
+            std::array::from_fn::<f64, 5, _>(|k| from + 0.25 * k as f64 * (to - from))
+        };
+        let mut open = vec![Piece {
+            from: 0.0,
+            to: 1.0,
+            samples: five(0.0, 1.0).map(|theta| at(self, theta)),
+        }];
         let mut leaves: Vec<(f64, f64)> = Vec::new();
         while let Some(Piece { from, to, samples }) = open.pop() {
             let whole = to - from == 1.0;
@@ -478,8 +518,20 @@ impl Gates {
             let [a, b, c, d, e] = samples;
             let between = |gates: &mut Self, from: f64, to: f64| at(gates, 0.5 * (from + to));
             let quarter = 0.25 * (to - from);
-            let right = [c.clone(), between(self, middle, middle + quarter), d, between(self, middle + quarter, to), e];
-            let left = [a, between(self, from, from + quarter), b, between(self, from + quarter, middle), c];
+            let right = [
+                c.clone(),
+                between(self, middle, middle + quarter),
+                d,
+                between(self, middle + quarter, to),
+                e,
+            ];
+            let left = [
+                a,
+                between(self, from, from + quarter),
+                b,
+                between(self, from + quarter, middle),
+                c,
+            ];
             open.push(Piece { from: middle, to, samples: right });
             open.push(Piece { from, to: middle, samples: left });
         }
@@ -503,7 +555,8 @@ impl Gates {
             for (k, weight) in [7.0, 32.0, 12.0, 32.0, 7.0].into_iter().enumerate() {
                 let theta = from + 0.25 * k as f64 * (to - from);
                 let f = self.field(&step.at(theta));
-                let (before, after) = ((theta - DIFFERENCE).max(0.0), (theta + DIFFERENCE).min(1.0));
+                let (before, after) =
+                    ((theta - DIFFERENCE).max(0.0), (theta + DIFFERENCE).min(1.0));
                 let at = |theta: f64| step.interpolant.at(theta);
                 let own = (at(after) - at(before)) / ((after - before) * h);
                 for i in 0..N {
@@ -582,7 +635,8 @@ impl Stages {
         self.before.len() < stages
     }
 
-    /// What lies between the times `from` and `to` was missed by a step from (t, x): to there, and through it with short steps.
+    /// What lies between the times `from` and `to` was missed by a step from (t, x): to there, and
+    /// through it with short steps.
     #[cold]
     #[inline(never)]
     pub(super) fn go_through<const N: usize>(
@@ -605,7 +659,8 @@ impl Stages {
 
 /// A method whose last step can be examined and taken back.
 pub trait Redoable<const N: usize>: Stepper<N> {
-    /// The continuous extension of the last step, which there must have been since the last restart.
+    /// The continuous extension of the last step, which there must have been since the last
+    /// restart.
     fn last(&self) -> &dyn Interpolant<N>;
 }
 
@@ -674,7 +729,11 @@ impl<M: Redoable<N>, const N: usize> Stepper<N> for Guarded<M, N> {
             }
             let step = self.method.step(field)?;
             let Step { t0, t1, x0, x1, .. } = step;
-            match self.gates.as_mut().map_or(Ok(None), |gates| gates.missed(&step, self.tolerance))? {
+            match self
+                .gates
+                .as_mut()
+                .map_or(Ok(None), |gates| gates.missed(&step, self.tolerance))?
+            {
                 Some(times) => {
                     self.reached = (t0, x0);
                     self.stages.go_through((t0, &x0), times)?;

@@ -1,8 +1,9 @@
 //! Time stepping: from an equation and a start to a sequence of accepted steps.
 //!
-//! A method is a [`Stepper`]: it makes one accepted [`Step`] at a time, and every step carries its interpolant (dense
-//! output). The one driver loop, [`drive`], runs a stepper over a [`DriveOptions`] (an end time, a [`Schedule`] of restarts and kicks, bounds on steps) and hands each
-//! step to an [`Observer`]. What is made of the steps (a path, a section) is not decided here.
+//! A method is a [`Stepper`]: it makes one accepted [`Step`] at a time, and every step carries its
+//! interpolant (dense output). The one driver loop, [`drive`], runs a stepper over a
+//! [`DriveOptions`] (an end time, a [`Schedule`] of restarts and kicks, bounds on steps) and hands
+//! each step to an [`Observer`]. What is made of the steps (a path, a section) is not decided here.
 //!
 //! ```
 //! use nalgebra::{SVector, vector};
@@ -19,13 +20,15 @@
 //! }
 //!
 //! let mut method = Dopri5::new(Tolerance { rtol: 1e-9, atol: 1e-9 });
-//! let end = drive(&Oscillator, vector![1.0, 0.0], &DriveOptions::to(1.0), &mut method, &mut Ignore, &())?;
+//! let to = DriveOptions::to(1.0);
+//! let end = drive(&Oscillator, vector![1.0, 0.0], &to, &mut method, &mut Ignore, &())?;
 //! assert_eq!(end.stop, StopReason::EndTime);
 //! assert!((end.x[0] - 0.540_302_305_868).abs() < 1e-8); // cos 1
 //! # Ok::<(), twofold_integrate::Failure>(())
 //! ```
 #![forbid(unsafe_code)]
-#![cfg_attr(test, allow(clippy::disallowed_methods))] // tests compare with tolerances, not with hashes
+// tests compare with tolerances, not with hashes
+#![cfg_attr(test, allow(clippy::disallowed_methods))]
 
 pub mod delay;
 pub mod dopri5;

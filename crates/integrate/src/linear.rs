@@ -1,7 +1,8 @@
 //! Linear systems of a fixed small size, for the implicit methods: LU with partial pivoting.
 //!
-//! `nalgebra`'s own `LU` type asks every caller to carry its dimension bounds (`DimMin`), up to the figure that only
-//! wants a `Stepper<N>`, and its elimination step finds the size out only when it runs.
+//! `nalgebra`'s own `LU` type asks every caller to carry its dimension bounds (`DimMin`), up to the
+//! figure that only wants a `Stepper<N>`, and its elimination step finds the size out only when it
+//! runs.
 
 use nalgebra::{ComplexField, SMatrix, SVector};
 
@@ -28,8 +29,9 @@ impl<T: ComplexField<RealField = f64> + Copy, const N: usize> Lu<T, N> {
                 }
             }
             exchanged[i] = pivot;
-            // By numbers that are known when this is compiled, so that the matrix stays in registers: a row that is looked up sends it through memory, where it
-            // is read before it is written.
+            // By numbers that are known when this is compiled, so that the matrix stays in
+            // registers: a row that is looked up sends it through memory, where it is read before
+            // it is written.
             for row in i + 1..N {
                 if row == pivot {
                     factors.swap_rows(i, row);
@@ -103,13 +105,15 @@ mod tests {
 
     proptest! {
         #[test]
-        fn solves_complex(entries in prop::collection::vec(-1.0..1.0_f64, 32), rhs in prop::collection::vec(-1.0..1.0_f64, 8)) {
+        fn solves_complex(entries in prop::collection::vec(-1.0..1.0_f64, 32),
+            rhs in prop::collection::vec(-1.0..1.0_f64, 8)) {
             let a = SMatrix::<Complex<f64>, 4, 4>::from_fn(|i, j| {
                 let k = 8 * i + 2 * j;
                 // Diagonally dominant enough to be well conditioned.
                 Complex::new(entries[k] + if i == j { 6.0 } else { 0.0 }, entries[k + 1])
             });
-            let b = SVector::<Complex<f64>, 4>::from_fn(|i, _| Complex::new(rhs[2 * i], rhs[2 * i + 1]));
+            let b = SVector::<Complex<f64>, 4>::from_fn(|i, _| Complex::new(rhs[2 * i],
+                rhs[2 * i + 1]));
             let x = Lu::new(a).unwrap().solve(b);
             prop_assert!((a * x - b).iter().all(|r| r.norm1() < 1e-13));
         }

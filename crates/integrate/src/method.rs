@@ -31,10 +31,11 @@ pub enum Method {
     Radau5,
     /// Taylor series that resolve the layer, in f64.
     Taylor,
-    /// The same in double-double arithmetic, about 32 digits: the reference. The equation's constants and the start are the decimal numbers that
-    /// they are written as: 0.1 is one tenth.
+    /// The same in double-double arithmetic, about 32 digits: the reference. The equation's
+    /// constants and the start are the decimal numbers that they are written as: 0.1 is one tenth.
     TaylorExtended,
-    /// Taylor series outside the layer and its own variable inside, for smoothed systems that are polynomials outside.
+    /// Taylor series outside the layer and its own variable inside, for smoothed systems that are
+    /// polynomials outside.
     Layered,
 }
 
@@ -48,8 +49,14 @@ pub trait WithStepper<const N: usize> {
 
 impl Method {
     /// Every method.
-    pub const ALL: [Method; 6] =
-        [Method::Lsoda, Method::Dopri5, Method::Radau5, Method::Taylor, Method::TaylorExtended, Method::Layered];
+    pub const ALL: [Method; 6] = [
+        Method::Lsoda,
+        Method::Dopri5,
+        Method::Radau5,
+        Method::Taylor,
+        Method::TaylorExtended,
+        Method::Layered,
+    ];
 
     /// The name on the command line, in files and in small print.
     pub fn name(self) -> &'static str {
@@ -64,19 +71,25 @@ impl Method {
     }
 
     /// Makes a stepper of this method and passes it to `user`.
-    pub fn with_stepper<U: WithStepper<N>, const N: usize>(self, tolerance: Tolerance, user: U) -> U::Answer {
+    pub fn with_stepper<U: WithStepper<N>, const N: usize>(
+        self,
+        tolerance: Tolerance,
+        user: U,
+    ) -> U::Answer {
         match self {
             Method::Lsoda => user.with(Guarded::new(Lsoda::new(tolerance), tolerance)),
             Method::Dopri5 => user.with(Guarded::new(Dopri5::new(tolerance), tolerance)),
             Method::Radau5 => user.with(Guarded::new(Radau5::new(tolerance), tolerance)),
             Method::Taylor => user.with(Taylor::new(tolerance)),
-            Method::TaylorExtended => user.with(Taylor::extended(tolerance).with_decimal_constants()),
+            Method::TaylorExtended => {
+                user.with(Taylor::extended(tolerance).with_decimal_constants())
+            }
             Method::Layered => user.with(Layered::new(tolerance)),
         }
     }
 
-    /// The same by the methods that equations of many states have; none for [`Method::TaylorExtended`] and [`Method::Layered`], which are compiled for
-    /// few.
+    /// The same by the methods that equations of many states have; none for
+    /// [`Method::TaylorExtended`] and [`Method::Layered`], which are compiled for few.
     pub fn with_common_stepper<U: WithStepper<N>, const N: usize>(
         self,
         tolerance: Tolerance,
@@ -92,15 +105,18 @@ impl Method {
     }
 }
 
-/// [`Method::TaylorExtended`] with numbers of `bits` bits (the next of [`PRECISIONS`], at most the last) and series of degree `order`, or of
-/// the one that the tolerance asks for.
+/// [`Method::TaylorExtended`] with numbers of `bits` bits (the next of [`PRECISIONS`], at most the
+/// last) and series of degree `order`, or of the one that the tolerance asks for.
 pub fn with_extended<U: WithStepper<N>, const N: usize>(
     bits: u16,
     order: Option<u16>,
     tolerance: Tolerance,
     user: U,
 ) -> U::Answer {
-    fn of_order<const N: usize, S: Precision>(stepper: Taylor<N, S>, order: Option<u16>) -> Taylor<N, S> {
+    fn of_order<const N: usize, S: Precision>(
+        stepper: Taylor<N, S>,
+        order: Option<u16>,
+    ) -> Taylor<N, S> {
         let stepper = stepper.with_decimal_constants();
         match order {
             Some(order) => stepper.with_order(usize::from(order)),
@@ -130,7 +146,8 @@ mod tests {
         }
     }
 
-    /// x' = x^2 from 0.7: x = 1/(1/0.7 - t). Not from 1: with such numbers f64 and extended arithmetic may agree to the last bit.
+    /// x' = x^2 from 0.7: x = 1/(1/0.7 - t). Not from 1: with such numbers f64 and extended
+    /// arithmetic may agree to the last bit.
     struct Growing;
     impl VectorField<1> for Growing {
         fn eval<S: Elementary>(&self, x: &SVector<S, 1>) -> SVector<S, 1> {
@@ -142,7 +159,15 @@ mod tests {
     impl WithStepper<1> for ToOneHalf {
         type Answer = (f64, Statistics);
         fn with<M: Stepper<1>>(self, mut stepper: M) -> Self::Answer {
-            let end = drive(&Growing, vector![0.7], &DriveOptions::to(0.9), &mut stepper, &mut Ignore, &()).unwrap();
+            let end = drive(
+                &Growing,
+                vector![0.7],
+                &DriveOptions::to(0.9),
+                &mut stepper,
+                &mut Ignore,
+                &(),
+            )
+            .unwrap();
             (end.x[0], end.statistics)
         }
     }
@@ -155,7 +180,10 @@ mod tests {
             assert!((x - 0.7 / (1.0 - 0.63)).abs() < 1e-8, "{x} {s:?}");
         }
         for (i, a) in found.iter().enumerate() {
-            assert!(found[..i].iter().all(|b| a.1 != b.1 || a.0 != b.0), "two names do the same work: {found:?}");
+            assert!(
+                found[..i].iter().all(|b| a.1 != b.1 || a.0 != b.0),
+                "two names do the same work: {found:?}"
+            );
         }
     }
 
@@ -164,7 +192,10 @@ mod tests {
         type Answer = (String, u64);
         fn with<M: Stepper<1>>(self, stepper: M) -> Self::Answer {
             let name = std::any::type_name::<M>();
-            (name.rsplit(['<', ':']).next().unwrap_or(name).to_owned(), stepper.statistics().highest_order)
+            (
+                name.rsplit(['<', ':']).next().unwrap_or(name).to_owned(),
+                stepper.statistics().highest_order,
+            )
         }
     }
 

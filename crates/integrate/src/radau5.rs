@@ -1,17 +1,20 @@
-//! Radau IIA of order 5: the implicit Runge-Kutta method of Hairer & Wanner, Solving ODEs II (2nd ed. 1996), secs IV.5
-//! and IV.8. L-stable, three stages, collocation. An independent witness for what the multistep methods find on the
-//! stiff systems.
+//! Radau IIA of order 5: the implicit Runge-Kutta method of Hairer & Wanner, Solving ODEs II (2nd
+//! ed. 1996), secs IV.5 and IV.8. L-stable, three stages, collocation. An independent witness for
+//! what the multistep methods find on the stiff systems.
 //!
-//! Its error estimate is of order 3, so the true error at a given tolerance is smaller than with a method that
-//! estimates the error of the solution it goes on with. Tolerances are taken literally; Hairer & Wanner's own program
-//! replaces rtol by 0.1 rtol^(2/3) to compensate.
+//! Its error estimate is of order 3, so the true error at a given tolerance is smaller than with a
+//! method that estimates the error of the solution it goes on with. Tolerances are taken literally;
+//! Hairer & Wanner's own program replaces rtol by 0.1 rtol^(2/3) to compensate.
 
 use nalgebra::{Complex, Matrix3, SMatrix, SVector, Vector3};
 
 use super::guard::Redoable;
 use super::linear::Lu;
 use super::starting_step::starting_step;
-use super::step::{Driven, DrivenStepper, Failure, Interpolant, Statistics, Steady, Step, Stepper, Tolerance, finite};
+use super::step::{
+    Driven, DrivenStepper, Failure, Interpolant, Statistics, Steady, Step, Stepper, Tolerance,
+    finite,
+};
 use twofold_num::elementary::{rough_pow, sqrt};
 use twofold_system::VectorField;
 
@@ -40,12 +43,14 @@ impl Tableau {
     fn new() -> Self {
         let r = sqrt(6.0);
         let c = [(4.0 - r) / 10.0, (4.0 + r) / 10.0, 1.0];
-        // Hairer & Wanner (1996), table IV.5.6, but for its last row: two are what an eigenvector takes.
+        // Hairer & Wanner (1996), table IV.5.6, but for its last row: two are what an eigenvector
+        // takes.
         let a = [
             [(88.0 - 7.0 * r) / 360.0, (296.0 - 169.0 * r) / 1800.0, (-2.0 + 3.0 * r) / 225.0],
             [(296.0 + 169.0 * r) / 1800.0, (88.0 + 7.0 * r) / 360.0, (-2.0 - 3.0 * r) / 225.0],
         ];
-        // det(z - A^-1): the denominator of the stability function, the (2, 3)-Pade approximation of exp.
+        // det(z - A^-1): the denominator of the stability function, the (2, 3)-Pade approximation
+        // of exp.
         let mut real = 3.6;
         for _ in 0..8 {
             let p = ((real - 9.0) * real + 36.0) * real - 60.0;
@@ -54,10 +59,13 @@ impl Tableau {
         let half = 0.5 * (9.0 - real);
         let complex = Complex::new(half, sqrt(60.0 / real - half * half));
 
-        // An eigenvector is orthogonal to the rows of A - 1/lambda: their cross product, scaled to end in 1.
+        // An eigenvector is orthogonal to the rows of A - 1/lambda: their cross product, scaled to
+        // end in 1.
         let eigenvector = |lambda: Complex<f64>| {
             let row = |i: usize| {
-                Vector3::from_fn(|j, _| Complex::new(a[i][j], 0.0) - if i == j { lambda.inv() } else { Complex::ZERO })
+                Vector3::from_fn(|j, _| {
+                    Complex::new(a[i][j], 0.0) - if i == j { lambda.inv() } else { Complex::ZERO }
+                })
             };
             let v = row(0).cross(&row(1));
             [v[0] / v[2], v[1] / v[2], Complex::new(1.0, 0.0)]
@@ -141,7 +149,13 @@ impl<const N: usize> Interpolant<N> for Collocation<N> {
         let [p1, p2, p3] = &self.p;
         // theta^k has the coefficients C(i, k)/C(4, k).
         let at = |a: f64, b: f64, c: f64| p1 * a + p2 * b + p3 * c;
-        Some([SVector::zeros(), at(0.25, 0.0, 0.0), at(0.5, 1.0 / 6.0, 0.0), at(0.75, 0.5, 0.25), at(1.0, 1.0, 1.0)])
+        Some([
+            SVector::zeros(),
+            at(0.25, 0.0, 0.0),
+            at(0.5, 1.0 / 6.0, 0.0),
+            at(0.75, 0.5, 0.25),
+            at(1.0, 1.0, 1.0),
+        ])
     }
     /// The polynomial's distance from its start, term by term.
     fn reach(&self, coordinate: usize) -> f64 {
@@ -173,7 +187,8 @@ pub struct Radau5<const N: usize> {
     renew_jacobian: bool,
     /// Kept factorisations, and the step they were made for.
     matrices: Option<(f64, Matrices<N>)>,
-    /// Step and error of the last accepted step, for the predictive controller; `None` at the start.
+    /// Step and error of the last accepted step, for the predictive controller; `None` at the
+    /// start.
     last: Option<(f64, f64)>,
     rejected_before: bool,
     /// theta/(1 - theta) of the last Newton iteration.
@@ -224,7 +239,8 @@ impl<const N: usize> Radau5<N> {
         let (t, weights) = (self.t, self.weights());
         let longest = self.max_step.min(self.t_end - t);
         let norm = |v: &SVector<f64, N>| norm(v, &weights);
-        let h = starting_step(&self.x, &self.derivative, &norm, 0.25, longest, &|y| field.eval(t, y));
+        let h =
+            starting_step(&self.x, &self.derivative, &norm, 0.25, longest, &|y| field.eval(t, y));
         self.statistics.evaluations += 1;
         h
     }
@@ -247,8 +263,14 @@ impl<const N: usize> Radau5<N> {
         Some(())
     }
 
-    /// Solves Z = h A F(x + Z) by simplified Newton iteration in the coordinates that split A^-1 (eq. IV.8.12-13).
-    fn solve<D: Driven<N> + ?Sized>(&mut self, field: &D, h: f64, weights: &SVector<f64, N>) -> Option<Solved<N>> {
+    /// Solves Z = h A F(x + Z) by simplified Newton iteration in the coordinates that split A^-1
+    /// (eq. IV.8.12-13).
+    fn solve<D: Driven<N> + ?Sized>(
+        &mut self,
+        field: &D,
+        h: f64,
+        weights: &SVector<f64, N>,
+    ) -> Option<Solved<N>> {
         self.factorise(h)?;
         let (_, matrices) = self.matrices.as_ref()?;
         let t = &self.tableau;
@@ -283,7 +305,9 @@ impl<const N: usize> Radau5<N> {
                 let stage = |s: usize| {
                     SVector::<f64, N>::from_fn(|i, _| {
                         t.v_real[s] * real[i]
-                            + 2.0 * (t.v_complex[s].re * complex[i].re - t.v_complex[s].im * complex[i].im)
+                            + 2.0
+                                * (t.v_complex[s].re * complex[i].re
+                                    - t.v_complex[s].im * complex[i].im)
                     })
                 };
                 [stage(0), stage(1), stage(2)]
@@ -347,7 +371,8 @@ impl<const N: usize> Radau5<N> {
             let Some(solved) = self.solve(field, h, &weights) else {
                 self.statistics.convergence_failures += 1;
                 failures += 1;
-                // An old Jacobian may be to blame: renew it at this step first, else the step is too long.
+                // An old Jacobian may be to blame: renew it at this step first, else the step is
+                // too long.
                 if self.jacobian_is_new {
                     self.h = h * 0.5;
                 } else {
@@ -363,7 +388,8 @@ impl<const N: usize> Radau5<N> {
             let mut e = matrices.real.solve(self.derivative + combined);
             let mut error = norm(&e, &weights);
             if error >= 1.0 && (self.last.is_none() || self.rejected_before) {
-                // Eq. (IV.8.20): at a start or after a rejection the estimate may be far too large for stiff components.
+                // Eq. (IV.8.20): at a start or after a rejection the estimate may be far too large
+                // for stiff components.
                 let f = field.eval(t0, &(x0 + e));
                 self.statistics.evaluations += 1;
                 e = matrices.real.solve(f + combined);
@@ -380,13 +406,15 @@ impl<const N: usize> Radau5<N> {
             }
             let error = error.max(1e-10);
             let most = control::MOST_ITERATIONS as f64;
-            let safety = control::SAFETY * (2.0 * most + 1.0) / (2.0 * most + solved.iterations as f64);
+            let safety =
+                control::SAFETY * (2.0 * most + 1.0) / (2.0 * most + solved.iterations as f64);
             let mut factor = safety / sqrt(sqrt(error));
             if error > 1.0 {
                 self.statistics.rejected += 1;
                 failures += 1;
                 self.rejected_before = true;
-                self.h = h * if self.last.is_none() { 0.1 } else { factor.clamp(control::SHRINK, 1.0) };
+                self.h =
+                    h * if self.last.is_none() { 0.1 } else { factor.clamp(control::SHRINK, 1.0) };
                 self.renew_jacobian = !self.jacobian_is_new;
                 continue;
             }
@@ -416,7 +444,8 @@ impl<const N: usize> Radau5<N> {
                 (h * factor).min(self.max_step)
             };
             let [first, second, third] = &self.tableau.polynomial;
-            let p = [combine(&solved.z, first), combine(&solved.z, second), combine(&solved.z, third)];
+            let p =
+                [combine(&solved.z, first), combine(&solved.z, second), combine(&solved.z, third)];
             self.t = t1;
             self.x = x1;
             self.derivative = derivative;
@@ -442,7 +471,10 @@ fn combine<const N: usize>(z: &[SVector<f64, N>; 3], row: &[f64; 3]) -> SVector<
     z[0] * row[0] + z[1] * row[1] + z[2] * row[2]
 }
 
-fn combine_complex<const N: usize>(z: &[SVector<f64, N>; 3], row: &[Complex<f64>; 3]) -> SVector<Complex<f64>, N> {
+fn combine_complex<const N: usize>(
+    z: &[SVector<f64, N>; 3],
+    row: &[Complex<f64>; 3],
+) -> SVector<Complex<f64>, N> {
     let re = combine(z, &row.map(|c| c.re));
     let im = combine(z, &row.map(|c| c.im));
     SVector::from_fn(|i, _| Complex::new(re[i], im[i]))
@@ -583,14 +615,16 @@ mod tests {
             radau.restart(&Clock, 0.0, [0.0].into(), t_end, 1.0).unwrap();
             radau.h = 1.0;
             let steps =
-                std::iter::from_fn(|| (radau.t < t_end).then(|| radau.step(&Clock).unwrap().t1)).collect::<Vec<_>>();
+                std::iter::from_fn(|| (radau.t < t_end).then(|| radau.step(&Clock).unwrap().t1))
+                    .collect::<Vec<_>>();
             assert_eq!(steps.last(), Some(&t_end));
             steps.len()
         };
         assert_eq!([2.9999, 3.0, 3.000_05, 3.0002].map(steps), [3, 3, 3, 4]);
     }
 
-    /// `n` equal steps over [0, t_end], the stages solved to a hundredth of `resolution`, no step control.
+    /// `n` equal steps over [0, t_end], the stages solved to a hundredth of `resolution`, no step
+    /// control.
     fn equal_steps<F: VectorField<N>, const N: usize>(
         field: &F,
         x: SVector<f64, N>,
@@ -637,7 +671,8 @@ mod tests {
         assert!(dense > 3.5, "{dense}");
     }
 
-    /// Stiff order: on Prothero & Robinson's problem with h lambda -> infinity, the stage order 3 rules (sec. IV.15).
+    /// Stiff order: on Prothero & Robinson's problem with h lambda -> infinity, the stage order 3
+    /// rules (sec. IV.15).
     #[test]
     fn keeps_its_stiff_order() {
         let error = |n| {
@@ -683,7 +718,8 @@ mod tests {
     #[test]
     fn stiff_decay_is_cheap() {
         let mut radau = Radau5::new(Tolerance { rtol: 1e-6, atol: 1e-6 });
-        let x = run(&mut radau, &ProtheroRobinson(1e8), SVector::from([2.0, 0.0]), 10.0, f64::INFINITY);
+        let x =
+            run(&mut radau, &ProtheroRobinson(1e8), SVector::from([2.0, 0.0]), 10.0, f64::INFINITY);
         assert!((x[0] - 10_f64.cos()).abs() < 1e-6);
         assert!(radau.statistics.steps < 200, "{:?}", radau.statistics);
     }
@@ -694,7 +730,8 @@ mod tests {
         let start = SVector::from([1.0, 0.0]);
         run(&mut used, &Circle, start, 3.0, 0.05);
         let again = run(&mut used, &Circle, start, 3.0, 0.05);
-        let fresh = run(&mut Radau5::new(Tolerance { rtol: 1e-5, atol: 1e-5 }), &Circle, start, 3.0, 0.05);
+        let fresh =
+            run(&mut Radau5::new(Tolerance { rtol: 1e-5, atol: 1e-5 }), &Circle, start, 3.0, 0.05);
         assert_eq!(again.map(f64::to_bits), fresh.map(f64::to_bits));
     }
 
@@ -708,9 +745,12 @@ mod tests {
         }
         let mut radau = Radau5::new(Tolerance { rtol: 1e-8, atol: 1e-8 });
         radau.restart(&Explosion, 0.0, SVector::from([1.0]), 2.0, f64::INFINITY).unwrap();
-        let failure = (0..100_000).find_map(|_| radau.step(&Explosion).err()).expect("the solution ends at t = 1");
-        let (Failure::StepUnderflow { t, .. } | Failure::NotFinite { t, .. } | Failure::NotConverged { t, .. }) =
-            failure
+        let failure = (0..100_000)
+            .find_map(|_| radau.step(&Explosion).err())
+            .expect("the solution ends at t = 1");
+        let (Failure::StepUnderflow { t, .. }
+        | Failure::NotFinite { t, .. }
+        | Failure::NotConverged { t, .. }) = failure
         else {
             panic!("{failure}")
         };

@@ -6,9 +6,11 @@ use super::step::Step;
 use twofold_num::elementary::cos;
 use twofold_num::{Dual, Interval};
 
-/// The zero of `f` in [a, b], f(a) and f(b) of opposite sign or one of them zero, to the last bits of the bracket.
+/// The zero of `f` in [a, b], f(a) and f(b) of opposite sign or one of them zero, to the last bits
+/// of the bracket.
 ///
-/// Brent (1973), ch. 4: inverse quadratic interpolation and secant steps, kept inside the bracket by bisection.
+/// Brent (1973), ch. 4: inverse quadratic interpolation and secant steps, kept inside the bracket
+/// by bisection.
 ///
 /// ```
 /// use twofold_integrate::roots::brent;
@@ -49,7 +51,10 @@ fn brent_of(f: &mut dyn FnMut(f64) -> f64, a: f64, b: f64, fa: f64, fb: f64) -> 
                 (2.0 * m * s, 1.0 - s)
             } else {
                 let (q, r) = (fa / fc, fb / fc);
-                (s * (2.0 * m * q * (q - r) - (b - a) * (r - 1.0)), (q - 1.0) * (r - 1.0) * (s - 1.0))
+                (
+                    s * (2.0 * m * q * (q - r) - (b - a) * (r - 1.0)),
+                    (q - 1.0) * (r - 1.0) * (s - 1.0),
+                )
             };
             if p > 0.0 {
                 q = -q;
@@ -80,14 +85,16 @@ pub struct Crossing {
     pub upward: bool,
 }
 
-/// Finds an orbit's crossings of a surface g = 0, step by step. The one rule of this program for what a crossing and
-/// its sense are:
+/// Finds an orbit's crossings of a surface g = 0, step by step. The one rule of this program for
+/// what a crossing and its sense are:
 ///
-/// - A crossing is where g, having last been of one sign, is of the other. Its sense is that of the signs.
-/// - So a zero is no side: an orbit that starts on the surface has not passed it, and one that touches it and turns back
-///   neither. A zero exactly at a step's end is decided by what follows, and if it is a crossing it is reported once, at fraction 0 of
-///   the next step.
-/// - A jump between two steps (a kick) to the other side is no crossing; the new side counts from there.
+/// - A crossing is where g, having last been of one sign, is of the other. Its sense is that of the
+///   signs.
+/// - So a zero is no side: an orbit that starts on the surface has not passed it, and one that
+///   touches it and turns back neither. A zero exactly at a step's end is decided by what follows,
+///   and if it is a crossing it is reported once, at fraction 0 of the next step.
+/// - A jump between two steps (a kick) to the other side is no crossing; the new side counts from
+///   there.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CrossingFinder {
     /// The sign last seen, or zero before any.
@@ -100,8 +107,9 @@ impl CrossingFinder {
         Self { side: if positive { 1.0 } else { -1.0 } }
     }
 
-    /// The crossings in `step`, in order, of a surface whose `g` need not be of a low degree in the state, such as sin(x). Between two of the places where `g`
-    /// is asked there is at most one zero of the polynomials that [`first_zero`] reasons about.
+    /// The crossings in `step`, in order, of a surface whose `g` need not be of a low degree in the
+    /// state, such as sin(x). Between two of the places where `g` is asked there is at most one
+    /// zero of the polynomials that [`first_zero`] reasons about.
     pub fn in_curved_step<const N: usize>(
         &mut self,
         step: &Step<'_, N>,
@@ -123,21 +131,31 @@ impl CrossingFinder {
     }
 
     /// The crossing between two neighbouring points, if there is one.
-    fn come_to(&mut self, point: (f64, f64), last: (f64, f64), value: &dyn Fn(f64) -> f64) -> Option<Crossing> {
+    fn come_to(
+        &mut self,
+        point: (f64, f64),
+        last: (f64, f64),
+        value: &dyn Fn(f64) -> f64,
+    ) -> Option<Crossing> {
         if point.1 == 0.0 {
             return None;
         }
         let before = std::mem::replace(&mut self.side, point.1.signum());
         (before != 0.0 && before != self.side).then(|| Crossing {
-            theta: if last.1 == 0.0 { last.0 } else { brent(value, last.0, point.0, last.1, point.1) },
+            theta: if last.1 == 0.0 {
+                last.0
+            } else {
+                brent(value, last.0, point.0, last.1, point.1)
+            },
             upward: self.side > 0.0,
         })
     }
 
     /// The crossings in `step`, in order. Nothing is allocated unless there is one.
     ///
-    /// `g` is sampled at two points more than the interpolant's degree; between samples that keep their sign, a smallest |g| in the
-    /// middle is followed to its minimum, so that two zeros between neighbouring samples are found as well.
+    /// `g` is sampled at two points more than the interpolant's degree; between samples that keep
+    /// their sign, a smallest |g| in the middle is followed to its minimum, so that two zeros
+    /// between neighbouring samples are found as well.
     pub fn in_step<const N: usize>(
         &mut self,
         step: &Step<'_, N>,
@@ -146,7 +164,8 @@ impl CrossingFinder {
         self.of(step.interpolant.degree(), &|theta| g(&step.at(theta)))
     }
 
-    /// [`CrossingFinder::in_step`] for a function of the fraction of the step, on an interpolant of this degree.
+    /// [`CrossingFinder::in_step`] for a function of the fraction of the step, on an interpolant of
+    /// this degree.
     fn of(&mut self, degree: usize, value: &dyn Fn(f64) -> f64) -> Vec<Crossing> {
         let n = degree + 2;
         let sample = |i: usize| {
@@ -213,8 +232,9 @@ impl CrossingFinder {
         found
     }
 
-    /// The crossings of the plane x\[coordinate\] = value, as [`CrossingFinder::in_step`] finds them, after one cheap test: most steps
-    /// stay so far from the plane that [`Interpolant::reach`](super::Interpolant::reach) proves that they do not meet it.
+    /// The crossings of the plane x\[coordinate\] = value, as [`CrossingFinder::in_step`] finds
+    /// them, after one cheap test: most steps stay so far from the plane that
+    /// [`Interpolant::reach`](super::Interpolant::reach) proves that they do not meet it.
     pub fn through_plane<const N: usize>(
         &mut self,
         step: &Step<'_, N>,
@@ -231,7 +251,9 @@ impl CrossingFinder {
                 self.side = h0.signum();
                 return Vec::new();
             }
-        } else if (h0 > 0.0 && h1 < 0.0 || h0 < 0.0 && h1 > 0.0) && step.interpolant.is_monotone(coordinate) {
+        } else if (h0 > 0.0 && h1 < 0.0 || h0 < 0.0 && h1 > 0.0)
+            && step.interpolant.is_monotone(coordinate)
+        {
             self.side = h1.signum();
             let theta = brent(|theta| step.coordinate(theta, coordinate) - value, 0.0, 1.0, h0, h1);
             return vec![Crossing { theta, upward: h1 > 0.0 }];
@@ -240,7 +262,8 @@ impl CrossingFinder {
     }
 }
 
-/// So near to an end, in parts of the distance to the next sample, it is seen whether a function falls from there.
+/// So near to an end, in parts of the distance to the next sample, it is seen whether a function
+/// falls from there.
 const BESIDE: f64 = 1e-6;
 
 /// Golden-section search for the smallest `sign * f` on [a, b]; stops early once it is negative.
@@ -270,7 +293,8 @@ fn smallest(f: &dyn Fn(f64) -> f64, mut a: f64, mut b: f64, sign: f64) -> (f64, 
 pub enum Start {
     /// Not zero there.
     Away,
-    /// Zero there with the given derivative with respect to the fraction of the step: this zero is not the one looked for.
+    /// Zero there with the given derivative with respect to the fraction of the step: this zero is
+    /// not the one looked for.
     Simple(f64),
     /// Zero there with zero derivative and the given half second derivative.
     Double(f64),
@@ -281,7 +305,8 @@ pub enum Start {
 pub enum Zero {
     /// The function changes sign at this fraction.
     Crossing(f64),
-    /// The function comes closer to zero than rounding can tell, at this fraction, and no change of sign is resolved.
+    /// The function comes closer to zero than rounding can tell, at this fraction, and no change of
+    /// sign is resolved.
     Touch(f64),
 }
 
@@ -294,20 +319,22 @@ impl Zero {
     }
 }
 
-/// Degree of the polynomials that [`first_zero`] reasons about: twice that of Dormand-Prince's interpolant, so that a
-/// switching function quadratic in the state is represented exactly.
+/// Degree of the polynomials that [`first_zero`] reasons about: twice that of Dormand-Prince's
+/// interpolant, so that a switching function quadratic in the state is represented exactly.
 const DEGREE: usize = 8;
 type Coefficients = [f64; DEGREE + 1];
 
 /// The first zero of `f` on (0, 1].
 ///
-/// With the zero at the start divided out, `f` is represented by the polynomial of degree 8 through its values at
-/// Chebyshev-Lobatto points, in Bernstein form. By the variation-diminishing property (Lane & Riesenfeld 1981; Mourrain,
-/// Rouillier & Roy 2005) coefficients of one sign prove that there is no zero, and one change of sign proves that there
-/// is exactly one; otherwise the interval is halved (de Casteljau), left half first. So for `f` a polynomial of degree
-/// 8 or less along the step - h linear or quadratic in the state on a dense output of degree 4 - no zero is missed, up
-/// to rounding, however close two of them are. For other `f` the polynomial is compared with `f` between its nodes, and
-/// the interval is halved until they agree to 1e-6 of the polynomial's size; then a pair of zeros may be missed only where
+/// With the zero at the start divided out, `f` is represented by the polynomial of degree 8 through
+/// its values at Chebyshev-Lobatto points, in Bernstein form. By the variation-diminishing property
+/// (Lane & Riesenfeld 1981; Mourrain, Rouillier & Roy 2005) coefficients of one sign prove that
+/// there is no zero, and one change of sign proves that there is exactly one; otherwise the
+/// interval is halved (de Casteljau), left half first. So for `f` a polynomial of degree 8 or less
+/// along the step - h linear or quadratic in the state on a dense output of degree 4 - no zero is
+/// missed, up to rounding, however close two of them are. For other `f` the polynomial is compared
+/// with `f` between its nodes, and the interval is halved until they agree to 1e-6 of the
+/// polynomial's size; then a pair of zeros may be missed only where
 /// |f| stays below that.
 pub fn first_zero(f: impl Fn(f64) -> f64, start: Start) -> Option<Zero> {
     let reduced = |s: f64| match start {
@@ -333,13 +360,15 @@ pub fn first_zero(f: impl Fn(f64) -> f64, start: Start) -> Option<Zero> {
 /// A number on a piece of a step with its derivative by the fraction of the step, both enclosed.
 pub type Enclosed = Dual<Interval, 1>;
 
-/// The first zero on (0, 1] of a function of the state along `step`, `f` at a fraction of the step and `enclosed` over a set of states. None is
-/// missed at which the function has structure that the interpolant in f64 can show, however close two of them are.
+/// The first zero on (0, 1] of a function of the state along `step`, `f` at a fraction of the step
+/// and `enclosed` over a set of states. None is missed at which the function has structure that the
+/// interpolant in f64 can show, however close two of them are.
 ///
-/// The dense output is enclosed on a piece of the step by its Bernstein coefficients, the function and its derivative along it by interval
-/// arithmetic; a piece is passed where the function is proved to have no zero, or to be monotone without change of sign, and halved
-/// otherwise (Moore 1966; Neumaier 1990, ch. 5; of the same kind is Park & Barton 1996). Where a zero is found, [`first_zero`] has the
-/// last word on its place if it finds the same one.
+/// The dense output is enclosed on a piece of the step by its Bernstein coefficients, the function
+/// and its derivative along it by interval arithmetic; a piece is passed where the function is
+/// proved to have no zero, or to be monotone without change of sign, and halved otherwise (Moore
+/// 1966; Neumaier 1990, ch. 5; of the same kind is Park & Barton 1996). Where a zero is found,
+/// [`first_zero`] has the last word on its place if it finds the same one.
 pub fn first_zero_along<const N: usize>(
     step: &Step<'_, N>,
     f: &dyn Fn(f64) -> f64,
@@ -353,13 +382,17 @@ pub fn first_zero_along<const N: usize>(
         Scan::Unknown => first_zero(f, start),
         Scan::Crossing(a, b) => match first_zero(f, start) {
             Some(Zero::Crossing(theta)) if a <= theta && theta <= b => Some(Zero::Crossing(theta)),
-            // An excursion to the other side that is no deeper than the rounding of the states is none.
-            Some(Zero::Touch(theta)) if (theta - b).abs() <= TOUCH && piece.touches(step.at(theta), enclosed) => {
+            // An excursion to the other side that is no deeper than the rounding of the states is
+            // none.
+            Some(Zero::Touch(theta))
+                if (theta - b).abs() <= TOUCH && piece.touches(step.at(theta), enclosed) =>
+            {
                 Some(Zero::Touch(theta))
             }
             _ => {
                 let (fa, fb) = (f(a), f(b));
-                // At a zero of the start, or within rounding of one, the left end has no sign of its own.
+                // At a zero of the start, or within rounding of one, the left end has no sign of
+                // its own.
                 let fa = if fa == 0.0 || (fa > 0.0) == (fb > 0.0) { -fb } else { fa };
                 Some(Zero::Crossing(if fb == 0.0 { b } else { brent(f, a, b, fa, fb) }))
             }
@@ -371,13 +404,15 @@ pub fn first_zero_along<const N: usize>(
     }
 }
 
-/// Two places of one touch, at which f differs from zero by rounding, are no farther apart: the root of the rounding.
+/// Two places of one touch, at which f differs from zero by rounding, are no farther apart: the
+/// root of the rounding.
 const TOUCH: f64 = 1e-6;
 /// Rounding of a state, relative to the largest of the step.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
 /// Pieces narrower than this are not halved: near the spacing of the fractions.
 const NARROWEST: f64 = 8.0 * f64::EPSILON;
-/// A zero of second order at the start is left with this fraction: before it the function is below the rounding of its values at 1.
+/// A zero of second order at the start is left with this fraction: before it the function is below
+/// the rounding of its values at 1.
 const AFTER_TANGENCY: f64 = 1.5e-8;
 /// Enclosures made for one step at most.
 const MOST_PIECES: usize = 50_000;
@@ -392,7 +427,8 @@ enum Scan {
     Unknown,
 }
 
-/// A piece of a step, as Bernstein coefficients of the state and of its derivative by the fraction of the step.
+/// A piece of a step, as Bernstein coefficients of the state and of its derivative by the fraction
+/// of the step.
 #[derive(Clone)]
 struct Piece<const N: usize> {
     a: f64,
@@ -407,14 +443,19 @@ impl<const N: usize> Piece<N> {
     fn whole(x0: SVector<f64, N>, c: [SVector<f64, N>; 5]) -> Self {
         let slope = std::array::from_fn(|i| (c[i + 1] - c[i]) * 4.0);
         let x = c.map(|c| x0 + c);
-        let largest = |c: &[SVector<f64, N>]| c.iter().fold(SVector::zeros(), |m: SVector<f64, N>, c| m.sup(&c.abs()));
+        let largest = |c: &[SVector<f64, N>]| {
+            c.iter().fold(SVector::zeros(), |m: SVector<f64, N>, c| m.sup(&c.abs()))
+        };
         let rounding = [largest(&x) * ROUNDING, largest(&slope) * (4.0 * f64::EPSILON)];
         Self { a: 0.0, b: 1.0, x, slope, rounding }
     }
 
     /// The two parts before and after `a + part (b - a)`, by de Casteljau's subdivision.
     fn split(&self, part: f64) -> [Self; 2] {
-        fn parts<const N: usize, const K: usize>(c: &[SVector<f64, N>; K], part: f64) -> [[SVector<f64, N>; K]; 2] {
+        fn parts<const N: usize, const K: usize>(
+            c: &[SVector<f64, N>; K],
+            part: f64,
+        ) -> [[SVector<f64, N>; K]; 2] {
             let (mut work, mut left, mut right) = (*c, *c, *c);
             for k in 0..K {
                 left[k] = work[0];
@@ -440,19 +481,27 @@ impl<const N: usize> Piece<N> {
     }
 
     /// Whether the function is zero at the state `x` of the step as far as its rounding lets tell.
-    fn touches(&self, x: SVector<f64, N>, enclosed: &dyn Fn(&SVector<Enclosed, N>) -> Enclosed) -> bool {
+    fn touches(
+        &self,
+        x: SVector<f64, N>,
+        enclosed: &dyn Fn(&SVector<Enclosed, N>) -> Enclosed,
+    ) -> bool {
         let [of_x, _] = &self.rounding;
-        enclosed(&SVector::from_fn(|i, _| Dual::constant(hull(&[x], i, of_x[i])))).value.contains(0.0)
+        enclosed(&SVector::from_fn(|i, _| Dual::constant(hull(&[x], i, of_x[i]))))
+            .value
+            .contains(0.0)
     }
 }
 
 /// The numbers between the i-th components, widened by `rounding`.
 fn hull<const N: usize>(c: &[SVector<f64, N>], i: usize, rounding: f64) -> Interval {
-    let (low, high) = c.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), c| (l.min(c[i]), h.max(c[i])));
+    let (low, high) =
+        c.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), c| (l.min(c[i]), h.max(c[i])));
     Interval::new(low - rounding, high + rounding).unwrap_or(Interval::ENTIRE)
 }
 
-/// The first zero from the left. Up to the piece that is looked at the function keeps the sign that it has behind its start.
+/// The first zero from the left. Up to the piece that is looked at the function keeps the sign that
+/// it has behind its start.
 fn scan<const N: usize>(
     whole: Piece<N>,
     f: &dyn Fn(f64) -> f64,
@@ -482,7 +531,11 @@ fn scan<const N: usize>(
         if !at.value.contains(0.0) {
             // What rounding lets end on the other side of zero begins there.
             if at.value.is_positive() != (sign > 0.0) {
-                return if a > 0.0 { Scan::Crossing((a - NARROWEST).max(0.0), a) } else { Scan::Unknown };
+                return if a > 0.0 {
+                    Scan::Crossing((a - NARROWEST).max(0.0), a)
+                } else {
+                    Scan::Unknown
+                };
             }
             continue;
         }
@@ -547,7 +600,8 @@ fn sign_changes(c: &Coefficients) -> usize {
     signs.clone().zip(signs.skip(1)).filter(|(x, y)| x != y).count()
 }
 
-/// The Bernstein coefficients of the polynomial that is `q` at the nodes, the largest of them, and whether it is `q` between the nodes, too.
+/// The Bernstein coefficients of the polynomial that is `q` at the nodes, the largest of them, and
+/// whether it is `q` between the nodes, too.
 fn polynomial(q: &dyn Fn(f64) -> f64, a: f64, b: f64) -> (Coefficients, f64, bool) {
     let basis = bernstein_basis();
     let at = |u: f64| q(if u >= 1.0 { b } else { a + (b - a) * u });
@@ -564,11 +618,19 @@ fn polynomial(q: &dyn Fn(f64) -> f64, a: f64, b: f64) -> (Coefficients, f64, boo
     (coefficients, size, sound)
 }
 
-fn isolate(q: &dyn Fn(f64) -> f64, c: &Coefficients, a: f64, b: f64, depth: usize, size: f64) -> Option<Zero> {
+fn isolate(
+    q: &dyn Fn(f64) -> f64,
+    c: &Coefficients,
+    a: f64,
+    b: f64,
+    depth: usize,
+    size: f64,
+) -> Option<Zero> {
     let changes = sign_changes(c);
     let rounding = 64.0 * f64::EPSILON * size;
     if changes == 0 {
-        // At the right end a zero is found here; one at the left end belongs to the interval before.
+        // At the right end a zero is found here; one at the left end belongs to the interval
+        // before.
         let end = c[DEGREE];
         return if c.iter().all(|v| *v == 0.0) || end.abs() > rounding {
             None
@@ -589,7 +651,8 @@ fn isolate(q: &dyn Fn(f64) -> f64, c: &Coefficients, a: f64, b: f64, depth: usiz
     }
     let (left, right) = halves(c);
     let middle = 0.5 * (a + b);
-    isolate(q, &left, a, middle, depth + 1, size).or_else(|| isolate(q, &right, middle, b, depth + 1, size))
+    isolate(q, &left, a, middle, depth + 1, size)
+        .or_else(|| isolate(q, &right, middle, b, depth + 1, size))
 }
 
 /// De Casteljau's subdivision at 1/2.
@@ -640,7 +703,10 @@ fn bernstein_basis() -> &'static Basis {
             }
         }
         let inverse = matrix.try_inverse().expect("interpolation at distinct nodes is unisolvent");
-        Basis { nodes, from_values: std::array::from_fn(|i| std::array::from_fn(|j| inverse[(i, j)])) }
+        Basis {
+            nodes,
+            from_values: std::array::from_fn(|i| std::array::from_fn(|j| inverse[(i, j)])),
+        }
     })
 }
 
@@ -689,19 +755,24 @@ mod tests {
         passages(c).iter().map(|p| p.theta).collect()
     }
 
-    /// Two crossings between the first two samples, or the last two, are found as those in the middle are.
+    /// Two crossings between the first two samples, or the last two, are found as those in the
+    /// middle are.
     #[test]
     fn a_dip_beside_an_end_is_found() {
         for c in [1e-3, 0.02, 0.1, 0.5, 0.97, 0.999] {
             for w in [1e-4, 1e-6] {
                 let found = zeros([c * c - w * w, -2.0 * c, 1.0, 0.0]);
-                assert!(found.len() == 2 && (found[0] - (c - w)).abs() < 1e-9, "{c} {w}: {found:?}");
+                assert!(
+                    found.len() == 2 && (found[0] - (c - w)).abs() < 1e-9,
+                    "{c} {w}: {found:?}"
+                );
             }
         }
         assert!(zeros([0.02 * 0.02 + 1e-9, -0.04, 1.0, 0.0]).is_empty());
     }
 
-    /// The senses of the crossings of the plane x = `value` in steps given by their cubics, one after the other.
+    /// The senses of the crossings of the plane x = `value` in steps given by their cubics, one
+    /// after the other.
     fn senses(value: f64, steps: &[[f64; 4]]) -> Vec<(usize, f64, bool)> {
         let [mut by_plane, mut by_surface, mut by_proof] = [CrossingFinder::default(); 3];
         let mut found = Vec::new();
@@ -711,7 +782,11 @@ mod tests {
             let passages = by_plane.through_plane(&step, 0, value);
             assert_eq!(passages, by_surface.in_step(&step, |x| x[0] - value));
             // Proofs spare work and change nothing.
-            let proved = by_proof.through_plane(&Step { interpolant: &Proving(Cubic(*c)), ..step }, 0, value);
+            let proved = by_proof.through_plane(
+                &Step { interpolant: &Proving(Cubic(*c)), ..step },
+                0,
+                value,
+            );
             assert!(proved.len() == passages.len(), "{proved:?} {passages:?}");
             assert_eq!(by_proof.side, by_surface.side);
             for (a, b) in proved.iter().zip(&passages) {
@@ -724,14 +799,21 @@ mod tests {
 
     #[test]
     fn the_sense_is_that_of_the_signs() {
-        // Two crossings in one step, down and up, through a plane that is not 0: (s - 1/4)(s - 3/4) + 7.
+        // Two crossings in one step, down and up, through a plane that is not 0: (s - 1/4)(s - 3/4)
+        // + 7.
         let found = senses(7.0, &[[7.1875, -1.0, 1.0, 0.0]]);
         assert_eq!(found.iter().map(|f| f.2).collect::<Vec<_>>(), [false, true], "{found:?}");
-        assert!((found[0].1 - 0.25).abs() < 1e-14 && (found[1].1 - 0.75).abs() < 1e-14, "{found:?}");
+        assert!(
+            (found[0].1 - 0.25).abs() < 1e-14 && (found[1].1 - 0.75).abs() < 1e-14,
+            "{found:?}"
+        );
         // The plane 0 is not met.
         assert_eq!(senses(0.0, &[[7.1875, -1.0, 1.0, 0.0]]), []);
         // Upwards and downwards through a plane below zero.
-        assert_eq!(senses(-2.0, &[[-2.5, 1.0, 0.0, 0.0], [-1.5, -1.0, 0.0, 0.0]]), [(0, 0.5, true), (1, 0.5, false)]);
+        assert_eq!(
+            senses(-2.0, &[[-2.5, 1.0, 0.0, 0.0], [-1.5, -1.0, 0.0, 0.0]]),
+            [(0, 0.5, true), (1, 0.5, false)]
+        );
     }
 
     #[test]
@@ -758,7 +840,10 @@ mod tests {
         let step = Step { t0: 0.0, t1: 1.0, x0: p.at(0.0), x1: p.at(1.0), interpolant: &p };
         assert_eq!(step.at(0.4)[0], 0.0);
         assert_eq!(CrossingFinder::default().in_step(&step, |x| x[0].abs()), []);
-        assert_eq!(CrossingFinder::default().in_step(&step, |x| x[0]), [Crossing { theta: 0.4, upward: true }]);
+        assert_eq!(
+            CrossingFinder::default().in_step(&step, |x| x[0]),
+            [Crossing { theta: 0.4, upward: true }]
+        );
     }
 
     #[test]
@@ -782,7 +867,8 @@ mod tests {
 
     #[test]
     fn finds_two_between_samples() {
-        // (s - 0.3)(s - 0.302) = s^2 - 0.602 s + 0.0906: both zeros lie between neighbouring samples.
+        // (s - 0.3)(s - 0.302) = s^2 - 0.602 s + 0.0906: both zeros lie between neighbouring
+        // samples.
         let found = zeros([0.0906, -0.602, 1.0, 0.0]);
         assert_eq!(found.len(), 2, "{found:?}");
         assert!((found[0] - 0.3).abs() < 1e-12 && (found[1] - 0.302).abs() < 1e-12, "{found:?}");
@@ -797,8 +883,10 @@ mod tests {
         for many in [1.0, 6.0, 40.0, 177.0] {
             let turn = std::f64::consts::PI / many;
             let found = CrossingFinder::default().in_curved_step(&step, |x| sin(many * x[0]));
-            let expected: Vec<f64> =
-                (1..100).map(|k| f64::from(k) * turn - 0.3).filter(|s| *s > 0.0 && *s <= 1.0).collect();
+            let expected: Vec<f64> = (1..100)
+                .map(|k| f64::from(k) * turn - 0.3)
+                .filter(|s| *s > 0.0 && *s <= 1.0)
+                .collect();
             assert_eq!(found.len(), expected.len(), "{many}: {found:?}");
             for (f, e) in found.iter().zip(&expected) {
                 let upward = sin(many * (e + 0.3) + 0.5) > 0.0;
@@ -806,9 +894,14 @@ mod tests {
             }
         }
         for gap in [1e-2, 1e-5, 1e-7] {
-            let pair = |x: &SVector<f64, 1>| (x[0] - 0.737) * (x[0] - 0.737 - gap) * (x[0] * x[0] + 1.0);
+            let pair =
+                |x: &SVector<f64, 1>| (x[0] - 0.737) * (x[0] - 0.737 - gap) * (x[0] * x[0] + 1.0);
             let found = CrossingFinder::starting(true).in_curved_step(&step, pair);
-            assert_eq!(found.iter().map(|f| f.upward).collect::<Vec<_>>(), [false, true], "{gap}: {found:?}");
+            assert_eq!(
+                found.iter().map(|f| f.upward).collect::<Vec<_>>(),
+                [false, true],
+                "{gap}: {found:?}"
+            );
             assert!((found[0].theta - 0.437).abs() < 1e-9, "{gap}: {found:?}");
         }
     }
@@ -819,7 +912,8 @@ mod tests {
         assert!((r - std::f64::consts::SQRT_2).abs() <= 4.5e-16);
     }
 
-    /// How often the function is asked, as it was when this was written: what no zero shows. No bracket begins at 0, and some go backwards.
+    /// How often the function is asked, as it was when this was written: what no zero shows. No
+    /// bracket begins at 0, and some go backwards.
     #[test]
     fn brent_asks_no_more_than_it_did() {
         type Case = (fn(f64) -> f64, f64, f64, f64, u32);
@@ -849,9 +943,13 @@ mod tests {
     fn smallest_is_the_smallest_and_below_zero_is_enough() {
         for (at, sign) in [(0.3, 1.0), (0.3, -1.0), (0.62, 1.0), (0.62, -1.0), (0.9, 1.0)] {
             let parabola = |least: f64| move |s: f64| sign * ((s - at) * (s - at) + least);
-            // Of a parabola nothing is known of where it is smallest beyond the square root of a rounding.
+            // Of a parabola nothing is known of where it is smallest beyond the square root of a
+            // rounding.
             let (s, v) = smallest(&parabola(0.25), 0.1, 1.0, sign);
-            assert!((s - at).abs() < 1e-6 && (v - sign * 0.25).abs() < 1e-12, "{at} {sign}: {s} {v}");
+            assert!(
+                (s - at).abs() < 1e-6 && (v - sign * 0.25).abs() < 1e-12,
+                "{at} {sign}: {s} {v}"
+            );
             // Below zero near the place only: that is found, and nothing smaller looked for.
             let (s, v) = smallest(&parabola(-1e-4), 0.1, 1.0, sign);
             assert!(v * sign < 0.0 && v == parabola(-1e-4)(s), "{at} {sign}: {s} {v}");

@@ -1,7 +1,7 @@
 //! Events at fixed times of a run: restarts and kicks.
 //!
-//! Noise and restarts are not kinds of system. They cut the time axis into segments; each segment is integrated as if
-//! it were a run of its own, which is what a loop around a solver does.
+//! Noise and restarts are not kinds of system. They cut the time axis into segments; each segment
+//! is integrated as if it were a run of its own, which is what a loop around a solver does.
 
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
@@ -46,7 +46,8 @@ pub enum KickLaw {
     Normal,
 }
 
-/// Kicks after every fixed interval. They act on the first three components: a hysteretic phi is not kicked.
+/// Kicks after every fixed interval. They act on the first three components: a hysteretic phi is
+/// not kicked.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Kick {
@@ -88,8 +89,13 @@ pub(super) struct Segment {
 }
 
 impl Schedule {
-    /// The segments that cover (t_start, t_end]. Times are multiples of the intervals, not running sums.
-    pub(super) fn segments(&self, t_start: f64, t_end: f64) -> impl Iterator<Item = Segment> + use<> {
+    /// The segments that cover (t_start, t_end]. Times are multiples of the intervals, not running
+    /// sums.
+    pub(super) fn segments(
+        &self,
+        t_start: f64,
+        t_end: f64,
+    ) -> impl Iterator<Item = Segment> + use<> {
         let restart = self.restart_every;
         let kick = self.kick.map(|k| k.every);
         let mut counts = (1_u64, 1_u64);
@@ -98,8 +104,9 @@ impl Schedule {
             if done {
                 return None;
             }
-            let time =
-                |interval: Option<f64>, count: u64| interval.map_or(f64::INFINITY, |d| t_start + count as f64 * d);
+            let time = |interval: Option<f64>, count: u64| {
+                interval.map_or(f64::INFINITY, |d| t_start + count as f64 * d)
+            };
             let (restart_at, kick_at) = (time(restart, counts.0), time(kick, counts.1));
             let end = restart_at.min(kick_at).min(t_end);
             // 0.3 * 1000 and 100 * 3 are one moment, whatever their last bits say.
@@ -128,7 +135,8 @@ pub struct Kicker {
 }
 
 impl Kicker {
-    /// The kicks that `kick` describes, from the first on, to the first `states` components of the state.
+    /// The kicks that `kick` describes, from the first on, to the first `states` components of the
+    /// state.
     pub fn new(kick: Kick, states: usize) -> Self {
         Self { kick, states, stream: RandomStream::new(kick.seed, kick.stream) }
     }
@@ -180,8 +188,9 @@ mod tests {
         assert_eq!(ends[4], 1.5);
     }
 
-    /// Every schedule of small whole numbers, in several units of time, against what the words say: a segment ends at each multiple of either
-    /// interval and at the end, a kick follows where a multiple of the kick's interval is and the run goes on.
+    /// Every schedule of small whole numbers, in several units of time, against what the words say:
+    /// a segment ends at each multiple of either interval and at the end, a kick follows where a
+    /// multiple of the kick's interval is and the run goes on.
     #[test]
     fn every_small_schedule_is_what_the_words_say() {
         let mut seen = 0;
@@ -203,14 +212,23 @@ mod tests {
                         let t_end = f64::from(length) * unit;
                         let is_multiple = |n: u32, of: u32| of > 0 && n.is_multiple_of(of);
                         let wanted: Vec<(u32, bool)> = (1..=length)
-                            .filter(|n| is_multiple(*n, restart) || is_multiple(*n, kick) || *n == length)
+                            .filter(|n| {
+                                is_multiple(*n, restart) || is_multiple(*n, kick) || *n == length
+                            })
                             .map(|n| (n, is_multiple(n, kick) && n < length))
                             .collect();
                         let found: Vec<Segment> = schedule.segments(0.0, t_end).collect();
-                        let what = format!("unit {unit}, restart {restart}, kick {kick}, length {length}: {found:?}");
+                        let what = format!(
+                            "unit {unit}, restart {restart}, kick {kick}, length {length}: \
+                                {found:?}"
+                        );
                         assert_eq!(found.len(), wanted.len(), "{what}");
                         for (segment, (n, kick)) in found.iter().zip(wanted) {
-                            assert!((segment.end - f64::from(n) * unit).abs() <= 1e-9 * segment.end.max(1.0), "{what}");
+                            assert!(
+                                (segment.end - f64::from(n) * unit).abs()
+                                    <= 1e-9 * segment.end.max(1.0),
+                                "{what}"
+                            );
                             assert_eq!(segment.kick, kick, "{what}");
                         }
                         assert_eq!(found.last().map(|s| s.end), Some(t_end), "{what}");
@@ -236,18 +254,27 @@ mod tests {
         let s = Schedule { restart_every: Some(100.0), kick: Some(kick) };
         let n = s.segments(0.0, 2e5).filter(|s| s.kick).count();
         assert_eq!(n, 666_666);
-        assert_eq!(Schedule { restart_every: Some(20.0), kick: None }.segments(0.0, 2e5).count(), 10_000);
+        assert_eq!(
+            Schedule { restart_every: Some(20.0), kick: None }.segments(0.0, 2e5).count(),
+            10_000
+        );
     }
 
     #[test]
     fn sphere_kicks_have_the_size() {
-        let mut k = Kicker::new(Kick { every: 0.3, size: 1e-3, law: KickLaw::Sphere, seed: 5, stream: 1 }, 3);
+        let mut k = Kicker::new(
+            Kick { every: 0.3, size: 1e-3, law: KickLaw::Sphere, seed: 5, stream: 1 },
+            3,
+        );
         for _ in 0..100 {
             let d = k.draw();
             assert!((d.iter().map(|c| c * c).sum::<f64>().sqrt() - 1e-3).abs() < 1e-17);
         }
         for states in [1, 2, 8] {
-            let mut k = Kicker::new(Kick { every: 0.3, size: 1e-3, law: KickLaw::Sphere, seed: 5, stream: 1 }, states);
+            let mut k = Kicker::new(
+                Kick { every: 0.3, size: 1e-3, law: KickLaw::Sphere, seed: 5, stream: 1 },
+                states,
+            );
             let mut mean = vec![0.0; states];
             for _ in 0..2000 {
                 let d = k.draw();
@@ -255,7 +282,10 @@ mod tests {
                 mean.iter_mut().zip(&d).for_each(|(m, d)| *m += d / 2000.0);
             }
             // No preferred direction: four standard errors of a component's mean.
-            assert!(mean.iter().all(|m| m.abs() < 4.0 * 1e-3 / (2000.0_f64 * states as f64).sqrt()), "{mean:?}");
+            assert!(
+                mean.iter().all(|m| m.abs() < 4.0 * 1e-3 / (2000.0_f64 * states as f64).sqrt()),
+                "{mean:?}"
+            );
         }
     }
 }

@@ -6,8 +6,9 @@ use twofold_num::elementary::rough_pow;
 
 /// Hairer, Norsett & Wanner (1993), sec. II.4, "Starting step size", for an autonomous equation.
 ///
-/// `x` and `derivative` are the state and f there, `norm` measures in units of the tolerance, `exponent` is one over the order
-/// of the error estimate plus one, no step is longer than `longest`, and `eval` is asked once for f elsewhere.
+/// `x` and `derivative` are the state and f there, `norm` measures in units of the tolerance,
+/// `exponent` is one over the order of the error estimate plus one, no step is longer than
+/// `longest`, and `eval` is asked once for f elsewhere.
 pub(super) fn starting_step<const N: usize>(
     x: &SVector<f64, N>,
     derivative: &SVector<f64, N>,
@@ -32,7 +33,8 @@ mod tests {
 
     use super::*;
 
-    /// The first step of x' = f(x) from `x` with tolerances of 1e-6, by hand from the book's recipe.
+    /// The first step of x' = f(x) from `x` with tolerances of 1e-6, by hand from the book's
+    /// recipe.
     fn first(x: f64, f: impl Fn(f64) -> f64, longest: f64) -> f64 {
         let norm = |v: &SVector<f64, 1>| v[0].abs() / (1e-6 + 1e-6 * x.abs());
         starting_step(&vector![x], &vector![f(x)], &norm, 0.2, longest, &|y| vector![f(y[0])])
@@ -53,7 +55,8 @@ mod tests {
         near(first(1.0, |_| 1e-12, 1.0), 1e-4);
         // At rest nothing is known.
         near(first(1.0, |_| 0.0, 1.0), 1e-6);
-        // Never more than a hundred times what a hundredth of the state's own time is, and that is at most the longest step.
+        // Never more than a hundred times what a hundredth of the state's own time is, and that is
+        // at most the longest step.
         near(first(1.0, |x| -x, 1e-5), 1e-3);
         // A derivative that is no number elsewhere.
         near(first(1.0, |x| if x == 1.0 { -1.0 } else { f64::NAN }, 1.0), 0.028_854);

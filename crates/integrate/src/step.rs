@@ -1,4 +1,5 @@
-//! The nouns every method shares: an accepted step with its interpolant, tolerances, statistics, failures.
+//! The nouns every method shares: an accepted step with its interpolant, tolerances, statistics,
+//! failures.
 
 use std::sync::Arc;
 
@@ -19,16 +20,18 @@ pub trait Interpolant<const N: usize> {
     }
     /// The degree of the interpolant as a polynomial in `theta`.
     fn degree(&self) -> usize;
-    /// A bound, up to rounding, on how far the coordinate leaves the range between its values at the step's two ends. Infinite where
-    /// no cheap one is known.
+    /// A bound, up to rounding, on how far the coordinate leaves the range between its values at
+    /// the step's two ends. Infinite where no cheap one is known.
     fn reach(&self, _coordinate: usize) -> f64 {
         f64::INFINITY
     }
-    /// The Bernstein coefficients, less the state at the start, of an interpolant that is a polynomial of degree 4 or less.
+    /// The Bernstein coefficients, less the state at the start, of an interpolant that is a
+    /// polynomial of degree 4 or less.
     fn bernstein(&self) -> Option<[SVector<f64, N>; 5]> {
         None
     }
-    /// A bound, up to rounding and the error of the step, on how far the coordinate leaves the chord between the step's two ends.
+    /// A bound, up to rounding and the error of the step, on how far the coordinate leaves the
+    /// chord between the step's two ends.
     fn bend(&self, coordinate: usize) -> f64 {
         self.reach(coordinate)
     }
@@ -54,7 +57,8 @@ pub struct Step<'a, const N: usize> {
 }
 
 impl<const N: usize> Step<'_, N> {
-    /// Where in the step the domain of an equation ends, and which of its operations has no value there.
+    /// Where in the step the domain of an equation ends, and which of its operations has no value
+    /// there.
     pub(crate) fn domain_end(&self, ends: &Ends) -> Option<(f64, String)> {
         ends.first(&|theta| self.at(theta).as_slice().to_vec(), &[0.0, 0.25, 0.5, 0.75, 1.0])
     }
@@ -63,9 +67,11 @@ impl<const N: usize> Step<'_, N> {
     pub(crate) fn stays_in_domain(&self, ends: Option<&Ends>) -> Result<(), Failure> {
         match ends.and_then(|ends| self.domain_end(ends)) {
             None => Ok(()),
-            Some((theta, what)) => {
-                Err(Failure::Undefined { t: self.time(theta), state: Failure::state(&self.at(theta)), what })
-            }
+            Some((theta, what)) => Err(Failure::Undefined {
+                t: self.time(theta),
+                state: Failure::state(&self.at(theta)),
+                what,
+            }),
         }
     }
 
@@ -114,8 +120,9 @@ pub struct Tolerance {
 
 /// A one-step-at-a-time method.
 pub trait Stepper<const N: usize> {
-    /// Starts afresh at (t, x) towards `t_end` with steps no longer than `max_step`. Everything learnt before (step size,
-    /// order, saved derivatives, factorised Jacobians) is forgotten; only [`Statistics`] go on counting.
+    /// Starts afresh at (t, x) towards `t_end` with steps no longer than `max_step`. Everything
+    /// learnt before (step size, order, saved derivatives, factorised Jacobians) is forgotten; only
+    /// [`Statistics`] go on counting.
     ///
     /// # Errors
     ///
@@ -129,7 +136,8 @@ pub trait Stepper<const N: usize> {
         max_step: f64,
     ) -> Result<(), Failure>;
 
-    /// [`Stepper::restart`] with the field of the last restart: what a method has found out about the equation itself still holds.
+    /// [`Stepper::restart`] with the field of the last restart: what a method has found out about
+    /// the equation itself still holds.
     ///
     /// # Errors
     ///
@@ -145,19 +153,21 @@ pub trait Stepper<const N: usize> {
         self.restart(field, t, x, t_end, max_step)
     }
 
-    /// Makes one accepted step. Never passes `t_end`; the step that reaches it has `t1 == t_end` exactly. Must not be
-    /// called again after that without [`Stepper::restart`].
+    /// Makes one accepted step. Never passes `t_end`; the step that reaches it has `t1 == t_end`
+    /// exactly. Must not be called again after that without [`Stepper::restart`].
     ///
     /// # Errors
     ///
-    /// [`Failure`]: the step shrank below rounding, an iteration did not converge, or the state is no longer finite. The stepper must be restarted before it is used again.
+    /// [`Failure`]: the step shrank below rounding, an iteration did not converge, or the state is
+    /// no longer finite. The stepper must be restarted before it is used again.
     fn step<F: VectorField<N>>(&mut self, field: &F) -> Result<Step<'_, N>, Failure>;
 
     /// What the method has done since it was made.
     fn statistics(&self) -> &Statistics;
 }
 
-/// A right-hand side that depends on time, x' = f(t, x); methods call it without knowing which it is, so that each is compiled once a dimension.
+/// A right-hand side that depends on time, x' = f(t, x); methods call it without knowing which it
+/// is, so that each is compiled once a dimension.
 pub(crate) trait Driven<const N: usize> {
     /// f(t, x).
     fn eval(&self, t: f64, x: &SVector<f64, N>) -> SVector<f64, N>;
@@ -179,7 +189,8 @@ impl<F: VectorField<N>, const N: usize> Driven<N> for Steady<'_, F> {
     }
 }
 
-/// A one-step method for right-hand sides that depend on time: [`Stepper::restart`] and [`Stepper::step`] for them.
+/// A one-step method for right-hand sides that depend on time: [`Stepper::restart`] and
+/// [`Stepper::step`] for them.
 pub(crate) trait DrivenStepper<const N: usize>: Stepper<N> {
     /// [`Stepper::restart`].
     fn restart_driven(
@@ -257,7 +268,8 @@ pub enum Flow {
     Stop,
 }
 
-/// Why a run ended. It is part of every summary, so that a run cut short is never taken for a whole one.
+/// Why a run ended. It is part of every summary, so that a run cut short is never taken for a whole
+/// one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StopReason {
@@ -274,12 +286,14 @@ pub enum StopReason {
     SetValued,
 }
 
-/// Why an integration could not go on. Each names the time and the state; the caller adds the run's name.
+/// Why an integration could not go on. Each names the time and the state; the caller adds the run's
+/// name.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Failure {
     /// The state or the right-hand side is infinite or not a number.
     #[error(
-        "the right-hand side or the state is no longer finite at t = {t}, state {state:?}: check the parameters and the start"
+        "the right-hand side or the state is no longer finite at t = {t}, state {state:?}: check \
+            the parameters and the start"
     )]
     NotFinite {
         /// Time of the last good state.
@@ -289,7 +303,8 @@ pub enum Failure {
     },
     /// The orbit came to a place where the equation has no value.
     #[error(
-        "the orbit comes to the end of the field's domain at t = {t}, state {state:?}: {what}; change the expression, or end the run before (--t-end)"
+        "the orbit comes to the end of the field's domain at t = {t}, state {state:?}: {what}; \
+            change the expression, or end the run before (--t-end)"
     )]
     Undefined {
         /// Time of the last good state.
@@ -300,7 +315,10 @@ pub enum Failure {
         what: String,
     },
     /// The solution ends in finite time, or beyond the range of numbers.
-    #[error("the solution grows without bound near t = {t}, state {state:?}: end the run before (--t-end)")]
+    #[error(
+        "the solution grows without bound near t = {t}, state {state:?}: end the run before \
+            (--t-end)"
+    )]
     Unbounded {
         /// When.
         t: f64,
@@ -309,7 +327,9 @@ pub enum Failure {
     },
     /// A method that needs smooth equations has come to a place where this one is not.
     #[error(
-        "the equation is not smooth at t = {t}, state {state:?}: {what}; a series cannot go on there: use --method dopri5, lsoda or radau5, or make the argument the switching function h"
+        "the equation is not smooth at t = {t}, state {state:?}: {what}; a series cannot go on \
+            there: use --method dopri5, lsoda or radau5, or make the argument the switching \
+            function h"
     )]
     NotSmooth {
         /// When.
@@ -321,7 +341,8 @@ pub enum Failure {
     },
     /// The step became too small to advance time.
     #[error(
-        "step size underflow ({h:e}) at t = {t}, state {state:?}: the tolerances ask for more than f64 can give here; loosen them (--rtol, --atol) or compare with another --method"
+        "step size underflow ({h:e}) at t = {t}, state {state:?}: the tolerances ask for more than \
+            f64 can give here; loosen them (--rtol, --atol) or compare with another --method"
     )]
     StepUnderflow {
         /// Time reached.
@@ -333,7 +354,9 @@ pub enum Failure {
     },
     /// The budget of steps is used up.
     #[error(
-        "{limit} steps were not enough: stopped at t = {t}, state {state:?}. If the last steps were tiny, the equation is stiff or not smooth there: compare with another --method; otherwise raise the limit of steps (--max-steps)"
+        "{limit} steps were not enough: stopped at t = {t}, state {state:?}. If the last steps \
+            were tiny, the equation is stiff or not smooth there: compare with another --method; \
+            otherwise raise the limit of steps (--max-steps)"
     )]
     TooManySteps {
         /// Time reached.
@@ -353,7 +376,8 @@ pub enum Failure {
     },
     /// An implicit method's nonlinear equations could not be solved even with tiny steps.
     #[error(
-        "the implicit equations did not converge at t = {t}, step {h:e}, state {state:?}: the right-hand side is too rough for this method; compare with another --method"
+        "the implicit equations did not converge at t = {t}, step {h:e}, state {state:?}: the \
+            right-hand side is too rough for this method; compare with another --method"
     )]
     NotConverged {
         /// Time reached.
@@ -366,7 +390,8 @@ pub enum Failure {
 }
 
 impl Failure {
-    /// The failure with its cause, as far as the equation on `tape` shows it: a place where it has no value, or a solution that grows without bound.
+    /// The failure with its cause, as far as the equation on `tape` shows it: a place where it has
+    /// no value, or a solution that grows without bound.
     pub fn diagnosed(self, tape: &Tape) -> Self {
         self.diagnosed_along(tape, None)
     }
@@ -376,14 +401,18 @@ impl Failure {
         let (t, state, far) = match &self {
             Self::NotFinite { t, state } => (*t, state.clone(), 1.0),
             // Steps were found too long for another reason, perhaps: only what is near is to blame.
-            Self::StepUnderflow { t, state, .. } | Self::NotConverged { t, state, .. } => (*t, state.clone(), 1e-3),
+            Self::StepUnderflow { t, state, .. } | Self::NotConverged { t, state, .. } => {
+                (*t, state.clone(), 1e-3)
+            }
             Self::NotSmooth { t, state, .. } => (*t, state.clone(), 1e-6),
             _ => return self,
         };
         if state.len() != tape.variables() || state.iter().any(|x| !x.is_finite()) {
             return self;
         }
-        if let (Some(what), false) = (undefined(tape, &state), matches!(self, Self::NotSmooth { .. })) {
+        if let (Some(what), false) =
+            (undefined(tape, &state), matches!(self, Self::NotSmooth { .. }))
+        {
             return Self::Undefined { t, state, what };
         }
         let field = |x: &[f64]| -> Vec<f64> {
@@ -391,7 +420,9 @@ impl Failure {
             tape.outputs().iter().map(|node| values[*node]).collect()
         };
         let derivative = velocity.map_or_else(|| field(&state), <[f64]>::to_vec);
-        let ahead = |time: f64| -> Vec<f64> { state.iter().zip(&derivative).map(|(x, f)| x + time * f).collect() };
+        let ahead = |time: f64| -> Vec<f64> {
+            state.iter().zip(&derivative).map(|(x, f)| x + time * f).collect()
+        };
         // The component that grows fastest, in its own size.
         let growth = |x: &[f64], f: &[f64]| {
             x.iter().zip(f).map(|(x, f)| if *x == 0.0 { 0.0 } else { f / x }).fold(0.0, f64::max)
@@ -403,7 +434,8 @@ impl Failure {
         let faster = growth(&soon, &field(&soon));
         let accelerates = faster.is_nan() || faster > 1.2 * rate;
         let unbounded = size > 1e100 || size > 1e3 && rate * scale > 1e3 && accelerates;
-        // Powers of 2 times the spacing of numbers. What grows without bound comes to the end of some domain, too, but later.
+        // Powers of 2 times the spacing of numbers. What grows without bound comes to the end of
+        // some domain, too, but later.
         let last = if unbounded { (GROWTHS / rate).min(far * scale) } else { far * scale };
         let next = |time: &f64| Some(2.0 * time).filter(|time| *time < 2.0 * last);
         let places: Vec<f64> = std::iter::successors(Some(1e-16 * scale), next).collect();
@@ -428,7 +460,8 @@ impl Failure {
     }
 }
 
-/// In so many times of its growth a solution that grows without bound beside the end of a domain comes there.
+/// In so many times of its growth a solution that grows without bound beside the end of a domain
+/// comes there.
 const GROWTHS: f64 = 20.0;
 /// Part of 1 + t in which a method may have stepped over the end of a domain.
 const BEHIND: f64 = 1e-12;
@@ -490,11 +523,24 @@ mod tests {
 
     #[test]
     fn a_step_has_its_own_ends() {
-        let step = Step { t0: 3.0, t1: 5.0, x0: vector![0.0, 0.0], x1: vector![1.0, -1.0], interpolant: &Wrong };
-        assert_eq!((step.length(), step.time(0.0), step.time(0.25), step.time(1.0)), (2.0, 3.0, 3.5, 5.0));
-        for (theta, want) in
-            [(-0.5, [0.0, 0.0]), (0.0, [0.0, 0.0]), (0.5, [0.375, -0.5]), (1.0, [1.0, -1.0]), (1.5, [1.0, -1.0])]
-        {
+        let step = Step {
+            t0: 3.0,
+            t1: 5.0,
+            x0: vector![0.0, 0.0],
+            x1: vector![1.0, -1.0],
+            interpolant: &Wrong,
+        };
+        assert_eq!(
+            (step.length(), step.time(0.0), step.time(0.25), step.time(1.0)),
+            (2.0, 3.0, 3.5, 5.0)
+        );
+        for (theta, want) in [
+            (-0.5, [0.0, 0.0]),
+            (0.0, [0.0, 0.0]),
+            (0.5, [0.375, -0.5]),
+            (1.0, [1.0, -1.0]),
+            (1.5, [1.0, -1.0]),
+        ] {
             assert_eq!(step.at(theta), SVector::from(want));
             assert_eq!([0, 1].map(|i| step.coordinate(theta, i)), want);
         }
@@ -504,7 +550,9 @@ mod tests {
         // An interpolant that says nothing of itself is not thought to be near, nor to be monotone.
         assert!(Wrong.reach(0) == f64::INFINITY && !Wrong.is_monotone(0));
         assert!(
-            finite(&vector![1.0, -2.0]) && !finite(&vector![1.0, f64::NAN]) && !finite(&vector![f64::INFINITY, 0.0])
+            finite(&vector![1.0, -2.0])
+                && !finite(&vector![1.0, f64::NAN])
+                && !finite(&vector![f64::INFINITY, 0.0])
         );
         assert_eq!(Failure::state(&vector![1.0, 2.0]), [1.0, 2.0]);
     }

@@ -1,24 +1,32 @@
 //! Taylor series of the solution, order and step size after Jorba & Zou (2005), layer-resolved.
 //!
-//! The series come from the equation itself ([`twofold_num::series`]), in `f64`, in [`DoubleDouble`] or in [`MultiFloat`]s.
+//! The series come from the equation itself ([`twofold_num::series`]), in `f64`, in
+//! [`DoubleDouble`] or in [`MultiFloat`]s.
 //!
-//! **Layers.** A smoothed switch, tanh(h/eps), is constant to working precision outside a layer |h/eps| < w. There all
-//! its derivatives vanish, so that a high-order method with long steps jumps across the layer and its own error
-//! estimate sees nothing (erf(h/eps) is constant sooner; it is treated alike). (Adaptive Taylor methods without a cure get even a first crossing wrong at
-//! every tolerance.) This one knows the arguments of every tanh in the equation, because it computes their series:
-//! outside a layer, a step ends before the argument has come nearer than the layer's edge, with certainty (a bound on
-//! the argument's speed over the step, not a sample). Inside, what the series of tanh leaves out has a bound, however small its last
-//! terms are (Cauchy's estimate, below), and a step is as long as keeps that below the tolerance, or as changes the argument by
+//! **Layers.** A smoothed switch, tanh(h/eps), is constant to working precision outside a layer
+//! |h/eps| < w. There all its derivatives vanish, so that a high-order method with long steps jumps
+//! across the layer and its own error estimate sees nothing (erf(h/eps) is constant sooner; it is
+//! treated alike). (Adaptive Taylor methods without a cure get even a first crossing wrong at every
+//! tolerance.) This one knows the arguments of every tanh in the equation, because it computes
+//! their series: outside a layer, a step ends before the argument has come nearer than the layer's
+//! edge, with certainty (a bound on the argument's speed over the step, not a sample). Inside, what
+//! the series of tanh leaves out has a bound, however small its last terms are (Cauchy's estimate,
+//! below), and a step is as long as keeps that below the tolerance, or as changes the argument by
 //! [`LAYER_STRIDE`], half of eps, where the series shows all that there is.
 //!
-//! **Kinks, jumps, ends of the domain.** The equation tells its signs, roots, logarithms and quotients too. A step ends just behind the first zero of a sign's argument, found
-//! with certainty on its series, as at an event, and the next begins with the other branch. Before a singular operation's argument (a quotient's divisor) is
-//! zero, also in the complex plane, a step has ended: so the method gets as near to a real zero as numbers allow, and says that it cannot go on. A step goes on
-//! where an exponential is, as a bound over the step shows, nothing beside the tolerance, or where its argument changes by so much that its series shows it.
+//! **Kinks, jumps, ends of the domain.** The equation tells its signs, roots, logarithms and
+//! quotients too. A step ends just behind the first zero of a sign's argument, found with certainty
+//! on its series, as at an event, and the next begins with the other branch. Before a singular
+//! operation's argument (a quotient's divisor) is zero, also in the complex plane, a step has
+//! ended: so the method gets as near to a real zero as numbers allow, and says that it cannot go
+//! on. A step goes on where an exponential is, as a bound over the step shows, nothing beside the
+//! tolerance, or where its argument changes by so much that its series shows it.
 //!
-//! **The bound.** Beyond w > 0, |tanh(w + c) - 1| = 2/|exp(2 w + 2 c) + 1| is at most M = 2/(exp(2 (w - r)) - 1) for complex |c| <= r < w. If the
-//! argument's terms allow it to move by r at most in a (complex) time R, the coefficient k of tanh's series is at most M/R^k, and what follows degree p at
-//! most M q^(p+1)/(1 - q) in a step q R (Cauchy's estimate; Ahlfors 1979, sec. 4.2.3). The edge is where tanh differs from 1 by the tolerance.
+//! **The bound.** Beyond w > 0, |tanh(w + c) - 1| = 2/|exp(2 w + 2 c) + 1| is at most M = 2/(exp(2
+//! (w - r)) - 1) for complex |c| <= r < w. If the argument's terms allow it to move by r at most in
+//! a (complex) time R, the coefficient k of tanh's series is at most M/R^k, and what follows degree
+//! p at most M q^(p+1)/(1 - q) in a step q R (Cauchy's estimate; Ahlfors 1979, sec. 4.2.3). The
+//! edge is where tanh differs from 1 by the tolerance.
 
 use std::sync::Arc;
 
@@ -39,15 +47,17 @@ pub const LAYER_STRIDE: f64 = 0.5;
 /// Jorba & Zou (2005), sec. 3: the step is shortened by exp(-0.7/(p - 1)) for safety.
 const SAFETY_EXPONENT: f64 = -0.7;
 
-/// A step is planned outside a layer only from this far beyond the edge, and then lands less than this far beyond: else
-/// the last bits of the landing would decide on which side the next step begins.
+/// A step is planned outside a layer only from this far beyond the edge, and then lands less than
+/// this far beyond: else the last bits of the landing would decide on which side the next step
+/// begins.
 const EDGE_MARGIN: f64 = 1.0;
 
-/// Evaluations of a tanh argument's series in search of the layer's edge; then the part of the step that is known to
-/// be free is taken.
+/// Evaluations of a tanh argument's series in search of the layer's edge; then the part of the step
+/// that is known to be free is taken.
 const EDGE_SEARCH: usize = 100;
 
-/// The order at which the work per unit of time is least for analytic solutions (Jorba & Zou 2005, sec. 3), with numbers of relative spacing `epsilon`.
+/// The order at which the work per unit of time is least for analytic solutions (Jorba & Zou 2005,
+/// sec. 3), with numbers of relative spacing `epsilon`.
 pub fn order_for(tolerance: Tolerance, epsilon: f64) -> u16 {
     let smallest = tolerance.rtol.min(tolerance.atol).clamp(epsilon / 16.0, 1e-2);
     (1.0 - 0.5 * ln(smallest)).ceil() as u16
@@ -59,7 +69,8 @@ pub trait Precision: Scalar + FromDecimal {
     const EPSILON: f64;
     /// tanh is exactly +-1 beyond this argument.
     const TANH_SATURATION: f64;
-    /// Whether series of the orders that this precision asks for have coefficients beyond the range of `f64`.
+    /// Whether series of the orders that this precision asks for have coefficients beyond the range
+    /// of `f64`.
     const BEYOND_F64: bool = false;
 
     /// log2 of the absolute value, to some digits; minus infinity for zero.
@@ -101,8 +112,8 @@ impl<const L: usize> Precision for MultiFloat<L> {
 
 /// The Taylor-series stepper in the arithmetic `S`.
 ///
-/// As a [`Stepper`] it takes and gives `f64` states; between restarts it keeps time and state in `S`, which
-/// [`Taylor::state`] and [`Taylor::at`] give in full.
+/// As a [`Stepper`] it takes and gives `f64` states; between restarts it keeps time and state in
+/// `S`, which [`Taylor::state`] and [`Taylor::at`] give in full.
 ///
 /// ```
 /// # use nalgebra::{SVector, vector};
@@ -175,7 +186,8 @@ impl<const N: usize> Interpolant<N> for Polynomial<N> {
 }
 
 impl<const N: usize> Taylor<N, f64> {
-    /// A stepper in `f64` arithmetic: the last two terms of every step's series stay below the tolerance.
+    /// A stepper in `f64` arithmetic: the last two terms of every step's series stay below the
+    /// tolerance.
     pub fn new(tolerance: Tolerance) -> Self {
         Self::with_tolerance(tolerance)
     }
@@ -189,7 +201,8 @@ impl<const N: usize> Taylor<N, DoubleDouble> {
 }
 
 impl<const N: usize, const L: usize> Taylor<N, MultiFloat<L>> {
-    /// A stepper in multi-precision arithmetic; tolerances down to [`MultiFloat::EPSILON`] make sense.
+    /// A stepper in multi-precision arithmetic; tolerances down to [`MultiFloat::EPSILON`] make
+    /// sense.
     pub fn multi(tolerance: Tolerance) -> Self {
         Self::with_tolerance(tolerance)
     }
@@ -206,7 +219,8 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
         self
     }
 
-    /// Reads the equation's constants, and a start at t = 0, as decimal numbers ([`Constants::Decimal`]), from the next restart on.
+    /// Reads the equation's constants, and a start at t = 0, as decimal numbers
+    /// ([`Constants::Decimal`]), from the next restart on.
     pub fn with_decimal_constants(mut self) -> Self {
         self.constants = Constants::Decimal;
         self
@@ -309,7 +323,8 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
         Ok(())
     }
 
-    /// A state in `f64` as it is meant: a start is given in decimal, like the constants; later states are what they are.
+    /// A state in `f64` as it is meant: a start is given in decimal, like the constants; later
+    /// states are what they are.
     fn exact(&self, t: f64, x: SVector<f64, N>) -> SVector<S, N> {
         x.map(|x| match self.constants {
             Constants::Decimal if t == 0.0 && x.is_finite() => S::from_decimal(&x.into()),
@@ -319,12 +334,14 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
 
     /// The last step's series at the time `s` after its start.
     fn sum(&self, s: S) -> SVector<S, N> {
-        SVector::from_fn(|i, _| self.solution.component(i).iter().rev().fold(S::zero(), |sum, c| sum * s + *c))
+        SVector::from_fn(|i, _| {
+            self.solution.component(i).iter().rev().fold(S::zero(), |sum, c| sum * s + *c)
+        })
     }
 
-    /// The step that the series allow: the terms of degree p - 1 and p stay below atol + rtol |x|, component by
-    /// component. With p as in [`Taylor::with_tolerance`] this is Jorba & Zou's step (2005, sec. 3), a factor e^2
-    /// inside the radius of convergence that these two terms suggest.
+    /// The step that the series allow: the terms of degree p - 1 and p stay below atol + rtol |x|,
+    /// component by component. With p as in [`Taylor::with_tolerance`] this is Jorba & Zou's step
+    /// (2005, sec. 3), a factor e^2 inside the radius of convergence that these two terms suggest.
     fn accurate_step(&self) -> f64 {
         if S::BEYOND_F64 {
             return self.accurate_step_beyond_f64();
@@ -369,7 +386,8 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
         h * exp(SAFETY_EXPONENT / (p - 1) as f64)
     }
 
-    /// [`Taylor::resolved_step`] with the series in fractions of `h`, whose coefficients are of ordinary size.
+    /// [`Taylor::resolved_step`] with the series in fractions of `h`, whose coefficients are of
+    /// ordinary size.
     fn resolved_step_beyond_f64(&self, mut h: f64) -> f64 {
         let mut series = Vec::with_capacity(self.order);
         for (kind, w) in self.solution.layer_arguments() {
@@ -397,7 +415,8 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
 }
 
 impl<const N: usize, S: Precision> Taylor<N, S> {
-    /// The longest step up to `h` before any singular operation's argument can be zero and in which no exponential hides.
+    /// The longest step up to `h` before any singular operation's argument can be zero and in which
+    /// no exponential hides.
     fn regular_step(&mut self, mut h: f64) -> f64 {
         for (kind, _, w) in self.solution.marks() {
             // The argument's own series may end sooner than the state's.
@@ -413,7 +432,9 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
             let fractions = self.layers.in_fractions(w, h, &mut self.argument);
             let part = match kind {
                 MarkKind::Sign | MarkKind::Curved => continue,
-                MarkKind::Singular => stride_time(fractions, DOMAIN_SHARE * fractions[0].abs(), 1.0),
+                MarkKind::Singular => {
+                    stride_time(fractions, DOMAIN_SHARE * fractions[0].abs(), 1.0)
+                }
                 MarkKind::Exp => self.layers.visible(fractions),
                 MarkKind::Power(n) => self.layers.visible_power(fractions, f64::from(n)),
             };
@@ -428,7 +449,10 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
     fn first_switch(&mut self, h: f64) -> Option<(S, Node)> {
         let mut first: Option<(S, Node)> = None;
         for (_, node, w) in self.solution.marks().filter(|(kind, _, _)| *kind == MarkKind::Sign) {
-            let Some(theta) = first_crossing(self.layers.in_fractions(w, h, &mut self.argument)) else { continue };
+            let Some(theta) = first_crossing(self.layers.in_fractions(w, h, &mut self.argument))
+            else {
+                continue;
+            };
             // To this precision, by Newton's method, unless it leaves the neighbourhood.
             let (length, start) = (S::from_f64(h), S::from_f64(h * theta));
             let mut s = start;
@@ -454,14 +478,17 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
         first
     }
 
-    /// The failure, or the singular operation that explains it, where the argument of one is next to zero.
+    /// The failure, or the singular operation that explains it, where the argument of one is next
+    /// to zero.
     fn stuck(&self, failure: Failure) -> Failure {
-        let (Failure::NotFinite { t, state } | Failure::StepUnderflow { t, state, .. }) = &failure else {
+        let (Failure::NotFinite { t, state } | Failure::StepUnderflow { t, state, .. }) = &failure
+        else {
             return failure;
         };
         let until = |w: &[S]| w[0].to_f64().abs() / w.get(1).map_or(0.0, |c| c.to_f64().abs());
         let near = |(kind, _, w): &(MarkKind, Node, &[S])| {
-            *kind == MarkKind::Singular && (w[0] == S::zero() || until(w) <= NEXT_TO * (1.0 + t.abs()))
+            *kind == MarkKind::Singular
+                && (w[0] == S::zero() || until(w) <= NEXT_TO * (1.0 + t.abs()))
         };
         let Some((_, node, w)) = self.solution.marks().find(near) else { return failure };
         let text = written(&self.tape, node);
@@ -482,7 +509,8 @@ const DOMAIN_SHARE: f64 = 0.9;
 /// So many steps in a row that only pass zeros of signs: the motion does not leave them.
 const MOST_LANDINGS: i32 = 14;
 
-/// The part of the unit interval in which the last two terms of the series `c` are `allowed` at most.
+/// The part of the unit interval in which the last two terms of the series `c` are `allowed` at
+/// most.
 fn resolved(c: &[f64], allowed: f64) -> f64 {
     let mut part = 1.0_f64;
     for (k, term) in c.iter().enumerate().skip(c.len().saturating_sub(2).max(1)) {
@@ -555,7 +583,12 @@ impl Layers {
     }
 
     /// A series in fractions of `h`, rounded: its coefficients are of ordinary size.
-    fn in_fractions<'a, S: Precision>(&self, w: &[S], h: f64, scratch: &'a mut Vec<f64>) -> &'a [f64] {
+    fn in_fractions<'a, S: Precision>(
+        &self,
+        w: &[S],
+        h: f64,
+        scratch: &'a mut Vec<f64>,
+    ) -> &'a [f64] {
         let (step, mut power) = (S::from_f64(h), S::one());
         scratch.clear();
         for c in w {
@@ -565,8 +598,8 @@ impl Layers {
         scratch
     }
 
-    /// The part of a step over which an exponential with the argument `w`, in fractions of the step, is nothing beside the tolerance, or changes
-    /// so little that its series shows it.
+    /// The part of a step over which an exponential with the argument `w`, in fractions of the
+    /// step, is nothing beside the tolerance, or changes so little that its series shows it.
     fn visible(&self, w: &[f64]) -> f64 {
         let shown = stride_time(w, 0.25 * self.terms, 1.0);
         let below = self.log_tolerance - EXP_MARGIN - w[0];
@@ -580,7 +613,8 @@ impl Layers {
         if shown < 1.0 && below > 0.0 { shown.max(stride_time(w, below, 1.0)) } else { shown }
     }
 
-    /// The longest step up to `h` over which the series of the transition function with the argument `w` can be trusted.
+    /// The longest step up to `h` over which the series of the transition function with the
+    /// argument `w` can be trusted.
     fn longest(&self, kind: LayerKind, w: &[f64], h: f64) -> f64 {
         let edge = match kind {
             LayerKind::Tanh => self.edge,
@@ -597,14 +631,16 @@ impl Layers {
         }
     }
 
-    /// The longest step up to `h` that Cauchy's estimate allows, the argument of tanh being `distance` away from 0 at its start.
+    /// The longest step up to `h` that Cauchy's estimate allows, the argument of tanh being
+    /// `distance` away from 0 at its start.
     fn estimated(&self, distance: f64, w: &[f64], h: f64) -> f64 {
         // Nearly the best radius r: exp(-2 r/(p + 1)) r is largest.
         let r = (0.5 * self.terms).min(distance - 0.5);
         if r <= LAYER_STRIDE {
             return 0.0;
         }
-        // M is below 2/(1 - 1/e) exp(-2 (distance - r)), and 1/(1 - q) at most 2: for smaller q there is room for the thousandth of r that the travel may be longer.
+        // M is below 2/(1 - 1/e) exp(-2 (distance - r)), and 1/(1 - q) at most 2: for smaller q
+        // there is room for the thousandth of r that the travel may be longer.
         let log = (self.log_tolerance - BOUND + 2.0 * (distance - r)) / self.terms;
         let q = exp(log).min(0.5);
         q * stride_time(w, r, h / q)
@@ -647,8 +683,9 @@ fn travel_and_speed(c: &[f64], s: f64) -> (f64, f64) {
     (travel, speed)
 }
 
-/// A time in [0, h] during which the polynomial `w`, which starts beyond `edge` + EDGE_MARGIN, certainly stays beyond
-/// `edge`; if less than `h`, it ends less than EDGE_MARGIN beyond (or the search was given up).
+/// A time in [0, h] during which the polynomial `w`, which starts beyond `edge` + EDGE_MARGIN,
+/// certainly stays beyond `edge`; if less than `h`, it ends less than EDGE_MARGIN beyond (or the
+/// search was given up).
 fn free_time(w: &[f64], edge: f64, h: f64) -> f64 {
     // The landing zone is the middle of the margin.
     let fastest = speed(w, h);
@@ -666,15 +703,16 @@ fn free_time(w: &[f64], edge: f64, h: f64) -> f64 {
     s
 }
 
-/// A time in [0, h] during which the polynomial `w` certainly moves by `stride` (and a thousandth) at most; not much shorter than need
-/// be.
+/// A time in [0, h] during which the polynomial `w` certainly moves by `stride` (and a thousandth)
+/// at most; not much shorter than need be.
 fn stride_time(w: &[f64], stride: f64, h: f64) -> f64 {
     // The first term alone often tells; no rounding makes the sum less.
     let fast = w[1].abs() * h > stride;
     if !fast && travel(w, h) <= stride {
         return h;
     }
-    // The travel is increasing and convex, so that Newton's method from the right converges from the right.
+    // The travel is increasing and convex, so that Newton's method from the right converges from
+    // the right.
     let first = stride / w[1].abs();
     // A branch, not a minimum: what follows then need not wait until h is known.
     let mut s = if first < h {
@@ -734,7 +772,8 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
     fn advance(&mut self) -> Result<Step<'_, N>, Failure> {
         let (t0, x0) = (self.t.to_f64(), self.x.map(S::to_f64));
         self.solution.expand(self.x.as_slice());
-        // One evaluation of the series costs about as much as one of the right-hand side per degree.
+        // One evaluation of the series costs about as much as one of the right-hand side per
+        // degree.
         self.statistics.evaluations += self.order as u64;
 
         let remaining = self.t_end - self.t;
@@ -747,15 +786,23 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
         let switch = self.first_switch(h);
         let mut last = switch.is_none() && h * 1.000_000_1 >= remaining.to_f64();
         if switch.is_none() && (h <= t0.abs() * f64::EPSILON || h < f64::MIN_POSITIVE) {
-            return Err(self.stuck(Failure::StepUnderflow { t: t0, h, state: Failure::state(&x0) }));
+            return Err(self.stuck(Failure::StepUnderflow {
+                t: t0,
+                h,
+                state: Failure::state(&x0),
+            }));
         }
         self.h = if last { remaining } else { S::from_f64(h) };
         if let Some((zero, node)) = switch {
-            // Just behind the zero: so far that the argument's rounding cannot undo it, the more the oftener it did.
+            // Just behind the zero: so far that the argument's rounding cannot undo it, the more
+            // the oftener it did.
             let beyond = S::EPSILON * (t0.abs() + h) * (1_u64 << (2 * self.landings + 2)) as f64;
             self.landings = if zero.to_f64() > 1e3 * beyond { 0 } else { self.landings + 1 };
             if self.landings > MOST_LANDINGS {
-                let what = format!("the motion does not leave the jump of {}", written_sign(&self.tape, node));
+                let what = format!(
+                    "the motion does not leave the jump of {}",
+                    written_sign(&self.tape, node)
+                );
                 return Err(Failure::NotSmooth { t: t0, state: Failure::state(&x0), what });
             }
             self.h = zero + S::from_f64(beyond);
@@ -780,10 +827,14 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
 
     /// The state after a step of length `h` from `x`, and what rounding has taken from it.
     ///
-    /// Summed with what the sums before have lost (Moller 1965; Hairer, Lubich & Wanner 2006, sec. VIII.5): an error is then small beside the step's
-    /// increment, not beside the state.
+    /// Summed with what the sums before have lost (Moller 1965; Hairer, Lubich & Wanner 2006, sec.
+    /// VIII.5): an error is then small beside the step's increment, not beside the state.
     #[inline]
-    fn landing(&self, from: SVector<S, N>, lost_before: SVector<S, N>) -> (SVector<S, N>, SVector<S, N>) {
+    fn landing(
+        &self,
+        from: SVector<S, N>,
+        lost_before: SVector<S, N>,
+    ) -> (SVector<S, N>, SVector<S, N>) {
         // All components at once: none waits for another.
         let series: [&[S]; N] = std::array::from_fn(|i| &self.solution.component(i)[..=self.order]);
         let mut increment = SVector::<S, N>::from_element(S::zero());
@@ -897,8 +948,11 @@ mod tests {
 
     #[test]
     fn the_papers_equation_is_compiled() {
-        let smoothed =
-            |transition| Smoothed { system: Caricature::with_reinjection(1e-1, 1e-4), transition, eps: 1e-3 };
+        let smoothed = |transition| Smoothed {
+            system: Caricature::with_reinjection(1e-1, 1e-4),
+            transition,
+            eps: 1e-3,
+        };
         assert!(is_compiled(&smoothed(Transition::Tanh)));
         assert!(!is_compiled(&smoothed(Transition::PerturbedTanh { sigma: 0.01 })));
     }
@@ -930,8 +984,9 @@ mod tests {
         assert_eq!(stride_time(&[5.0, 0.1], LAYER_STRIDE, 1.0), 1.0);
     }
 
-    /// What the series of tanh w leaves out at the end of the longest step that is trusted, w = distance - s + bend s^2 being the argument.
-    /// With it, the step, and whether it is longer than what is always allowed (where the error is the step control's business).
+    /// What the series of tanh w leaves out at the end of the longest step that is trusted, w =
+    /// distance - s + bend s^2 being the argument. With it, the step, and whether it is longer than
+    /// what is always allowed (where the error is the step control's business).
     fn left_out(distance: f64, bend: f64, tolerance: f64) -> (f64, f64, bool) {
         let tolerance = Tolerance { rtol: tolerance, atol: tolerance };
         let order = usize::from(order_for(tolerance, DoubleDouble::EPSILON));
@@ -940,11 +995,15 @@ mod tests {
         // x' = tanh w, w' = v, v' = 2 bend: the series of x is the integral of that of tanh w.
         let tape = Tape::record(3, |x| vec![x[1].tanh(), x[2], Recorded::from_f64(2.0 * bend)]);
         let mut solution = Solution::<DoubleDouble>::new(order + 1, &tape, Constants::Binary);
-        solution.expand(&[DoubleDouble::ZERO, DoubleDouble::from_f64(distance), DoubleDouble::from_f64(-1.0)]);
+        solution.expand(&[
+            DoubleDouble::ZERO,
+            DoubleDouble::from_f64(distance),
+            DoubleDouble::from_f64(-1.0),
+        ]);
         let x = solution.component(0);
-        let series = (0..=order)
-            .rev()
-            .fold(DoubleDouble::ZERO, |sum, k| sum * DoubleDouble::from_f64(h) + x[k + 1].scale((k + 1) as f64));
+        let series = (0..=order).rev().fold(DoubleDouble::ZERO, |sum, k| {
+            sum * DoubleDouble::from_f64(h) + x[k + 1].scale((k + 1) as f64)
+        });
         let exact = DoubleDouble::from_f64(distance) - DoubleDouble::from_f64(h)
             + DoubleDouble::from_f64(bend) * DoubleDouble::from_f64(h).squared();
         ((series - exact.tanh()).to_f64().abs(), h, h > stride_time(&w, LAYER_STRIDE, 1e3))
@@ -962,10 +1021,14 @@ mod tests {
                         !estimated || error <= tolerance,
                         "{distance}, {bend}, {tolerance:e}: {error:e} in a step of {h}"
                     );
-                    // Straight on, the layer is gone through in long steps: the estimate is worth its name.
+                    // Straight on, the layer is gone through in long steps: the estimate is worth
+                    // its name.
                     let near_the_edge = (0.8 * edge..edge + EDGE_MARGIN).contains(&distance);
                     let long = if near_the_edge { 2.0 * LAYER_STRIDE } else { 0.0 };
-                    assert!(bend != 0.0 || h > long, "{distance}, {tolerance:e}: a step of only {h}");
+                    assert!(
+                        bend != 0.0 || h > long,
+                        "{distance}, {tolerance:e}: a step of only {h}"
+                    );
                 }
                 distance += 0.37;
             }
@@ -975,7 +1038,8 @@ mod tests {
     #[test]
     fn the_order_is_jorba_and_zous() {
         let order = |size: f64| order_for(Tolerance { rtol: size, atol: 1.0 }, f64::EPSILON);
-        // 1 - ln(tolerance)/2, rounded up; not above what 1e-2 asks for nor below a sixteenth of the spacing of numbers.
+        // 1 - ln(tolerance)/2, rounded up; not above what 1e-2 asks for nor below a sixteenth of
+        // the spacing of numbers.
         assert_eq!([1.0, 1e-2, 1e-3, 1e-8, 1e-15].map(order), [4, 4, 5, 11, 19]);
         assert_eq!([1e-17, 1e-40, 0.0].map(order), [21, 21, 21]);
         assert_eq!(order_for(Tolerance { rtol: 1.0, atol: 1e-30 }, 1e-33), 36);
@@ -1004,14 +1068,20 @@ mod tests {
                 for part in [0.0, 0.25, 0.75, 1.0] {
                     let (t, x) = taylor.at(S::from_f64(part));
                     let want = t0 + (t1 - t0) * S::from_f64(part);
-                    assert!((t - want).to_f64().abs() < tolerance && (x[1] - want).to_f64().abs() < tolerance);
+                    assert!(
+                        (t - want).to_f64().abs() < tolerance
+                            && (x[1] - want).to_f64().abs() < tolerance
+                    );
                     // x = exp(t - 1/4), the exponential of this arithmetic.
                     assert!((x[0] - (want - S::from_f64(0.25)).exp()).to_f64().abs() < tolerance);
                 }
                 let gap = |a: SVector<S, 2>, b: SVector<S, 2>| {
                     (0..2).map(|i| (a[i] - b[i]).to_f64().abs()).fold(0.0, f64::max)
                 };
-                assert!(gap(taylor.at(S::zero()).1, x0) < tolerance && gap(taylor.at(S::one()).1, x1) < tolerance);
+                assert!(
+                    gap(taylor.at(S::zero()).1, x0) < tolerance
+                        && gap(taylor.at(S::one()).1, x1) < tolerance
+                );
             }
         }
         let tolerance = |size: f64| Tolerance { rtol: size, atol: size };

@@ -1,22 +1,28 @@
-//! Short runs by every method, bit for bit as they were when the tables of the paper's figures were computed: each step's ends, its
-//! interpolant, and what was counted. A change of any of these numbers is a change of the figures' hashes, found in a second instead of an hour.
+//! Short runs by every method, bit for bit as they were when the tables of the paper's figures were
+//! computed: each step's ends, its interpolant, and what was counted. A change of any of these
+//! numbers is a change of the figures' hashes, found in a second instead of an hour.
 //!
-//! Beside the frozen numbers each step is held against what an [`Interpolant`] promises, so that what is frozen makes sense.
+//! Beside the frozen numbers each step is held against what an [`Interpolant`] promises, so that
+//! what is frozen makes sense.
 
 use std::fmt::Write;
 use std::ops::ControlFlow;
 
 use nalgebra::{SVector, vector};
 
-use super::ensemble::{Common, EnsembleRun, InstructionSet, SectionPlane, Tolerances, ensemble_watched};
+use super::ensemble::{
+    Common, EnsembleRun, InstructionSet, SectionPlane, Tolerances, ensemble_watched,
+};
 use super::filippov::{
-    AllModes, ExitRule, FilippovObserver, FilippovOptions, FunnelGrid, Mode, ModeEvent, Side, SlidingFlow, SlidingLaw,
-    connect, funnel, history, run, run_two_surfaces,
+    AllModes, ExitRule, FilippovObserver, FilippovOptions, FunnelGrid, Mode, ModeEvent, Side,
+    SlidingFlow, SlidingLaw, connect, funnel, history, run, run_two_surfaces,
 };
 use super::roots::CrossingFinder;
 use super::*;
 use twofold_num::{Elementary, MultiFloat};
-use twofold_system::{Bound, Caricature, Hysteretic, Relaxation, Smoothed, System, Transition, VectorField};
+use twofold_system::{
+    Bound, Caricature, Hysteretic, Relaxation, Smoothed, System, Transition, VectorField,
+};
 
 /// A digest of numbers and words: 64-bit FNV-1a (Fowler, Noll & Vo).
 #[derive(Clone, Debug)]
@@ -54,10 +60,16 @@ struct Seen<const N: usize> {
 
 impl<const N: usize> Seen<N> {
     fn new() -> Self {
-        Self { digest: Digest::new(), steps: 0, passages: vec![CrossingFinder::default(); 2], passed: 0 }
+        Self {
+            digest: Digest::new(),
+            steps: 0,
+            passages: vec![CrossingFinder::default(); 2],
+            passed: 0,
+        }
     }
 
-    /// What a run came to, in one line: its last words, its steps, the crossings of a plane, the digest of everything.
+    /// What a run came to, in one line: its last words, its steps, the crossings of a plane, the
+    /// digest of everything.
     fn line<E: std::fmt::Debug>(mut self, name: &str, end: &E) -> String {
         write!(self.digest, "{end:?}").unwrap();
         format!("{name}: {} steps, {} passages, {:016x}", self.steps, self.passed, self.digest.0)
@@ -78,19 +90,31 @@ impl<const N: usize> Observer<N> for Seen<N> {
             let (grows, monotone) = (step.x1[i] > step.x0[i], step.interpolant.is_monotone(i));
             for theta in [0.0, 0.21875, 0.5, 0.8125, 1.0] {
                 let x = step.interpolant.at(theta)[i];
-                assert_eq!(x.to_bits(), step.interpolant.coordinate(theta, i).to_bits(), "{i} at {theta}");
+                assert_eq!(
+                    x.to_bits(),
+                    step.interpolant.coordinate(theta, i).to_bits(),
+                    "{i} at {theta}"
+                );
                 let slack = 1e-6 * (1.0 + x.abs());
-                assert!(x >= low - reach - slack && x <= high + reach + slack, "{x} {low} {high} {reach}");
+                assert!(
+                    x >= low - reach - slack && x <= high + reach + slack,
+                    "{x} {low} {high} {reach}"
+                );
                 let slack = 1e-12 * (1.0 + x.abs());
-                assert!(!monotone || if grows { x >= last - slack } else { x <= last + slack }, "{x} after {last}");
+                assert!(
+                    !monotone || if grows { x >= last - slack } else { x <= last + slack },
+                    "{x} after {last}"
+                );
                 last = x;
                 self.digest.numbers([&x]);
             }
             self.digest.numbers([&reach]);
             write!(self.digest, "{monotone}").unwrap();
         }
-        // A plane through the middle of the layer, and one far from it; and as any surface, to the same bits.
-        for (passages, (coordinate, value)) in self.passages.iter_mut().zip([(0, 1e-3), (1, 0.125)]) {
+        // A plane through the middle of the layer, and one far from it; and as any surface, to the
+        // same bits.
+        for (passages, (coordinate, value)) in self.passages.iter_mut().zip([(0, 1e-3), (1, 0.125)])
+        {
             let mut as_surface = *passages;
             let found = passages.through_plane(step, coordinate, value);
             if !step.interpolant.is_monotone(coordinate) {
@@ -99,7 +123,11 @@ impl<const N: usize> Observer<N> for Seen<N> {
             }
             for passage in found {
                 self.passed += 1;
-                self.digest.numbers([&passage.theta, &step.time(passage.theta), &f64::from(u8::from(passage.upward))]);
+                self.digest.numbers([
+                    &passage.theta,
+                    &step.time(passage.theta),
+                    &f64::from(u8::from(passage.upward)),
+                ]);
                 self.digest.numbers(&step.at(passage.theta));
             }
         }
@@ -164,9 +192,13 @@ enum Planar {
 impl VectorField<2> for Planar {
     fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
         match self {
-            Planar::VanDerPol(mu) => vector![x[1], ((S::one() - x[0] * x[0]) * x[1]).scale(*mu) - x[0]],
+            Planar::VanDerPol(mu) => {
+                vector![x[1], ((S::one() - x[0] * x[0]) * x[1]).scale(*mu) - x[0]]
+            }
             Planar::Explosion => vector![x[0] * x[0], S::one()],
-            Planar::Decay(lambda) => vector![(x[1].cos() - x[0]).scale(*lambda) - x[1].sin(), S::one()],
+            Planar::Decay(lambda) => {
+                vector![(x[1].cos() - x[0]).scale(*lambda) - x[1].sin(), S::one()]
+            }
             Planar::Root => vector![(S::one() - x[0] * x[0]).sqrt() * x[1], S::one()],
         }
     }
@@ -175,7 +207,8 @@ impl VectorField<2> for Planar {
 /// Fields in space.
 enum Spatial {
     Smooth(Smoothed<Caricature>),
-    /// Turns in x, y and drifts in z by a smoothed switch on the circle of radius 1: the layer's variable is no sum of states.
+    /// Turns in x, y and drifts in z by a smoothed switch on the circle of radius 1: the layer's
+    /// variable is no sum of states.
     Circle,
     /// Two layers, both sums of states.
     Crossed,
@@ -191,7 +224,8 @@ impl VectorField<3> for Spatial {
             Spatial::Smooth(field) => field.eval(x),
             Spatial::Circle => vector![x[1].scale(2.0) + c(0.1), -x[0], phi() - x[2].scale(0.5)],
             Spatial::Crossed => {
-                let (a, b) = ((x[0] / c(1e-2)).tanh(), ((x[1] + x[0].scale(0.25)) / c(1e-2)).tanh());
+                let (a, b) =
+                    ((x[0] / c(1e-2)).tanh(), ((x[1] + x[0].scale(0.25)) / c(1e-2)).tanh());
                 vector![-b + x[2].scale(0.1), a - x[2].scale(0.2), a * b - x[2].scale(0.5)]
             }
             Spatial::Quotient => vector![x[1], -x[0], phi() / (c(2.0) + x[2])],
@@ -204,12 +238,16 @@ fn caricature(transition: Transition, eps: f64) -> Spatial {
 }
 
 fn kicked(law: KickLaw, every: f64) -> Schedule {
-    Schedule { restart_every: Some(0.7), kick: Some(Kick { every, size: 1e-3, law, seed: 11, stream: 2 }) }
+    Schedule {
+        restart_every: Some(0.7),
+        kick: Some(Kick { every, size: 1e-3, law, seed: 11, stream: 2 }),
+    }
 }
 
 const START: [f64; 3] = [0.2, 0.0, -1.0];
 
-/// Every options for a method in space: `t_end` is the length of a plain run, `part` of those with a schedule.
+/// Every options for a method in space: `t_end` is the length of a plain run, `part` of those with
+/// a schedule.
 fn in_space<M: Stepper<3>>(method: impl Fn(f64) -> M, t_end: f64, part: f64) -> Vec<String> {
     let smooth = caricature(Transition::Tanh, 1e-3);
     let options = |schedule, step_cap, kicked_states| DriveOptions {
@@ -227,9 +265,24 @@ fn in_space<M: Stepper<3>>(method: impl Fn(f64) -> M, t_end: f64, part: f64) -> 
         go("coarse", &smooth, &DriveOptions::to(t_end), 1e-5),
         go("fine", &smooth, &DriveOptions::to(part), 1e-11),
         go("sphere", &smooth, &options(kicked(KickLaw::Sphere, 0.3), StepCap::None, 3), 1e-7),
-        go("cube", &smooth, &options(kicked(KickLaw::Cube, 0.35), StepCap::FractionOfSegment(0.1), 2), 1e-7),
-        go("normal", &smooth, &options(kicked(KickLaw::Normal, 0.9), StepCap::Absolute(0.05), 1), 1e-7),
-        go("circle of two", &smooth, &options(kicked(KickLaw::Sphere, 0.3), StepCap::None, 2), 1e-6),
+        go(
+            "cube",
+            &smooth,
+            &options(kicked(KickLaw::Cube, 0.35), StepCap::FractionOfSegment(0.1), 2),
+            1e-7,
+        ),
+        go(
+            "normal",
+            &smooth,
+            &options(kicked(KickLaw::Normal, 0.9), StepCap::Absolute(0.05), 1),
+            1e-7,
+        ),
+        go(
+            "circle of two",
+            &smooth,
+            &options(kicked(KickLaw::Sphere, 0.3), StepCap::None, 2),
+            1e-6,
+        ),
         go("cap", &smooth, &options(never, StepCap::Absolute(0.02), 3), 1e-6),
         go("few", &smooth, &DriveOptions { max_steps: 20, ..DriveOptions::to(t_end) }, 1e-8),
         go("wide layer", &caricature(Transition::Tanh, 0.1), &DriveOptions::to(part), 1e-8),
@@ -275,7 +328,13 @@ fn lsoda() {
     found.extend(in_the_plane(|size| Lsoda::new(tolerance(size)), 50.0));
     let relative = Tolerance { rtol: 0.0, atol: 1e-7 };
     let start = vector![2.0, 0.0];
-    found.push(follow("absolute", &Planar::VanDerPol(1.0), start, &DriveOptions::to(8.0), Lsoda::new(relative)));
+    found.push(follow(
+        "absolute",
+        &Planar::VanDerPol(1.0),
+        start,
+        &DriveOptions::to(8.0),
+        Lsoda::new(relative),
+    ));
     hold(&found, LSODA);
 }
 
@@ -303,7 +362,13 @@ fn taylor_extended() {
         ("cube", &smooth, &options),
         ("circle", &Spatial::Circle, &DriveOptions::to(0.4)),
     ] {
-        found.push(follow(name, field, START.into(), options, Taylor::<3, _>::extended(tolerance(1e-24))));
+        found.push(follow(
+            name,
+            field,
+            START.into(),
+            options,
+            Taylor::<3, _>::extended(tolerance(1e-24)),
+        ));
         found.push(follow(
             name,
             field,
@@ -318,7 +383,13 @@ fn taylor_extended() {
             options,
             Taylor::<3, _>::extended(tolerance(1e-16)).with_order(12),
         ));
-        found.push(follow(name, field, START.into(), options, Taylor::<3, MultiFloat<3>>::multi(tolerance(1e-30))));
+        found.push(follow(
+            name,
+            field,
+            START.into(),
+            options,
+            Taylor::<3, MultiFloat<3>>::multi(tolerance(1e-30)),
+        ));
     }
     hold(&found, TAYLOR_EXTENDED);
 }
@@ -337,20 +408,38 @@ fn layered() {
         ("grazing", [0.02, 0.2, 0.9]),
     ] {
         let field = caricature(Transition::Tanh, 1e-3);
-        found.push(follow(name, &field, start.into(), &DriveOptions::to(1.0), Layered::new(tolerance(1e-10))));
+        found.push(follow(
+            name,
+            &field,
+            start.into(),
+            &DriveOptions::to(1.0),
+            Layered::new(tolerance(1e-10)),
+        ));
         let field = Spatial::Smooth(Smoothed {
             system: Caricature::with_reinjection(1e-3, 1e-5),
             transition: Transition::Tanh,
             eps: 2e-2,
         });
-        found.push(follow(name, &field, start.into(), &DriveOptions::to(1.5), Layered::new(tolerance(1e-7))));
+        found.push(follow(
+            name,
+            &field,
+            start.into(),
+            &DriveOptions::to(1.5),
+            Layered::new(tolerance(1e-7)),
+        ));
     }
     for field in [
         Spatial::Quotient,
         caricature(Transition::Arctan, 1e-3),
         caricature(Transition::PerturbedTanh { sigma: 0.1 }, 1e-3),
     ] {
-        found.push(follow("refused", &field, START.into(), &DriveOptions::to(1.0), Layered::new(tolerance(1e-8))));
+        found.push(follow(
+            "refused",
+            &field,
+            START.into(),
+            &DriveOptions::to(1.0),
+            Layered::new(tolerance(1e-8)),
+        ));
     }
     hold(&found, LAYERED);
 }
@@ -359,9 +448,14 @@ fn layered() {
 fn hysteretic() {
     let mut found = Vec::new();
     for relaxation in [Relaxation::Literal, Relaxation::Single] {
-        let field =
-            Hysteretic { system: Caricature::with_reinjection(1e-1, 1e-4), eps: 5e-2, eps_prime: 5e-2, relaxation };
-        let options = DriveOptions { schedule: kicked(KickLaw::Sphere, 0.3), ..DriveOptions::to(3.0) };
+        let field = Hysteretic {
+            system: Caricature::with_reinjection(1e-1, 1e-4),
+            eps: 5e-2,
+            eps_prime: 5e-2,
+            relaxation,
+        };
+        let options =
+            DriveOptions { schedule: kicked(KickLaw::Sphere, 0.3), ..DriveOptions::to(3.0) };
         let start = vector![0.2, 0.0, -1.0, 1.0];
         for (name, options) in [("plain", &DriveOptions::to(3.0)), ("kicked", &options)] {
             found.push(follow(name, &field, start, options, Lsoda::new(tolerance(1e-8))));
@@ -384,27 +478,50 @@ fn filippov_in_space() {
     let mut found = Vec::new();
     let side = Side::Minus;
     let random = |seed| ExitRule::Random {
-        law: if seed == 1 { SlidingLaw::Exponential { mean: 0.5 } } else { SlidingLaw::Uniform { longest: 1.2 } },
+        law: if seed == 1 {
+            SlidingLaw::Exponential { mean: 0.5 }
+        } else {
+            SlidingLaw::Uniform { longest: 1.2 }
+        },
         plus_probability: 0.4,
         seed,
         stream: 3,
     };
     let usual = FilippovOptions { max_events: 60, max_steps: 2000, ..FilippovOptions::default() };
-    let mut go =
-        |name: &str, system: &Bound<3>, x0: [f64; 3], t_end: f64, rule: ExitRule, settings: &FilippovOptions| {
-            let mut seen = Seen::new();
-            let end = run(system, x0.into(), t_end, settings, rule, &mut seen);
-            found.push(seen.line(name, &end));
-        };
+    let mut go = |name: &str,
+                  system: &Bound<3>,
+                  x0: [f64; 3],
+                  t_end: f64,
+                  rule: ExitRule,
+                  settings: &FilippovOptions| {
+        let mut seen = Seen::new();
+        let end = run(system, x0.into(), t_end, settings, rule, &mut seen);
+        found.push(seen.line(name, &end));
+    };
     let caricature = builtin("caricature", &[("alpha", 0.1), ("beta", 1e-5)]);
     go("all", &caricature, START, 50.0, ExitRule::All, &usual);
     go("random", &caricature, START, 60.0, random(1), &usual);
     go("uniform", &caricature, START, 40.0, random(2), &FilippovOptions { max_step: 0.2, ..usual });
-    let coarse = FilippovOptions { tolerance: tolerance(1e-7), leg: 1e-3, departure: 1e-2, ..usual };
+    let coarse =
+        FilippovOptions { tolerance: tolerance(1e-7), leg: 1e-3, departure: 1e-2, ..usual };
     go("coarse", &caricature, START, 60.0, ExitRule::AfterArc { arc: 0.4, side }, &coarse);
     go("at once", &caricature, START, 60.0, ExitRule::AtOnce { side }, &coarse);
-    go("few events", &caricature, START, 60.0, random(1), &FilippovOptions { max_events: 4, ..usual });
-    go("few steps", &caricature, START, 60.0, random(1), &FilippovOptions { max_steps: 40, ..usual });
+    go(
+        "few events",
+        &caricature,
+        START,
+        60.0,
+        random(1),
+        &FilippovOptions { max_events: 4, ..usual },
+    );
+    go(
+        "few steps",
+        &caricature,
+        START,
+        60.0,
+        random(1),
+        &FilippovOptions { max_steps: 40, ..usual },
+    );
     go("on the surface", &caricature, [0.0, 0.3, 0.5], 3.0, random(1), &usual);
     go("in the repelling region", &caricature, [0.0, -0.3, -0.5], 3.0, random(1), &usual);
     go("no number", &caricature, [f64::NAN, 0.3, 0.5], 3.0, random(1), &usual);
@@ -413,9 +530,17 @@ fn filippov_in_space() {
     go("wheel", &wheel, [0.69267, 0.0, 0.0], 12.0, random(1), &usual);
     for (plus, minus) in [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)] {
         for (v, w) in [(0.0, 0.0), (-1.2, -1.4), (0.5, -0.7), (-0.3, 0.4)] {
-            let fold = builtin("two-fold", &[("plus_fold", plus), ("minus_fold", minus), ("v", v), ("w", w)]);
-            for start in [[0.0, 0.3, 0.8], [0.0, -0.7, 0.2], [0.0, -0.6, -0.25], [0.25, -0.5, -0.5], [-0.4, 0.5, -0.5]]
-            {
+            let fold = builtin(
+                "two-fold",
+                &[("plus_fold", plus), ("minus_fold", minus), ("v", v), ("w", w)],
+            );
+            for start in [
+                [0.0, 0.3, 0.8],
+                [0.0, -0.7, 0.2],
+                [0.0, -0.6, -0.25],
+                [0.25, -0.5, -0.5],
+                [-0.4, 0.5, -0.5],
+            ] {
                 for rule in [
                     ExitRule::AfterTime { time: 0.3, side },
                     ExitRule::AtOnce { side: Side::Plus },
@@ -424,9 +549,23 @@ fn filippov_in_space() {
                     go("fold", &fold, start, 1.5, rule, &coarse);
                 }
             }
-            go("at the two-fold", &fold, [0.0; 3], 2.0, ExitRule::AfterTime { time: 0.4, side }, &coarse);
+            go(
+                "at the two-fold",
+                &fold,
+                [0.0; 3],
+                2.0,
+                ExitRule::AfterTime { time: 0.4, side },
+                &coarse,
+            );
             go("at the two-fold", &fold, [0.0; 3], 2.0, ExitRule::AtOnce { side }, &coarse);
-            go("at the two-fold", &fold, [0.0; 3], 0.1, ExitRule::AfterArc { arc: 0.5, side }, &coarse);
+            go(
+                "at the two-fold",
+                &fold,
+                [0.0; 3],
+                0.1,
+                ExitRule::AfterArc { arc: 0.5, side },
+                &coarse,
+            );
         }
     }
     // Their lines are many: one digest for all, the names and numbers of steps for the first.
@@ -447,8 +586,17 @@ fn filippov_families() {
         format!("{name}: {:016x}", digest.0)
     };
     let mut found = Vec::new();
-    for (times, until_two_fold, start) in [(3, true, START), (1, false, START), (2, false, [0.0, -0.3, -0.5])] {
-        let grid = FunnelGrid { shortest: 0.05, longest: 1.5, times, horizon: 12.0, until_two_fold, per_step: 2 };
+    for (times, until_two_fold, start) in
+        [(3, true, START), (1, false, START), (2, false, [0.0, -0.3, -0.5])]
+    {
+        let grid = FunnelGrid {
+            shortest: 0.05,
+            longest: 1.5,
+            times,
+            horizon: 12.0,
+            until_two_fold,
+            per_step: 2,
+        };
         let family = funnel(&caricature, start.into(), 50.0, &settings, &grid).unwrap();
         found.push(line("funnel", &family));
         let other = FunnelGrid { shortest: 0.1, times: 2, horizon: 3.0, ..grid };
@@ -456,15 +604,34 @@ fn filippov_families() {
         assert_eq!(members.len(), 2);
         found.push(line("members", &members));
     }
-    let grid = FunnelGrid { shortest: 0.05, longest: 1.5, times: 2, horizon: 2.0, until_two_fold: true, per_step: 1 };
-    found.push(line("no funnel", &funnel(&caricature, START.into(), 3.0, &settings, &grid).unwrap_err()));
+    let grid = FunnelGrid {
+        shortest: 0.05,
+        longest: 1.5,
+        times: 2,
+        horizon: 2.0,
+        until_two_fold: true,
+        per_step: 1,
+    };
+    found.push(line(
+        "no funnel",
+        &funnel(&caricature, START.into(), 3.0, &settings, &grid).unwrap_err(),
+    ));
     for x in [[0.0, -0.3, -0.8], [1e-3, -0.9, -0.05], [0.0, 0.5, 0.5]] {
         found.push(line("history", &history(&caricature, x.into(), 40.0, &settings, 3)));
     }
-    found.push(line("short history", &history(&caricature, vector![0.0, -0.9, -0.9], 0.1, &settings, 3)));
+    found.push(line(
+        "short history",
+        &history(&caricature, vector![0.0, -0.9, -0.9], 0.1, &settings, 3),
+    ));
     for b in [[0.3, 0.4, -0.6], [-0.2, 0.5, 0.1], [0.0, 0.3, 0.3]] {
-        found.push(line("connect", &connect(&caricature, START.into(), b.into(), 100.0, &settings, 2)));
-        found.push(line("too short", &connect(&caricature, START.into(), b.into(), 5.0, &settings, 2)));
+        found.push(line(
+            "connect",
+            &connect(&caricature, START.into(), b.into(), 100.0, &settings, 2),
+        ));
+        found.push(line(
+            "too short",
+            &connect(&caricature, START.into(), b.into(), 5.0, &settings, 2),
+        ));
     }
     hold(&found, FILIPPOV_FAMILIES);
 }
@@ -474,7 +641,12 @@ fn filippov_in_the_plane() {
     let mut found = Vec::new();
     let stay = ExitRule::AfterTime { time: 1e9, side: Side::Plus };
     for (name, parameters, x0, t_end) in [
-        ("stick-slip", &[("belt", 0.3), ("friction", 1.0), ("weakening", 0.2)][..], [0.0, 0.0], 20.0),
+        (
+            "stick-slip",
+            &[("belt", 0.3), ("friction", 1.0), ("weakening", 0.2)][..],
+            [0.0, 0.0],
+            20.0,
+        ),
         ("relay-linear", &[("gain", 1.0)], [0.5, 0.0], 4.0),
         ("relay-parabolic", &[("gain", 2.0)], [2.0, 0.0], 10.0),
         ("relay-parabolic", &[("gain", 0.5)], [2.0, 0.0], 100.0),
@@ -494,8 +666,16 @@ fn filippov_in_the_plane() {
             found.push(seen.line(name, &end));
         }
     }
-    two_surfaces::<2, 3>("relay-square", [[2.0, 0.7], [-1.0, 3.0], [0.0, 2.0], [1.0, 0.0]], &mut found);
-    two_surfaces::<4, 5>("two-blocks", [[0.0, 0.1, 1.0, 0.5], [0.0; 4], [0.5, -0.3, 0.0, 0.2]], &mut found);
+    two_surfaces::<2, 3>(
+        "relay-square",
+        [[2.0, 0.7], [-1.0, 3.0], [0.0, 2.0], [1.0, 0.0]],
+        &mut found,
+    );
+    two_surfaces::<4, 5>(
+        "two-blocks",
+        [[0.0, 0.1, 1.0, 0.5], [0.0; 4], [0.5, -0.3, 0.0, 0.2]],
+        &mut found,
+    );
     hold(&found, FILIPPOV_IN_THE_PLANE);
 }
 
@@ -508,7 +688,8 @@ fn two_surfaces<const N: usize, const M: usize>(
 {
     let faces = System::builtin(name).unwrap().faces().unwrap();
     let faces = faces.map(|pair| pair.map(|face| face.bind::<N>().unwrap()));
-    let settings = FilippovOptions { max_events: 60, max_steps: 2000, ..FilippovOptions::default() };
+    let settings =
+        FilippovOptions { max_events: 60, max_steps: 2000, ..FilippovOptions::default() };
     for x0 in starts {
         for side in [Side::Plus, Side::Minus] {
             let mut seen = Seen::new();
@@ -521,10 +702,16 @@ fn two_surfaces<const N: usize, const M: usize>(
 
 #[test]
 fn a_layered_series_has_the_degree_that_the_tolerance_asks_for() {
-    let degree = |rtol: f64, atol: f64| Layered::<1>::new(Tolerance { rtol, atol }).statistics().highest_order;
-    // -0.85 ln of the smaller tolerance, which is taken between a sixteenth of the spacing of numbers and 1e-2; at least 8, at most what a series holds.
+    let degree = |rtol: f64, atol: f64| {
+        Layered::<1>::new(Tolerance { rtol, atol }).statistics().highest_order
+    };
+    // -0.85 ln of the smaller tolerance, which is taken between a sixteenth of the spacing of
+    // numbers and 1e-2; at least 8, at most what a series holds.
     assert_eq!([degree(1e-8, 1.0), degree(1.0, 1e-8), degree(1e-12, 1e-3)], [16, 16, 24]);
-    assert_eq!([degree(1.0, 1.0), degree(1e-2, 1e-2), degree(1e-17, 1.0), degree(0.0, 0.0)], [8, 8, 31, 31]);
+    assert_eq!(
+        [degree(1.0, 1.0), degree(1e-2, 1e-2), degree(1e-17, 1.0), degree(0.0, 0.0)],
+        [8, 8, 31, 31]
+    );
 }
 
 #[test]
@@ -532,7 +719,8 @@ fn a_crossing_that_a_cap_interrupts_is_the_same_crossing() {
     let field = caricature(Transition::Tanh, 1e-3);
     let end = |cap| {
         let options = DriveOptions { step_cap: cap, ..DriveOptions::to(3.0) };
-        drive(&field, START.into(), &options, &mut Layered::new(tolerance(1e-10)), &mut Ignore, &()).unwrap()
+        drive(&field, START.into(), &options, &mut Layered::new(tolerance(1e-10)), &mut Ignore, &())
+            .unwrap()
     };
     let (whole, pieces) = (end(StepCap::None), end(StepCap::Absolute(3e-4)));
     assert!(pieces.statistics.steps > 20 * whole.statistics.steps);
@@ -544,7 +732,8 @@ struct Clocked(std::sync::atomic::AtomicU64);
 
 impl VectorField<3> for Clocked {
     fn eval<S: Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
-        // Times are not negative, so that their bits have their order. Of a number with more to it (a derivative) the value is unknown here.
+        // Times are not negative, so that their bits have their order. Of a number with more to it
+        // (a derivative) the value is unknown here.
         if let Some(t) = (&x[2] as &dyn std::any::Any).downcast_ref::<f64>() {
             self.0.fetch_max(t.to_bits(), std::sync::atomic::Ordering::Relaxed);
         }
@@ -584,7 +773,8 @@ fn nothing_is_asked_beyond_the_end() {
     }
 }
 
-/// A lane tells of those steps, and of no others, of which a run alone cannot say by the interpolant's reach that they miss the plane.
+/// A lane tells of those steps, and of no others, of which a run alone cannot say by the
+/// interpolant's reach that they miss the plane.
 #[test]
 fn lanes_tell_of_the_steps_that_may_meet_the_plane() {
     struct Heard(Vec<u64>);
@@ -609,9 +799,16 @@ fn lanes_tell_of_the_steps_that_may_meet_the_plane() {
             Flow::Continue
         }
     }
-    let field = Smoothed { system: Caricature::with_reinjection(1e-1, 1e-4), transition: Transition::Tanh, eps: 1e-1 };
+    let field = Smoothed {
+        system: Caricature::with_reinjection(1e-1, 1e-4),
+        transition: Transition::Tanh,
+        eps: 1e-1,
+    };
     let runs: Vec<EnsembleRun<3>> = (0..8_u32)
-        .map(|k| EnsembleRun { start: vector![0.1 + 0.05 * f64::from(k), 0.02, -1.0], options: DriveOptions::to(12.0) })
+        .map(|k| EnsembleRun {
+            start: vector![0.1 + 0.05 * f64::from(k), 0.02, -1.0],
+            options: DriveOptions::to(12.0),
+        })
         .collect();
     let size = tolerance(1e-4);
     let (mut told, mut all) = (0, 0);
@@ -622,7 +819,15 @@ fn lanes_tell_of_the_steps_that_may_meet_the_plane() {
                 .iter()
                 .map(|run| {
                     let mut may = May(plane, Vec::new(), 0);
-                    let _ = drive(&field, run.start, &run.options, &mut Dopri5::new(size), &mut may, &()).unwrap();
+                    let _ = drive(
+                        &field,
+                        run.start,
+                        &run.options,
+                        &mut Dopri5::new(size),
+                        &mut may,
+                        &(),
+                    )
+                    .unwrap();
                     all += may.2;
                     may.1
                 })
@@ -630,7 +835,9 @@ fn lanes_tell_of_the_steps_that_may_meet_the_plane() {
             told += wanted.iter().map(Vec::len).sum::<usize>() as u64;
             for set in InstructionSet::ALL.into_iter().filter(|set| set.is_here()) {
                 let found =
-                    super::ensemble::ensemble_with(set, &field, &runs, size, Some(plane), |_| Heard(Vec::new()));
+                    super::ensemble::ensemble_with(set, &field, &runs, size, Some(plane), |_| {
+                        Heard(Vec::new())
+                    });
                 let found: Vec<_> = found.into_iter().map(|end| end.observer.0).collect();
                 assert_eq!(found, wanted, "{plane:?}, {set:?}");
             }
@@ -649,18 +856,32 @@ impl Monitor for Refuses {
 
 #[test]
 fn lanes_are_runs_alone() {
-    let field = Smoothed { system: Caricature::with_reinjection(1e-1, 1e-4), transition: Transition::Tanh, eps: 1e-2 };
+    let field = Smoothed {
+        system: Caricature::with_reinjection(1e-1, 1e-4),
+        transition: Transition::Tanh,
+        eps: 1e-2,
+    };
     let size = tolerance(1e-7);
     let mut runs: Vec<EnsembleRun<3>> = (0..13_u32)
         .map(|k| {
-            let kick = Kick { every: 0.4, size: 1e-3, law: KickLaw::Sphere, seed: 7, stream: k.into() };
-            let schedule = Schedule { restart_every: (k % 3 > 0).then_some(0.7), kick: (k % 5 == 4).then_some(kick) };
-            let step_cap = [StepCap::None, StepCap::Absolute(0.1), StepCap::FractionOfSegment(0.1)][k as usize % 3];
-            let options = DriveOptions { schedule, step_cap, ..DriveOptions::to(0.5 + f64::from(k * 7 % 11) / 5.0) };
+            let kick =
+                Kick { every: 0.4, size: 1e-3, law: KickLaw::Sphere, seed: 7, stream: k.into() };
+            let schedule = Schedule {
+                restart_every: (k % 3 > 0).then_some(0.7),
+                kick: (k % 5 == 4).then_some(kick),
+            };
+            let step_cap = [StepCap::None, StepCap::Absolute(0.1), StepCap::FractionOfSegment(0.1)]
+                [k as usize % 3];
+            let options = DriveOptions {
+                schedule,
+                step_cap,
+                ..DriveOptions::to(0.5 + f64::from(k * 7 % 11) / 5.0)
+            };
             EnsembleRun { start: vector![0.1 + 0.01 * f64::from(k), 0.0, -1.0], options }
         })
         .collect();
-    let sizes: Vec<Tolerance> = (0..runs.len()).map(|i| tolerance([1e-7, 1e-4, 1e-9][i % 3])).collect();
+    let sizes: Vec<Tolerance> =
+        (0..runs.len()).map(|i| tolerance([1e-7, 1e-4, 1e-9][i % 3])).collect();
     runs[5].start[0] = f64::NAN;
     runs[6].start[1] = 1e200;
     runs[7].options.t_end = 0.0;
@@ -678,9 +899,11 @@ fn lanes_are_runs_alone() {
         Ok(s) => format!("{:?} {:?} {:?}", s, s.t.to_bits(), s.x.map(f64::to_bits)),
         Err(failure) => format!("{failure:?}"),
     };
-    for (corner, plane) in
-        [(None, None), (Some(corner), None), (None, Some(SectionPlane { coordinate: 1, value: 0.125 }))]
-    {
+    for (corner, plane) in [
+        (None, None),
+        (Some(corner), None),
+        (None, Some(SectionPlane { coordinate: 1, value: 0.125 })),
+    ] {
         // Every third run has none of its own.
         let corners = corner.map(|corner| {
             (0..runs.len())
@@ -692,12 +915,20 @@ fn lanes_are_runs_alone() {
             .enumerate()
             .map(|(i, run)| {
                 let mut stops = Stops(corners.as_ref().map(|corners| corners[i]));
-                word(&drive(&field, run.start, &run.options, &mut Dopri5::new(sizes[i]), &mut stops, &()))
+                word(&drive(
+                    &field,
+                    run.start,
+                    &run.options,
+                    &mut Dopri5::new(sizes[i]),
+                    &mut stops,
+                    &(),
+                ))
             })
             .collect();
         if corner.is_some() {
             assert!(
-                alone.iter().any(|w| w.contains("Observer")) && alone.iter().any(|w| w.contains("EndTime")),
+                alone.iter().any(|w| w.contains("Observer"))
+                    && alone.iter().any(|w| w.contains("EndTime")),
                 "{alone:?}"
             );
         }
@@ -706,7 +937,10 @@ fn lanes_are_runs_alone() {
         impl Observer<3> for Met {
             fn step(&mut self, step: &Step<'_, 3>) -> Flow {
                 for passage in self.0.through_plane(step, 1, 0.125) {
-                    self.1.extend([step.time(passage.theta).to_bits(), step.at(passage.theta)[0].to_bits()]);
+                    self.1.extend([
+                        step.time(passage.theta).to_bits(),
+                        step.at(passage.theta)[0].to_bits(),
+                    ]);
                 }
                 Flow::Continue
             }
@@ -719,7 +953,8 @@ fn lanes_are_runs_alone() {
             .zip(&sizes)
             .map(|(run, size)| {
                 let mut met = Met(CrossingFinder::default(), Vec::new());
-                let _ = drive(&field, run.start, &run.options, &mut Dopri5::new(*size), &mut met, &());
+                let _ =
+                    drive(&field, run.start, &run.options, &mut Dopri5::new(*size), &mut met, &());
                 met.1
             })
             .collect();
@@ -732,7 +967,8 @@ fn lanes_are_runs_alone() {
             let count = times * runs.len();
             let cycled: Vec<_> = (0..count).map(|i| runs[often(i)]).collect();
             let sizes: Vec<_> = (0..count).map(|i| sizes[often(i)]).collect();
-            let corners: Option<Vec<_>> = corners.as_ref().map(|all| (0..count).map(|i| all[often(i)]).collect());
+            let corners: Option<Vec<_>> =
+                corners.as_ref().map(|all| (0..count).map(|i| all[often(i)]).collect());
             let common = Common {
                 tolerances: Tolerances::Each(&sizes),
                 plane,
@@ -748,7 +984,10 @@ fn lanes_are_runs_alone() {
                 common,
                 |_| Met(CrossingFinder::default(), Vec::new()),
                 &mut |i, end: ensemble::End<Met, 3>| {
-                    assert!(ends[i].replace((word(&end.summary), end.observer.1)).is_none(), "run {i} ended twice");
+                    assert!(
+                        ends[i].replace((word(&end.summary), end.observer.1)).is_none(),
+                        "run {i} ended twice"
+                    );
                 },
             );
             for (i, end) in ends.into_iter().enumerate() {
@@ -763,13 +1002,19 @@ fn lanes_are_runs_alone() {
             let mut finished = 0;
             let long = [EnsembleRun {
                 start: START.into(),
-                options: DriveOptions { step_cap: StepCap::Absolute(1e-3), ..DriveOptions::to(50.0) },
+                options: DriveOptions {
+                    step_cap: StepCap::Absolute(1e-3),
+                    ..DriveOptions::to(50.0)
+                },
             }];
             let tolerances = Tolerances::All(size);
-            let common = Common { tolerances, plane: None, corners: None, carried: None, monitor: &Refuses };
+            let common =
+                Common { tolerances, plane: None, corners: None, carried: None, monitor: &Refuses };
             ensemble_watched(set, &field, &long, common, |_| Ignore, &mut |_, _| finished += 1);
             assert_eq!(finished, 0, "{set:?}");
-            ensemble_watched(set, &field, &runs[..3], common, |_| Ignore, &mut |_, _| finished += 1);
+            ensemble_watched(set, &field, &runs[..3], common, |_| Ignore, &mut |_, _| {
+                finished += 1
+            });
             assert_eq!(finished, 3, "{set:?}");
         }
         assert!(met_alone.iter().filter(|m| !m.is_empty()).count() > 3, "{met_alone:?}");

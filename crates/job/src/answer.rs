@@ -22,7 +22,8 @@ pub struct Answer {
     pub stop: Stop,
 }
 
-/// Why a computation ended. An answer always says so: one that was cut short never looks like one that was finished.
+/// Why a computation ended. An answer always says so: one that was cut short never looks like one
+/// that was finished.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Stop {
@@ -68,7 +69,9 @@ impl From<StopReason> for Stop {
 
 /// A fact that is missing from an answer, or has another shape than was asked for.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the answer has no fact \"{name}\" of the kind wanted ({why}); was it made by another version?")]
+#[error(
+    "the answer has no fact \"{name}\" of the kind wanted ({why}); was it made by another version?"
+)]
 pub struct NoSuchFact {
     /// The fact's name.
     pub name: String,
@@ -84,7 +87,8 @@ impl Answer {
 
     /// Adds a fact.
     pub fn with_fact<T: Serialize>(mut self, name: &str, value: &T) -> Self {
-        let value = serde_json::to_value(value).expect("facts are plain data: string keys, no failing serialisers");
+        let value = serde_json::to_value(value)
+            .expect("facts are plain data: string keys, no failing serialisers");
         self.facts.insert(name.to_owned(), value);
         self
     }

@@ -82,7 +82,8 @@ impl Question for Classification {
         if plane(&self.run).is_err() {
             return Vec::new();
         }
-        let twins = if self.run.schedule.kick.is_some() { self.noise_free_twins() } else { Vec::new() };
+        let twins =
+            if self.run.schedule.kick.is_some() { self.noise_free_twins() } else { Vec::new() };
         std::iter::once(self.run.clone()).chain(twins).map(|run| Arc::new(Run(run)) as _).collect()
     }
 
@@ -105,7 +106,8 @@ struct Lengths {
     free_shift: f64,
     /// Their length.
     free_length: f64,
-    /// Time over which a hysteretic system's exponent is averaged: stiff for the explicit method of the variational equation.
+    /// Time over which a hysteretic system's exponent is averaged: stiff for the explicit method of
+    /// the variational equation.
     hysteretic_average: f64,
 }
 
@@ -136,39 +138,58 @@ impl Classification {
     fn evidence_of(&self, executor: &Executor<'_>, answer: &Answer) -> Result<Evidence, JobError> {
         match self.so_far(executor, answer)? {
             SoFar::Judged(evidence) => Ok(evidence),
-            SoFar::Awaits(exponent) => self.with_exponent(answer, exponent.found(&*executor.ask(&*exponent)?)),
+            SoFar::Awaits(exponent) => {
+                self.with_exponent(answer, exponent.found(&*executor.ask(&*exponent)?))
+            }
         }
     }
 
     /// What an answer to the run's question comes to without the orbit's exponent.
-    pub(super) fn so_far(&self, executor: &Executor<'_>, answer: &Answer) -> Result<SoFar<Evidence>, JobError> {
+    pub(super) fn so_far(
+        &self,
+        executor: &Executor<'_>,
+        answer: &Answer,
+    ) -> Result<SoFar<Evidence>, JobError> {
         let run = &self.run;
         let (end, section) = section(run, answer)?;
-        let random_exits = matches!(run.switch, SwitchSpec::Filippov { exit: ExitRule::Random { .. }, .. });
+        let random_exits =
+            matches!(run.switch, SwitchSpec::Filippov { exit: ExitRule::Random { .. }, .. });
         let mut question = self.asked();
         if question.kicked {
             // Without its chance a random exit rule is no rule: there is nothing to compare with.
-            let reference = if random_exits { None } else { Some(self.noise_free_structure(executor)?) };
+            let reference =
+                if random_exits { None } else { Some(self.noise_free_structure(executor)?) };
             question.reference = reference.as_deref();
             return Ok(SoFar::Judged(classify(&section, &question, &self.thresholds)));
         }
         let evidence = classify(&section, &question, &self.thresholds);
         Ok(match evidence.verdict {
-            Verdict::Chaotic { .. } | Verdict::Undecided { .. } => SoFar::Awaits(Box::new(self.exponent(end))),
+            Verdict::Chaotic { .. } | Verdict::Undecided { .. } => {
+                SoFar::Awaits(Box::new(self.exponent(end)))
+            }
             _ => SoFar::Judged(evidence),
         })
     }
 
     /// The evidence with the exponent that was awaited; `None` if that orbit could not be followed.
-    pub(super) fn with_exponent(&self, answer: &Answer, exponent: Option<Exponent>) -> Result<Evidence, JobError> {
+    pub(super) fn with_exponent(
+        &self,
+        answer: &Answer,
+        exponent: Option<Exponent>,
+    ) -> Result<Evidence, JobError> {
         let (_, section) = section(&self.run, answer)?;
-        Ok(classify(&section, &attractor::Question { lyapunov: exponent, ..self.asked() }, &self.thresholds))
+        Ok(classify(
+            &section,
+            &attractor::Question { lyapunov: exponent, ..self.asked() },
+            &self.thresholds,
+        ))
     }
 
     /// The question about the section's points.
     fn asked(&self) -> attractor::Question<'static> {
         let run = &self.run;
-        let random_exits = matches!(run.switch, SwitchSpec::Filippov { exit: ExitRule::Random { .. }, .. });
+        let random_exits =
+            matches!(run.switch, SwitchSpec::Filippov { exit: ExitRule::Random { .. }, .. });
         attractor::Question {
             t_end: Some(run.t_end),
             shown_from: 0.5 * run.t_end,
@@ -181,15 +202,20 @@ impl Classification {
     /// The largest exponent of the run's system, from its final state.
     fn exponent(&self, start: Vec<f64>) -> LargestExponent {
         let settings = match self.run.switch {
-            SwitchSpec::Hysteretic { .. } | SwitchSpec::Delayed { .. } | SwitchSpec::Relay { .. } => {
-                lyapunov::LyapunovOptions {
-                    duration: LENGTHS.hysteretic_average,
-                    ..lyapunov::LyapunovOptions::default()
-                }
-            }
+            SwitchSpec::Hysteretic { .. }
+            | SwitchSpec::Delayed { .. }
+            | SwitchSpec::Relay { .. } => lyapunov::LyapunovOptions {
+                duration: LENGTHS.hysteretic_average,
+                ..lyapunov::LyapunovOptions::default()
+            },
             _ => lyapunov::LyapunovOptions::default(),
         };
-        LargestExponent { system: self.run.system.clone(), switch: self.run.switch, start, settings }
+        LargestExponent {
+            system: self.run.system.clone(),
+            switch: self.run.switch,
+            start,
+            settings,
+        }
     }
 
     /// The same run without kicks, from starts a little apart.
@@ -206,8 +232,12 @@ impl Classification {
         (0..LENGTHS.free_runs).map(twin).collect()
     }
 
-    /// The structure that noise can wash out: sections of its twins without kicks, each as long as it was not captured by a closed orbit.
-    fn noise_free_structure(&self, executor: &Executor<'_>) -> Result<Vec<Vec<SectionPoint>>, JobError> {
+    /// The structure that noise can wash out: sections of its twins without kicks, each as long as
+    /// it was not captured by a closed orbit.
+    fn noise_free_structure(
+        &self,
+        executor: &Executor<'_>,
+    ) -> Result<Vec<Vec<SectionPoint>>, JobError> {
         let mut free = Vec::new();
         for twin in self.noise_free_twins() {
             let (_, section) = section(&twin, &*executor.ask(&Run(twin.clone()))?)?;
@@ -228,18 +258,21 @@ impl Classification {
     }
 }
 
-/// The states that span the plane in which a run is judged: the first two that its section leaves free, or the only one.
+/// The states that span the plane in which a run is judged: the first two that its section leaves
+/// free, or the only one.
 fn plane(run: &RunSpec) -> Result<(&str, Option<&str>), JobError> {
     let Observation::Section { coordinate, .. } = run.observe else {
         return Err(refused("a run is classified from its section; record one with --section"));
     };
     let names = run.system.coordinates();
     let states = names.len();
-    let mut free = names.into_iter().enumerate().filter(|(i, _)| *i != coordinate).map(|(_, name)| name);
+    let mut free =
+        names.into_iter().enumerate().filter(|(i, _)| *i != coordinate).map(|(_, name)| name);
     match free.next() {
         Some(first) if states > 1 => Ok((first, free.next())),
         _ => Err(refused(
-            "a run is classified from where it meets a section, so its system must have at least two states",
+            "a run is classified from where it meets a section, so its system must have at least \
+                two states",
         )),
     }
 }
@@ -248,20 +281,25 @@ fn refused(why: &str) -> JobError {
     JobError::Other(why.into())
 }
 
-/// Where the run ended, and its section as the classifier takes it: in the plane of the first two coordinates that the section leaves free. With
-/// two states there is one, and the other is 0; with more than three this is a projection, in which different points may fall together but
-/// one orbit's period, its approach and its irregularity are seen as they are.
+/// Where the run ended, and its section as the classifier takes it: in the plane of the first two
+/// coordinates that the section leaves free. With two states there is one, and the other is 0; with
+/// more than three this is a projection, in which different points may fall together but one
+/// orbit's period, its approach and its irregularity are seen as they are.
 fn section(run: &RunSpec, answer: &Answer) -> Result<(Vec<f64>, Vec<SectionPoint>), JobError> {
     let (first, second) = plane(run)?;
     if answer.stop == Stop::Interrupted {
         return Err(JobError::Interrupted);
     }
-    let table = answer.table("section").ok_or_else(|| refused("the run has no table of its section"))?;
+    let table =
+        answer.table("section").ok_or_else(|| refused("the run has no table of its section"))?;
     let (u, v) = (table.numbers(first), second.map(|name| table.numbers(name)));
     let directions = table.words("direction").map(|word| word == Direction::Up.word());
     let points = table.numbers("t").iter().zip(u).zip(directions).enumerate();
-    let points =
-        points.map(|(row, ((t, u), upward))| SectionPoint { t: *t, u: [*u, v.map_or(0.0, |v| v[row])], upward });
+    let points = points.map(|(row, ((t, u), upward))| SectionPoint {
+        t: *t,
+        u: [*u, v.map_or(0.0, |v| v[row])],
+        upward,
+    });
     Ok((answer.fact("state")?, points.collect()))
 }
 
@@ -272,7 +310,8 @@ mod tests {
     use twofold_integrate::{StepCap, Tolerance};
     use twofold_system::{Definition, System};
 
-    /// Van der Pol's oscillator at mu = 1, alone and with states that follow it or die out: period 6.663286859, amplitude 2.00861986 (Urabe 1958).
+    /// Van der Pol's oscillator at mu = 1, alone and with states that follow it or die out: period
+    /// 6.663286859, amplitude 2.00861986 (Urabe 1958).
     fn evidence(states: &str, field: &str, start: Vec<f64>) -> Result<Evidence, JobError> {
         let text = format!("states = {states}\nh = \"y\"\nplus = {field}\nminus = {field}\n");
         let run = RunSpec {
@@ -296,7 +335,8 @@ mod tests {
 
     #[test]
     fn a_limit_cycle_is_recognised_in_two_states_and_in_five() {
-        let two = evidence("[\"x\", \"y\"]", "[\"y\", \"(1 - x*x)*y - x\"]", vec![0.1, 0.0]).unwrap();
+        let two =
+            evidence("[\"x\", \"y\"]", "[\"y\", \"(1 - x*x)*y - x\"]", vec![0.1, 0.0]).unwrap();
         let five = evidence(
             "[\"a\", \"y\", \"x\", \"b\", \"c\"]",
             "[\"-a\", \"(1 - x*x)*y - x\", \"y\", \"x - b\", \"y - 2*c\"]",
@@ -310,7 +350,10 @@ mod tests {
             assert!((cycle.duration - 6.663_286_859).abs() < 1e-5, "{}", cycle.duration);
             // A picture shows the second half; y goes up through 0 where x is below 0.
             assert_eq!(evidence.shown_from, 1000.0);
-            assert!(cycle.points.len() == 2 && cycle.points.iter().all(|p| p.upward == (p.u[amplitude] < 0.0)));
+            assert!(
+                cycle.points.len() == 2
+                    && cycle.points.iter().all(|p| p.upward == (p.u[amplitude] < 0.0))
+            );
             let sizes = cycle.points.iter().map(|p| p.u[amplitude].abs());
             // In five states the plane is (a, x).
             sizes.for_each(|size| assert!((size - 2.008_619_86).abs() < 1e-6, "{size}"));
@@ -318,7 +361,12 @@ mod tests {
     }
 
     fn run(system: System, switch: SwitchSpec, t_end: f64) -> Classification {
-        Classification::of(crate::cases::run(system, switch, t_end, Observation::Section { coordinate: 0, value: 0.0 }))
+        Classification::of(crate::cases::run(
+            system,
+            switch,
+            t_end,
+            Observation::Section { coordinate: 0, value: 0.0 },
+        ))
     }
 
     /// A classification depends on its run; of a kicked run also on eight noise-free runs; of a run
@@ -327,10 +375,13 @@ mod tests {
     fn what_a_verdict_rests_on() {
         use twofold_integrate::{Kick, KickLaw};
         let mut question = run(crate::cases::decays(2), SwitchSpec::tanh(1e-2), 9.0);
-        let runs = |question: &Classification| -> Vec<Value> { question.rests_on().iter().map(|q| q.json()).collect() };
+        let runs = |question: &Classification| -> Vec<Value> {
+            question.rests_on().iter().map(|q| q.json()).collect()
+        };
         assert_eq!(runs(&question), [Run(question.run.clone()).json()]);
         let free = question.clone();
-        question.run.schedule.kick = Some(Kick { every: 0.3, size: 1e-3, law: KickLaw::Sphere, seed: 9, stream: 5 });
+        question.run.schedule.kick =
+            Some(Kick { every: 0.3, size: 1e-3, law: KickLaw::Sphere, seed: 9, stream: 5 });
         let kicked = runs(&question);
         assert_eq!((kicked.len(), &kicked[1]), (9, &Run(free.run).json()));
         question.run.observe = Observation::Path { chord: 1.0 };
@@ -338,7 +389,8 @@ mod tests {
         assert!(question.ask(&Executor::quiet()).unwrap_err().to_string().contains("--section"));
     }
 
-    /// Decays at the rates 1 and 2; a hysteretic one is followed for less long; x' = x^2 leaves and has none.
+    /// Decays at the rates 1 and 2; a hysteretic one is followed for less long; x' = x^2 leaves and
+    /// has none.
     #[test]
     fn exponents_are_those_of_the_runs_system() {
         use crate::cases;
@@ -351,14 +403,19 @@ mod tests {
                 exponent.found(&executor.ask(&exponent).unwrap())
             };
             let exponent = of(&question).unwrap();
-            assert!((exponent.value + 1.0).abs() < 1e-5 && exponent.duration == duration, "{exponent:?}");
+            assert!(
+                (exponent.value + 1.0).abs() < 1e-5 && exponent.duration == duration,
+                "{exponent:?}"
+            );
         }
-        let leaving = run(cases::smooth(&["x", "y"], "x + 1", &["x*x", "-y"]), SwitchSpec::tanh(1e-2), 0.5);
+        let leaving =
+            run(cases::smooth(&["x", "y"], "x + 1", &["x*x", "-y"]), SwitchSpec::tanh(1e-2), 0.5);
         let exponent = leaving.exponent(vec![1.0, 1.0]);
         assert_eq!(exponent.found(&executor.ask(&exponent).unwrap()), None);
     }
 
-    /// Three oscillators of frequencies that have no common measure, seen in the positions of two of them: nothing captures that.
+    /// Three oscillators of frequencies that have no common measure, seen in the positions of two
+    /// of them: nothing captures that.
     #[test]
     fn structures_are_what_was_not_captured_after_the_transient() {
         let system = crate::cases::smooth(
@@ -370,14 +427,18 @@ mod tests {
         question.run.method.tolerance = Tolerance { rtol: 1e-6, atol: 1e-6 };
         let twins = question.noise_free_twins();
         let shifts: Vec<f64> = twins.iter().map(|twin| twin.start[0] - 1.0).collect();
-        assert!(shifts.iter().enumerate().all(|(k, s)| (s - 1e-9 * k as f64).abs() < 1e-15), "{shifts:?}");
+        assert!(
+            shifts.iter().enumerate().all(|(k, s)| (s - 1e-9 * k as f64).abs() < 1e-15),
+            "{shifts:?}"
+        );
         let free = question.noise_free_structure(&Executor::quiet()).unwrap();
         assert_eq!(free.len(), 8);
         // Two passages a turn.
         let wanted = 6500.0 / std::f64::consts::PI;
         for loose in free {
             assert!(
-                loose.iter().all(|p| p.t > 1000.0) && (loose.len() as f64 / wanted - 1.0).abs() < 0.01,
+                loose.iter().all(|p| p.t > 1000.0)
+                    && (loose.len() as f64 / wanted - 1.0).abs() < 0.01,
                 "{}",
                 loose.len()
             );

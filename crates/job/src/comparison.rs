@@ -46,10 +46,13 @@ impl Question for PathComparison {
 
 fn path(executor: &Executor<'_>, run: &RunSpec) -> Result<Vec<Sample>, JobError> {
     // Many pairs are compared, of paths that have no other use and together fill much memory.
-    let recording = Recording::of_answer(run, &*executor.ask_in_passing(&Run(run.clone()))?)?.whole()?;
+    let recording =
+        Recording::of_answer(run, &*executor.ask_in_passing(&Run(run.clone()))?)?.whole()?;
     match recording.data {
         Data::Path(samples) => Ok(samples),
-        _ => Err(JobError::Other("only paths can be compared as paths; leave out --section".into())),
+        _ => {
+            Err(JobError::Other("only paths can be compared as paths; leave out --section".into()))
+        }
     }
 }
 
@@ -64,10 +67,16 @@ mod tests {
     fn only_paths_are_compared() {
         let field = ["v", "-x", "-z"];
         let run = |observe| {
-            cases::run(cases::smooth(&["x", "v", "z"], "x + 9", &field), SwitchSpec::tanh(1e-2), 20.0, observe)
+            cases::run(
+                cases::smooth(&["x", "v", "z"], "x + 9", &field),
+                SwitchSpec::tanh(1e-2),
+                20.0,
+                observe,
+            )
         };
         let path = run(Observation::Path { chord: 1e-3 });
-        let answer = PathComparison(path.clone(), path.clone()).compute(&Executor::quiet(), &()).unwrap();
+        let answer =
+            PathComparison(path.clone(), path.clone()).compute(&Executor::quiet(), &()).unwrap();
         let [a, b] = answer.fact::<[f64; 2]>("freshness").unwrap();
         assert!(a == b && a > 0.0 && a <= 1.0, "{a} {b}");
         let section = run(Observation::Section { coordinate: 0, value: 0.0 });

@@ -43,10 +43,14 @@ impl Question for MethodDigits {
     }
 
     fn compute(&self, _: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
-        let found = instances::smoothed(&self.system, Transition::Tanh, self.eps)?.digits(&self.compared)?;
-        let columns = [Column::words("method"), Column::numbers("tolerance"), Column::integers("crossing")];
-        let mut rows =
-            Table::new("agreement", columns.into_iter().chain(["t", "error", "digits"].map(Column::numbers)));
+        let found = instances::smoothed(&self.system, Transition::Tanh, self.eps)?
+            .digits(&self.compared)?;
+        let columns =
+            [Column::words("method"), Column::numbers("tolerance"), Column::integers("crossing")];
+        let mut rows = Table::new(
+            "agreement",
+            columns.into_iter().chain(["t", "error", "digits"].map(Column::numbers)),
+        );
         for row in &found.rows {
             let a = &row.agreement;
             rows.push([
@@ -76,8 +80,8 @@ mod tests {
     use twofold_analyse::reference::SectionPlane;
     use twofold_integrate::StepCap;
 
-    /// y and z turn about the origin once in 2 pi: y = 0 is passed at pi/2 and 3 pi/2. The tighter the tolerance, the
-    /// more digits.
+    /// y and z turn about the origin once in 2 pi: y = 0 is passed at pi/2 and 3 pi/2. The tighter
+    /// the tolerance, the more digits.
     #[test]
     fn digits_are_what_is_right_behind_the_point() {
         let methods = [1e-4, 1e-10].map(|tolerance| Contender { name: Method::Dopri5, tolerance });
@@ -97,11 +101,19 @@ mod tests {
         let answer = question.compute(&Executor::quiet(), &()).unwrap();
         let rows = answer.table("agreement").unwrap();
         assert_eq!(rows.integers("crossing"), [1, 2, 1, 2]);
-        assert!(rows.words("method").all(|word| word == "dopri5") && answer.table("visits").unwrap().is_empty());
-        for (row, [least, most]) in [[1.0, 6.0], [1.0, 6.0], [8.0, 13.0], [8.0, 13.0]].into_iter().enumerate() {
+        assert!(
+            rows.words("method").all(|word| word == "dopri5")
+                && answer.table("visits").unwrap().is_empty()
+        );
+        for (row, [least, most]) in
+            [[1.0, 6.0], [1.0, 6.0], [8.0, 13.0], [8.0, 13.0]].into_iter().enumerate()
+        {
             let [t, error, digits] = ["t", "error", "digits"].map(|name| rows.numbers(name)[row]);
             assert!((t - PI * ((row % 2) as f64 + 0.5)).abs() < 1e-12, "{t}");
-            assert!((least..most).contains(&digits) && (digits + error.log10()).abs() < 1e-12, "{error} {digits}");
+            assert!(
+                (least..most).contains(&digits) && (digits + error.log10()).abs() < 1e-12,
+                "{error} {digits}"
+            );
         }
     }
 }

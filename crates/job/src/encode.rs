@@ -1,8 +1,9 @@
 //! Answers as bytes, and back.
 //!
-//! [`bits`] is what is hashed and what the store keeps; [`csv()`] and [`json()`] are for people and other programs. All three are views
-//! of the same [`Table`]s, and all three are read back by this file, with units and metadata: a table that comes back is equal to the one
-//! that went out, to the last bit.
+//! [`bits`] is what is hashed and what the store keeps; [`csv()`] and [`json()`] are for people and
+//! other programs. All three are views of the same [`Table`]s, and all three are read back by this
+//! file, with units and metadata: a table that comes back is equal to the one that went out, to the
+//! last bit.
 
 use std::io::Write as _;
 
@@ -24,8 +25,8 @@ fn malformed<T>(what: impl Into<String>) -> Result<T, Malformed> {
     Err(Malformed(what.into()))
 }
 
-/// The bytes that are hashed: table by table, column by column, little-endian. Names and units are part of them; all
-/// not-a-numbers are one.
+/// The bytes that are hashed: table by table, column by column, little-endian. Names and units are
+/// part of them; all not-a-numbers are one.
 pub fn bits(tables: &[Table]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let text = |bytes: &mut Vec<u8>, text: &str| {
@@ -52,7 +53,9 @@ pub fn bits(tables: &[Table]) -> Vec<u8> {
                         bytes.extend_from_slice(&v.to_bits().to_le_bytes());
                     }
                 }
-                Cells::Integers(values) => values.iter().for_each(|v| bytes.extend_from_slice(&v.to_le_bytes())),
+                Cells::Integers(values) => {
+                    values.iter().for_each(|v| bytes.extend_from_slice(&v.to_le_bytes()))
+                }
                 Cells::Words(words) => {
                     bytes.extend_from_slice(&(words.vocabulary.len() as u64).to_le_bytes());
                     words.vocabulary.iter().for_each(|w| text(&mut bytes, w));
@@ -69,7 +72,9 @@ struct Reader<'a>(&'a [u8]);
 
 impl<'a> Reader<'a> {
     fn take(&mut self, n: usize) -> Result<&'a [u8], Malformed> {
-        let Some((head, rest)) = self.0.split_at_checked(n) else { return malformed("it ends too early") };
+        let Some((head, rest)) = self.0.split_at_checked(n) else {
+            return malformed("it ends too early");
+        };
         self.0 = rest;
         Ok(head)
     }
@@ -78,7 +83,8 @@ impl<'a> Reader<'a> {
         self.take(8)?.try_into().or_else(|_| malformed("it ends too early"))
     }
 
-    /// A count of things that take at least `size` bytes each: one that the rest cannot hold is refused before memory is taken for it.
+    /// A count of things that take at least `size` bytes each: one that the rest cannot hold is
+    /// refused before memory is taken for it.
     fn count(&mut self, size: usize) -> Result<usize, Malformed> {
         let n = u64::from_le_bytes(self.eight()?);
         match usize::try_from(n).ok().and_then(|n| n.checked_mul(size)) {
@@ -109,16 +115,25 @@ pub fn from_bits(bytes: &[u8]) -> Result<Vec<Table>, Malformed> {
                 b"n" => {
                     let n = r.count(8)?;
                     let cells = r.take(8 * n)?.chunks_exact(8);
-                    Cells::Numbers(cells.map(|c| f64::from_le_bytes(c.try_into().unwrap_or_default())).collect())
+                    Cells::Numbers(
+                        cells
+                            .map(|c| f64::from_le_bytes(c.try_into().unwrap_or_default()))
+                            .collect(),
+                    )
                 }
                 b"i" => {
                     let n = r.count(8)?;
                     let cells = r.take(8 * n)?.chunks_exact(8);
-                    Cells::Integers(cells.map(|c| i64::from_le_bytes(c.try_into().unwrap_or_default())).collect())
+                    Cells::Integers(
+                        cells
+                            .map(|c| i64::from_le_bytes(c.try_into().unwrap_or_default()))
+                            .collect(),
+                    )
                 }
                 b"w" => {
                     let n = r.count(4)?;
-                    let vocabulary = (0..r.count(8)?).map(|_| r.text()).collect::<Result<Vec<_>, _>>()?;
+                    let vocabulary =
+                        (0..r.count(8)?).map(|_| r.text()).collect::<Result<Vec<_>, _>>()?;
                     let codes: Vec<u32> = r
                         .take(4 * n)?
                         .chunks_exact(4)
@@ -181,16 +196,19 @@ pub(super) fn heading(table: &Table, about: &Value) -> Heading {
 }
 
 fn headings(table: &Table) -> Vec<ColumnHeading> {
-    let heading = |c: &Column| ColumnHeading { name: c.name.clone(), unit: c.unit.clone(), kind: c.kind() };
+    let heading =
+        |c: &Column| ColumnHeading { name: c.name.clone(), unit: c.unit.clone(), kind: c.kind() };
     table.columns.iter().map(heading).collect()
 }
 
 /// What starts the line of metadata: a comment to gnuplot, NumPy, R and pandas (`comment="#"`).
 const COMMENT: &str = "# ";
 
-/// CSV: a line of column names, a row per line with shortest round-trip numbers (blanks are empty), and a comment line of metadata as JSON
-/// (`about` is whatever its maker wants to say). The names come first because common readers take the first line for them, even a comment
-/// (`numpy.genfromtxt(names=True)`). A file that was cut short can say so in one more comment line ([`cut_short`]).
+/// CSV: a line of column names, a row per line with shortest round-trip numbers (blanks are empty),
+/// and a comment line of metadata as JSON (`about` is whatever its maker wants to say). The names
+/// come first because common readers take the first line for them, even a comment
+/// (`numpy.genfromtxt(names=True)`). A file that was cut short can say so in one more comment line
+/// ([`cut_short`]).
 ///
 /// ```
 /// use twofold_job::encode::{csv, from_csv};
@@ -206,7 +224,8 @@ pub fn csv(table: &Table, about: &Value) -> Vec<u8> {
     csv_of_parts(&[table], about)
 }
 
-/// [`csv()`] of tables with the same columns, as if they were one: the rows of the first, then those of the second, and so on. Nothing for no table.
+/// [`csv()`] of tables with the same columns, as if they were one: the rows of the first, then
+/// those of the second, and so on. Nothing for no table.
 pub fn csv_of_parts(tables: &[&Table], about: &Value) -> Vec<u8> {
     let Some(first) = tables.first() else { return Vec::new() };
     let mut bytes = csv_head(first);
@@ -220,7 +239,9 @@ pub fn csv_of_parts(tables: &[&Table], about: &Value) -> Vec<u8> {
 /// The first line of [`csv()`]: column names.
 pub fn csv_head(table: &Table) -> Vec<u8> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(table.columns.iter().map(|c| &c.name)).expect("memory takes what is written to it");
+    writer
+        .write_record(table.columns.iter().map(|c| &c.name))
+        .expect("memory takes what is written to it");
     writer.into_inner().expect("memory takes what is written to it")
 }
 
@@ -248,7 +269,9 @@ fn csv_rows_after(mut bytes: Vec<u8>, table: &Table) -> Vec<u8> {
                 bytes.push(b',');
             }
             match &column.cells {
-                Cells::Words(words) => bytes.extend_from_slice(&vocabularies[i][words.codes[row] as usize]),
+                Cells::Words(words) => {
+                    bytes.extend_from_slice(&vocabularies[i][words.codes[row] as usize])
+                }
                 Cells::Numbers(values) => shortest(&mut bytes, values[row]),
                 Cells::Integers(values) => {
                     write!(bytes, "{}", values[row]).expect("memory takes what is written to it")
@@ -307,8 +330,8 @@ pub fn stop_of_csv(bytes: &[u8]) -> Option<Stop> {
     serde_json::from_value(Value::String(String::from_utf8_lossy(word).into_owned())).ok()
 }
 
-/// The table of which [`csv()`] made this file, and what it says about itself. Files of version 0.2, which began with their metadata,
-/// are read, too.
+/// The table of which [`csv()`] made this file, and what it says about itself. Files of version
+/// 0.2, which began with their metadata, are read, too.
 ///
 /// # Errors
 ///
@@ -330,8 +353,12 @@ pub fn from_csv(bytes: &[u8]) -> Result<(Heading, Table), Malformed> {
     } else {
         return malformed("its last line is not a comment with metadata");
     };
-    let heading: Heading = serde_json::from_slice(text).map_err(|e| Malformed(format!("its metadata: {e}")))?;
-    let mut table = Table::new(&heading.table, heading.columns.iter().map(|c| Column::new(&c.name, &c.unit, c.kind)));
+    let heading: Heading =
+        serde_json::from_slice(text).map_err(|e| Malformed(format!("its metadata: {e}")))?;
+    let mut table = Table::new(
+        &heading.table,
+        heading.columns.iter().map(|c| Column::new(&c.name, &c.unit, c.kind)),
+    );
     let mut reader = csv::Reader::from_reader(body);
     let names = reader.headers().map_err(|e| Malformed(e.to_string()))?;
     if !names.iter().eq(table.columns.iter().map(|c| c.name.as_str())) {
@@ -352,25 +379,33 @@ pub fn from_csv(bytes: &[u8]) -> Result<(Heading, Table), Malformed> {
                 Cells::Integers(values) => field.parse().ok().map(|v| values.push(v)).is_some(),
             };
             if !fits {
-                return malformed(format!("row {}, column {}: \"{field}\" is not a number", row + 1, column.name));
+                return malformed(format!(
+                    "row {}, column {}: \"{field}\" is not a number",
+                    row + 1,
+                    column.name
+                ));
             }
         }
     }
     Ok((heading, table))
 }
 
-/// JSON: what `about` says, the facts, statistics and stop reason, and every table with its columns and rows.
+/// JSON: what `about` says, the facts, statistics and stop reason, and every table with its columns
+/// and rows.
 pub fn json(answer: &Answer, about: &Value) -> Vec<u8> {
     let cell = |cells: &Cells, row: usize| match cells {
         Cells::Numbers(v) if v[row].is_nan() => Value::Null,
-        Cells::Numbers(v) if v[row].is_infinite() => json!(if v[row] > 0.0 { "inf" } else { "-inf" }),
+        Cells::Numbers(v) if v[row].is_infinite() => {
+            json!(if v[row] > 0.0 { "inf" } else { "-inf" })
+        }
         Cells::Numbers(v) => json!(v[row]),
         Cells::Integers(v) => json!(v[row]),
         Cells::Words(w) => json!(w.get(row)),
     };
     let table = |t: &Table| {
         let row = |row| Value::Array(t.columns.iter().map(|c| cell(&c.cells, row)).collect());
-        json!({ "name": t.name, "columns": headings(t), "rows": (0..t.len()).map(row).collect::<Vec<_>>() })
+        json!({ "name": t.name, "columns": headings(t),
+            "rows": (0..t.len()).map(row).collect::<Vec<_>>() })
     };
     let value = json!({
         "made_by": concat!("twofold ", env!("CARGO_PKG_VERSION")),
@@ -414,10 +449,16 @@ pub fn from_json(bytes: &[u8]) -> Result<(Value, Answer), Malformed> {
     let file: Written = serde_json::from_slice(bytes).map_err(|e| Malformed(e.to_string()))?;
     let mut tables = Vec::new();
     for t in file.tables {
-        let mut table = Table::new(&t.name, t.columns.iter().map(|c| Column::new(&c.name, &c.unit, c.kind)));
+        let mut table =
+            Table::new(&t.name, t.columns.iter().map(|c| Column::new(&c.name, &c.unit, c.kind)));
         for (number, row) in t.rows.iter().enumerate() {
             if row.len() != table.columns.len() {
-                return malformed(format!("table {}, row {}: {} cells", t.name, number + 1, row.len()));
+                return malformed(format!(
+                    "table {}, row {}: {} cells",
+                    t.name,
+                    number + 1,
+                    row.len()
+                ));
             }
             for (column, value) in table.columns.iter_mut().zip(row) {
                 let fits = match (&mut column.cells, value) {
@@ -426,14 +467,22 @@ pub fn from_json(bytes: &[u8]) -> Result<(Value, Answer), Malformed> {
                     (Cells::Words(w), value) => value.as_str().map(|word| w.push(word)),
                 };
                 if fits.is_none() {
-                    let what = format!("table {}, row {}, column {}: {value}", t.name, number + 1, column.name);
+                    let what = format!(
+                        "table {}, row {}, column {}: {value}",
+                        t.name,
+                        number + 1,
+                        column.name
+                    );
                     return malformed(what);
                 }
             }
         }
         tables.push(table);
     }
-    Ok((file.about, Answer { tables, facts: file.facts, statistics: file.statistics, stop: file.stop }))
+    Ok((
+        file.about,
+        Answer { tables, facts: file.facts, statistics: file.statistics, stop: file.stop },
+    ))
 }
 
 #[cfg(test)]
@@ -444,7 +493,11 @@ mod tests {
     fn table(numbers: Vec<f64>, words: Vec<String>) -> Table {
         let mut table = Table::new(
             "a table",
-            [Column::new("x", "m", ColumnKind::Number), Column::words("word"), Column::integers("n")],
+            [
+                Column::new("x", "m", ColumnKind::Number),
+                Column::words("word"),
+                Column::integers("n"),
+            ],
         );
         for (i, (x, word)) in numbers.into_iter().zip(&words).enumerate() {
             table.push([x.into(), word.as_str().into(), (i as i64 - 3).into()]);
@@ -509,11 +562,13 @@ mod tests {
         }
 
         #[test]
-        fn damaged_bits_are_refused_or_are_other_tables(t in any_table(), at in any::<prop::sample::Index>(), flip in 1_u8..) {
+        fn damaged_bits_are_refused_or_are_other_tables(t in any_table(),
+            at in any::<prop::sample::Index>(), flip in 1_u8..) {
             let mut bytes = bits(std::slice::from_ref(&t));
             let at = at.index(bytes.len());
             bytes[at] ^= flip;
-            // Whatever comes back must be a table that its own bits describe: nothing is read past, nothing panics.
+            // Whatever comes back must be a table that its own bits describe: nothing is read past,
+            // nothing panics.
             if let Ok(tables) = from_bits(&bytes) {
                 prop_assert!(from_bits(&bits(&tables)).is_ok());
             }
@@ -539,20 +594,28 @@ mod tests {
         }
         // All not-a-numbers are one blank.
         let mut other = t.clone();
-        other.columns[0].cells = Cells::Numbers(vec![0.0, f64::from_bits(f64::NAN.to_bits() | 1), 1.0]);
+        other.columns[0].cells =
+            Cells::Numbers(vec![0.0, f64::from_bits(f64::NAN.to_bits() | 1), 1.0]);
         assert_eq!(bits(&[other]), base);
     }
 
     /// Beyond all numbers and below them, and the blank, in every form.
     #[test]
     fn infinities_come_back() {
-        let t = table(vec![f64::INFINITY, f64::NEG_INFINITY, f64::NAN, -0.0], vec!["inf".into(); 4]);
+        let t =
+            table(vec![f64::INFINITY, f64::NEG_INFINITY, f64::NAN, -0.0], vec!["inf".into(); 4]);
         let answer = Answer { stop: Stop::StepBudget, ..Answer::of_tables(vec![t.clone()]) };
         let file = json(&answer, &Value::Null);
         let (_, back) = from_json(&file).unwrap();
         assert_eq!((back.hash(), back.stop), (answer.hash(), Stop::StepBudget));
-        assert_eq!(back.table("a table").unwrap().numbers("x")[..2], [f64::INFINITY, f64::NEG_INFINITY]);
-        assert_eq!(bits(&[from_csv(&csv(&t, &Value::Null)).unwrap().1]), bits(std::slice::from_ref(&t)));
+        assert_eq!(
+            back.table("a table").unwrap().numbers("x")[..2],
+            [f64::INFINITY, f64::NEG_INFINITY]
+        );
+        assert_eq!(
+            bits(&[from_csv(&csv(&t, &Value::Null)).unwrap().1]),
+            bits(std::slice::from_ref(&t))
+        );
         // A number is a number, inf or -inf; nothing else is one, and inf is no whole number.
         let text = String::from_utf8(file).unwrap();
         for (from, to) in [
@@ -624,7 +687,8 @@ mod tests {
         use crate::{Run, cases};
         let observe = Observation::Times { every: 0.5 };
         let run = Run(cases::run(cases::decays(2), SwitchSpec::tanh(1e-2), 1.0, observe));
-        let tables = [vec![0.1, 0.2], vec![7.0, 8.0]].map(|numbers| table(numbers, vec!["up".into(), "down".into()]));
+        let tables = [vec![0.1, 0.2], vec![7.0, 8.0]]
+            .map(|numbers| table(numbers, vec!["up".into(), "down".into()]));
         for (stop, said) in [(Stop::Finished, None), (Stop::Interrupted, Some(Stop::Interrupted))] {
             let bytes = csv_of_run(&run, &Answer { stop, ..Answer::of_tables(tables.to_vec()) });
             let (heading, back) = from_csv(&bytes).unwrap();
@@ -641,6 +705,9 @@ mod tests {
         assert!(from_bits(&[255; 64]).is_err());
         let t = table(vec![0.1], vec!["up".into()]);
         let text = String::from_utf8(csv(&t, &Value::Null)).unwrap().replace("0.1", "zero");
-        assert!(from_csv(text.as_bytes()).unwrap_err().to_string().contains("row 1, column x"), "{text}");
+        assert!(
+            from_csv(text.as_bytes()).unwrap_err().to_string().contains("row 1, column x"),
+            "{text}"
+        );
     }
 }

@@ -163,7 +163,9 @@ impl<'a> Executor<'a> {
         let Some(store) = &self.store else { return };
         let mut answers = self.answers.lock().unwrap_or_else(PoisonError::into_inner);
         answers.retain(|key, cell| {
-            let unused = cell.get().is_some_and(|answer| answer.as_ref().is_ok_and(|a| Arc::strong_count(a) == 1));
+            let unused = cell
+                .get()
+                .is_some_and(|answer| answer.as_ref().is_ok_and(|a| Arc::strong_count(a) == 1));
             !(unused && store.has(key))
         });
     }
@@ -172,8 +174,13 @@ impl<'a> Executor<'a> {
 /// The line about a finished job.
 fn said(answer: &Answer) -> String {
     // Facts have no rows to count.
-    let rows = if answer.tables.is_empty() { "done".to_owned() } else { format!("{} rows", answer.rows()) };
-    let work = answer.statistics.as_ref().map(|s| format!("{} steps, {rows}", s.steps)).unwrap_or(rows);
+    let rows = if answer.tables.is_empty() {
+        "done".to_owned()
+    } else {
+        format!("{} rows", answer.rows())
+    };
+    let work =
+        answer.statistics.as_ref().map(|s| format!("{} steps, {rows}", s.steps)).unwrap_or(rows);
     match answer.stop {
         // What was looked for, such as an event that ends the run, is said by the command.
         Stop::Finished | Stop::Found => work,
@@ -207,8 +214,9 @@ mod tests {
                 13 => return Err(JobError::Other("unlucky".into())),
                 n @ 0..2 => n,
                 n => {
-                    let before =
-                        |k| -> Result<u64, JobError> { Ok(executor.ask(&Fibonacci(n - k, self.1))?.fact("value")?) };
+                    let before = |k| -> Result<u64, JobError> {
+                        Ok(executor.ask(&Fibonacci(n - k, self.1))?.fact("value")?)
+                    };
                     before(1)? + before(2)?
                 }
             };
@@ -221,7 +229,8 @@ mod tests {
         static COUNT: AtomicUsize = AtomicUsize::new(0);
         let executor = Executor::quiet();
         let pool = rayon::ThreadPoolBuilder::new().num_threads(4).build().unwrap();
-        let questions: Vec<AnyQuestion> = (0..13).chain(0..13).map(|n| Arc::new(Fibonacci(n, &COUNT)) as _).collect();
+        let questions: Vec<AnyQuestion> =
+            (0..13).chain(0..13).map(|n| Arc::new(Fibonacci(n, &COUNT)) as _).collect();
         pool.install(|| executor.gather(&questions));
         assert_eq!(COUNT.load(Ordering::Relaxed), 13);
         assert_eq!(executor.ask(&Fibonacci(12, &COUNT)).unwrap().fact::<u64>("value"), Ok(144));
@@ -232,7 +241,8 @@ mod tests {
     fn what_the_store_has_is_not_held_in_memory() {
         static COUNT: AtomicUsize = AtomicUsize::new(0);
         let folder = tempfile::tempdir().unwrap();
-        let questions: Vec<AnyQuestion> = (0..8).map(|n| Arc::new(Fibonacci(n, &COUNT)) as _).collect();
+        let questions: Vec<AnyQuestion> =
+            (0..8).map(|n| Arc::new(Fibonacci(n, &COUNT)) as _).collect();
         let held = |executor: &Executor<'_>| executor.answers.lock().unwrap().len();
 
         let executor = Executor::new(Some(Store::new(folder.path())), &());
@@ -245,7 +255,8 @@ mod tests {
         assert_eq!((COUNT.load(Ordering::Relaxed), held(&executor)), (8, 1));
         drop(held_by_us);
 
-        // An executor that begins with them reads none of them (one is damaged and not missed), and computes only what is missing.
+        // An executor that begins with them reads none of them (one is damaged and not missed), and
+        // computes only what is missing.
         let next = Executor::new(Some(Store::new(folder.path())), &());
         let path = Store::new(folder.path()).path(&key(&*questions[3]));
         let whole = std::fs::read(&path).unwrap();
@@ -282,7 +293,10 @@ mod tests {
         static COUNT: AtomicUsize = AtomicUsize::new(0);
         let executor = Executor::quiet();
         for _ in 0..2 {
-            assert_eq!(executor.ask(&Fibonacci(14, &COUNT)).unwrap_err(), JobError::Other("unlucky".into()));
+            assert_eq!(
+                executor.ask(&Fibonacci(14, &COUNT)).unwrap_err(),
+                JobError::Other("unlucky".into())
+            );
         }
         assert_eq!(executor.ask(&Fibonacci(3, &COUNT)).unwrap().fact::<u64>("value"), Ok(2));
     }

@@ -14,18 +14,21 @@ use twofold_analyse::tangent::Tangent;
 use twofold_instances::{self as instances, Exponents, Growth, Late};
 use twofold_integrate::Monitor;
 use twofold_integrate::ensemble::InstructionSet;
-use twofold_system::{Bound, BoundField, Compiled, Field, Hysteretic, ParameterBatch, Smoothed, System};
+use twofold_system::{
+    Bound, BoundField, Compiled, Field, Hysteretic, ParameterBatch, Smoothed, System,
+};
 
-/// The largest Lyapunov exponent of the orbit from `start`. Facts: `exponent` ([`Exponent`]), `half_width` of its 95 % interval and `sign`
-/// ([`Sign`](lyapunov::Sign)) by that interval; or `failure` with the reason if the orbit could not be followed (it leaves, or its
-/// future is a set).
+/// The largest Lyapunov exponent of the orbit from `start`. Facts: `exponent` ([`Exponent`]),
+/// `half_width` of its 95 % interval and `sign` ([`Sign`](lyapunov::Sign)) by that interval; or
+/// `failure` with the reason if the orbit could not be followed (it leaves, or its future is a
+/// set).
 ///
 /// ```
 /// use twofold_analyse::lyapunov::{Exponent, LyapunovOptions};
 /// use twofold_job::{Executor, LargestExponent, spec::SwitchSpec};
 /// use twofold_system::System;
 /// let question = LargestExponent {
-///     system: System::builtin("fused-focus").expect("built in").with("mu", -0.02).expect("a parameter"),
+///     system: System::builtin("fused-focus").expect("built in").with("mu", -0.02)?,
 ///     switch: SwitchSpec::tanh(1e-2),
 ///     start: vec![0.0, 0.3],
 ///     settings: LyapunovOptions { transient: 10.0, duration: 50.0, ..Default::default() },
@@ -52,8 +55,10 @@ impl LargestExponent {
         answer.fact("exponent").ok()
     }
 
-    /// The exponents of several questions that differ in start and in the equation's numbers alone, side by side in the lanes of vector registers: of each
-    /// what its answer has ([`LargestExponent::found`]), bit for bit. Nothing if they differ in more, or lanes have no room for their equation.
+    /// The exponents of several questions that differ in start and in the equation's numbers alone,
+    /// side by side in the lanes of vector registers: of each what its answer has
+    /// ([`LargestExponent::found`]), bit for bit. Nothing if they differ in more, or lanes have no
+    /// room for their equation.
     ///
     /// # Errors
     /// [`JobError::Interrupted`] if `monitor` asks to stop.
@@ -84,9 +89,11 @@ impl LargestExponent {
     where
         ParameterBatch<M>: Exponents<N>,
     {
-        let fields: Option<Vec<BoundField<M>>> = questions.iter().map(|q| q.tangent()?.bind().ok()).collect();
+        let fields: Option<Vec<BoundField<M>>> =
+            questions.iter().map(|q| q.tangent()?.bind().ok()).collect();
         let Some(tangents) = fields.and_then(ParameterBatch::new) else { return Ok(None) };
-        let starts: Vec<_> = questions.iter().map(|q| SVector::<f64, N>::from_column_slice(&q.start)).collect();
+        let starts: Vec<_> =
+            questions.iter().map(|q| SVector::<f64, N>::from_column_slice(&q.start)).collect();
         let settings = &questions[0].settings;
         match tangents.exponents(set, &starts, settings, monitor) {
             Some(found) => Ok(Some(found.into_iter().map(Result::ok).collect())),
@@ -94,13 +101,15 @@ impl LargestExponent {
         }
     }
 
-    /// The smoothed equation with its variational equation, as data: the operations that [`LargestExponent::exponent`] goes through.
+    /// The smoothed equation with its variational equation, as data: the operations that
+    /// [`LargestExponent::exponent`] goes through.
     fn tangent(&self) -> Option<Field> {
         let SwitchSpec::Smoothed { eps, transition } = self.switch else { return None };
         Some(match self.system.compiled() {
             Some(Compiled::Caricature(system)) => {
                 let field = Smoothed { system, transition, eps };
-                // Symbolically, so that nothing is computed with derivatives that are zero everywhere: a third of all instructions.
+                // Symbolically, so that nothing is computed with derivatives that are zero
+                // everywhere: a third of all instructions.
                 Field::record(["x", "y", "z"], &field).variational(1)
             }
             _ => Field::smoothed(&self.system, transition, eps).variational(1),
@@ -111,7 +120,10 @@ impl LargestExponent {
         let start = |i: usize| self.start.get(i).copied().unwrap_or(f64::NAN);
         let dimension = self.system.dimension();
         if self.start.len() != dimension {
-            return Err(format!("the start has {} numbers, the system {dimension} states", self.start.len()));
+            return Err(format!(
+                "the start has {} numbers, the system {dimension} states",
+                self.start.len()
+            ));
         }
         let field = match (self.switch, self.system.compiled()) {
             (SwitchSpec::Smoothed { eps, transition }, Some(Compiled::Caricature(system))) => {
@@ -120,20 +132,28 @@ impl LargestExponent {
                 let tangent = Tangent::<_, 1>(&field);
                 return tangent.growth(x, 3, &self.settings, monitor).map_err(|e| e.to_string());
             }
-            (SwitchSpec::Hysteretic { eps, eps_prime, relaxation, .. }, Some(Compiled::Caricature(system))) => {
+            (
+                SwitchSpec::Hysteretic { eps, eps_prime, relaxation, .. },
+                Some(Compiled::Caricature(system)),
+            ) => {
                 let field = Hysteretic { system, eps, eps_prime, relaxation };
                 let x = SVector::from_fn(|i, _| if i < 3 { start(i) } else { self.phi() });
                 let tangent = Tangent::<_, 1>(&field);
                 return tangent.growth(x, 3, &self.settings, monitor).map_err(|e| e.to_string());
             }
-            (SwitchSpec::Smoothed { eps, transition }, _) => Field::smoothed(&self.system, transition, eps),
+            (SwitchSpec::Smoothed { eps, transition }, _) => {
+                Field::smoothed(&self.system, transition, eps)
+            }
             (SwitchSpec::Hysteretic { eps, eps_prime, relaxation, .. }, _) => {
                 Field::hysteretic(&self.system, eps, eps_prime, relaxation)
             }
-            (SwitchSpec::Delayed { .. } | SwitchSpec::Relay { .. }, _) => return self.of_late_switch(monitor),
+            (SwitchSpec::Delayed { .. } | SwitchSpec::Relay { .. }, _) => {
+                return self.of_late_switch(monitor);
+            }
             (SwitchSpec::Filippov { .. }, _) => {
                 return Err(
-                    "the largest exponent alone has no tangent flow across a jump; ask for all (twofold lyapunov)"
+                    "the largest exponent alone has no tangent flow across a jump; ask for all \
+                        (twofold lyapunov)"
                         .into(),
                 );
             }
@@ -158,13 +178,17 @@ impl LargestExponent {
         match self.start.len() {
             1 => self.late::<1>(&self.bound()?, monitor),
             2 => self.late::<2>(&self.bound()?, monitor),
-            3 => self.late::<3>(&*instances::late(&self.system).map_err(|e| e.to_string())?, monitor),
+            3 => {
+                self.late::<3>(&*instances::late(&self.system).map_err(|e| e.to_string())?, monitor)
+            }
             4 => self.late::<4>(&self.bound()?, monitor),
             5 => self.late::<5>(&self.bound()?, monitor),
             6 => self.late::<6>(&self.bound()?, monitor),
             7 => self.late::<7>(&self.bound()?, monitor),
             8 => self.late::<8>(&self.bound()?, monitor),
-            n => Err(format!("exponents of switches with a past are computed for up to eight states, not for {n}")),
+            n => Err(format!(
+                "exponents of switches with a past are computed for up to eight states, not for {n}"
+            )),
         }
     }
 
@@ -172,19 +196,31 @@ impl LargestExponent {
         self.system.bind().map_err(|e| e.to_string())
     }
 
-    fn late<const N: usize>(&self, system: &dyn Late<N>, monitor: &dyn Monitor) -> Result<Estimate, String> {
+    fn late<const N: usize>(
+        &self,
+        system: &dyn Late<N>,
+        monitor: &dyn Monitor,
+    ) -> Result<Estimate, String> {
         let Some(switch) = self.switch.late() else { return Err("this switch has no past".into()) };
         let x0 = SVector::from_column_slice(&self.start);
-        system.late_growth(&self.system, switch, x0, &self.settings, monitor).map_err(|e| e.to_string())
+        system
+            .late_growth(&self.system, switch, x0, &self.settings, monitor)
+            .map_err(|e| e.to_string())
     }
 
     /// By the recorded equation and its variational equation.
-    fn along<const N: usize, const M: usize>(&self, tangent: &Field, monitor: &dyn Monitor) -> Result<Estimate, String>
+    fn along<const N: usize, const M: usize>(
+        &self,
+        tangent: &Field,
+        monitor: &dyn Monitor,
+    ) -> Result<Estimate, String>
     where
         BoundField<M>: Growth<N>,
     {
         let tangent = tangent.bind::<M>().map_err(|e| e.to_string())?;
-        let x = SVector::<f64, N>::from_fn(|i, _| self.start.get(i).copied().unwrap_or_else(|| self.phi()));
+        let x = SVector::<f64, N>::from_fn(|i, _| {
+            self.start.get(i).copied().unwrap_or_else(|| self.phi())
+        });
         tangent.growth(x, self.start.len(), &self.settings, monitor).map_err(|e| e.to_string())
     }
 
@@ -250,8 +286,12 @@ mod tests {
     fn question(system: System, switch: SwitchSpec, duration: f64) -> LargestExponent {
         let tolerance = Tolerance { rtol: 1e-9, atol: 1e-9 };
         let start = vec![1.0; system.dimension()];
-        let settings =
-            lyapunov::LyapunovOptions { tolerance, transient: 20.0, duration, ..lyapunov::LyapunovOptions::default() };
+        let settings = lyapunov::LyapunovOptions {
+            tolerance,
+            transient: 20.0,
+            duration,
+            ..lyapunov::LyapunovOptions::default()
+        };
         LargestExponent { system, switch, start, settings }
     }
 
@@ -259,20 +299,27 @@ mod tests {
         SwitchSpec::hysteretic(1e-2, Relaxation::Single)
     }
 
-    /// Decays at the rates 1, 2, 3 ... : neighbours approach each other at the lowest. phi, where it is a state, follows h, which is far from 0.
+    /// Decays at the rates 1, 2, 3 ... : neighbours approach each other at the lowest. phi, where
+    /// it is a state, follows h, which is far from 0.
     #[test]
     fn the_slowest_of_many_decays_is_the_exponent() {
         for n in 1..=9 {
-            for switch in [SwitchSpec::tanh(1e-2), hysteretic()].into_iter().take(if n < 9 { 2 } else { 1 }) {
-                let answer = question(cases::decays(n), switch, 10.0).compute(&Executor::quiet(), &()).unwrap();
-                let exponent: Exponent = answer.fact("exponent").unwrap_or_else(|e| panic!("{n} {switch:?}: {e}"));
+            for switch in
+                [SwitchSpec::tanh(1e-2), hysteretic()].into_iter().take(if n < 9 { 2 } else { 1 })
+            {
+                let answer = question(cases::decays(n), switch, 10.0)
+                    .compute(&Executor::quiet(), &())
+                    .unwrap();
+                let exponent: Exponent =
+                    answer.fact("exponent").unwrap_or_else(|e| panic!("{n} {switch:?}: {e}"));
                 assert!((exponent.value + 1.0).abs() < 1e-5, "{n} {switch:?}: {exponent:?}");
                 assert_eq!((exponent.duration, answer.stop), (10.0, Stop::Finished));
             }
         }
     }
 
-    /// The same where the switch depends on the past, which these orbits never ask: h is far from 0.
+    /// The same where the switch depends on the past, which these orbits never ask: h is far from
+    /// 0.
     #[test]
     fn decays_have_the_slowest_rate_whatever_the_switch() {
         let smooth = SwitchSpec::Delayed {
@@ -283,8 +330,11 @@ mod tests {
         };
         for n in 1..=8 {
             for switch in [SwitchSpec::delayed(0.3), SwitchSpec::relay(0.1), smooth] {
-                let answer = question(cases::decays(n), switch, 10.0).compute(&Executor::quiet(), &()).unwrap();
-                let exponent: Exponent = answer.fact("exponent").unwrap_or_else(|e| panic!("{n} {switch:?}: {e}"));
+                let answer = question(cases::decays(n), switch, 10.0)
+                    .compute(&Executor::quiet(), &())
+                    .unwrap();
+                let exponent: Exponent =
+                    answer.fact("exponent").unwrap_or_else(|e| panic!("{n} {switch:?}: {e}"));
                 assert!((exponent.value + 1.0).abs() < 1e-5, "{n} {switch:?}: {exponent:?}");
             }
         }
@@ -298,16 +348,23 @@ mod tests {
         assert!(compiled.compiled().is_some() && recorded.compiled().is_none());
         for switch in [SwitchSpec::tanh(1e-2), hysteretic()] {
             let [a, b] = [&compiled, &recorded].map(|system| {
-                let question =
-                    LargestExponent { start: vec![0.2, 0.0, -1.0], ..question(system.clone(), switch, 30.0) };
-                question.compute(&Executor::quiet(), &()).unwrap().fact::<Exponent>("exponent").unwrap()
+                let question = LargestExponent {
+                    start: vec![0.2, 0.0, -1.0],
+                    ..question(system.clone(), switch, 30.0)
+                };
+                question
+                    .compute(&Executor::quiet(), &())
+                    .unwrap()
+                    .fact::<Exponent>("exponent")
+                    .unwrap()
             });
             assert!((a.value - b.value).abs() < 1e-4, "{a:?} {b:?}");
         }
     }
 
-    /// Orbits side by side have the exponents that they have alone: the compiled caricature's with numbers of their own, files' systems of two to four states,
-    /// every transition function; some that cannot be followed, and vectors that shrink by far more than a step may.
+    /// Orbits side by side have the exponents that they have alone: the compiled caricature's with
+    /// numbers of their own, files' systems of two to four states, every transition function; some
+    /// that cannot be followed, and vectors that shrink by far more than a step may.
     #[test]
     fn exponents_side_by_side_are_those_alone() {
         let compiled = |alpha: f64| System::from(Caricature::with_reinjection(alpha, 1e-5));
@@ -318,13 +375,26 @@ mod tests {
         };
         let smoothed = |eps: f64, transition: Transition| SwitchSpec::Smoothed { eps, transition };
         let mut all: Vec<(Vec<LargestExponent>, bool)> = Vec::new();
-        let transitions =
-            [Transition::PerturbedTanh { sigma: 0.1 }, Transition::Arctan, Transition::Algebraic, Transition::Erf];
+        let transitions = [
+            Transition::PerturbedTanh { sigma: 0.1 },
+            Transition::Arctan,
+            Transition::Algebraic,
+            Transition::Erf,
+        ];
         for transition in transitions {
-            all.push(((1..4).map(|k| caricature(0.1 * f64::from(k), smoothed(1e-2, transition))).collect(), true));
+            all.push((
+                (1..4)
+                    .map(|k| caricature(0.1 * f64::from(k), smoothed(1e-2, transition)))
+                    .collect(),
+                true,
+            ));
         }
-        let tanh =
-            |k: u32| caricature(0.1 + 0.002 * f64::from(k), smoothed(1e-2 / f64::from(1 + k % 3), Transition::Tanh));
+        let tanh = |k: u32| {
+            caricature(
+                0.1 + 0.002 * f64::from(k),
+                smoothed(1e-2 / f64::from(1 + k % 3), Transition::Tanh),
+            )
+        };
         let mut many: Vec<_> = (0..70).map(tanh).collect();
         many[7].start[0] = f64::NAN;
         many[9].start[1] = 1e200;
@@ -332,7 +402,8 @@ mod tests {
         for (states, growth) in [(2, "0.9"), (3, "0.9"), (4, "-2")] {
             let of = |k: u32| {
                 let names = ["x", "y", "z", "w"];
-                let mut fields: Vec<String> = names.iter().map(|name| format!("0 - {name}*{k}")).collect();
+                let mut fields: Vec<String> =
+                    names.iter().map(|name| format!("0 - {name}*{k}")).collect();
                 fields[0] = format!("x*({growth} - x*x) + tanh(y)");
                 let fields: Vec<&str> = fields[..states].iter().map(String::as_str).collect();
                 let system = cases::smooth(&names[..states], "y - 0.3", &fields);
@@ -370,7 +441,9 @@ mod tests {
                 .map(|question| question.found(&question.compute(&Executor::quiet(), &()).unwrap()))
                 .collect();
             let bits = |all: &[Option<Exponent>]| -> Vec<_> {
-                all.iter().map(|e| e.map(|e| [e.value, e.standard_error, e.duration].map(f64::to_bits))).collect()
+                all.iter()
+                    .map(|e| e.map(|e| [e.value, e.standard_error, e.duration].map(f64::to_bits)))
+                    .collect()
             };
             let questions: Vec<_> = questions.iter().collect();
             for set in InstructionSet::ALL.into_iter().filter(|set| set.is_here()) {
@@ -389,15 +462,24 @@ mod tests {
 
     #[test]
     fn what_has_no_exponent_says_why() {
-        let said = |q: LargestExponent| q.compute(&Executor::quiet(), &()).unwrap().fact::<String>("failure").unwrap();
-        let few = LargestExponent { start: vec![1.0], ..question(cases::decays(2), SwitchSpec::tanh(1e-2), 9.0) };
+        let said = |q: LargestExponent| {
+            q.compute(&Executor::quiet(), &()).unwrap().fact::<String>("failure").unwrap()
+        };
+        let few = LargestExponent {
+            start: vec![1.0],
+            ..question(cases::decays(2), SwitchSpec::tanh(1e-2), 9.0)
+        };
         assert!(said(few).contains("1 numbers, the system 2 states"));
         let exit = ExitRule::AtOnce { side: Side::Plus };
         let filippov = question(cases::decays(2), SwitchSpec::Filippov { exit, funnel: None }, 9.0);
         assert!(said(filippov).contains("ask for all"));
-        assert!(said(question(cases::decays(10), SwitchSpec::tanh(1e-2), 9.0)).contains("not for 10"));
+        assert!(
+            said(question(cases::decays(10), SwitchSpec::tanh(1e-2), 9.0)).contains("not for 10")
+        );
         assert!(said(question(cases::decays(9), hysteretic(), 9.0)).contains("not for 10"));
-        assert!(said(question(cases::decays(9), SwitchSpec::relay(0.1), 9.0)).contains("not for 9"));
+        assert!(
+            said(question(cases::decays(9), SwitchSpec::relay(0.1), 9.0)).contains("not for 9")
+        );
         // x' = x^2 leaves at t = 1.
         let leaving = cases::smooth(&["x"], "x + 1", &["x*x"]);
         assert!(!said(question(leaving, SwitchSpec::tanh(1e-2), 9.0)).is_empty());
@@ -407,7 +489,10 @@ mod tests {
     fn phi_begins_on_the_side_of_the_start() {
         let system = cases::smooth(&["x", "y"], "y - 1", &["-x", "-y"]);
         for (y, phi) in [(1.5, 1.0), (0.5, 0.0), (1.0, 0.0)] {
-            let question = LargestExponent { start: vec![0.0, y], ..question(system.clone(), hysteretic(), 9.0) };
+            let question = LargestExponent {
+                start: vec![0.0, y],
+                ..question(system.clone(), hysteretic(), 9.0)
+            };
             assert_eq!(question.phi(), phi, "{y}");
         }
     }
@@ -421,12 +506,23 @@ mod tests {
                 if t < self.0 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
             }
         }
-        let turning =
-            |duration| question(cases::smooth(&["x", "v"], "x + 9", &["v", "-x"]), SwitchSpec::tanh(1e-2), duration);
+        let turning = |duration| {
+            question(
+                cases::smooth(&["x", "v"], "x + 9", &["v", "-x"]),
+                SwitchSpec::tanh(1e-2),
+                duration,
+            )
+        };
         let third = turning(3000.0).compute(&Executor::quiet(), &Until(1000.0)).unwrap();
         assert_eq!(third.stop, Stop::Interrupted);
         let exponent: Exponent = third.fact("exponent").unwrap();
-        assert!((900.0..2500.0).contains(&exponent.duration) && exponent.value.abs() < 1e-2, "{exponent:?}");
-        assert_eq!(turning(30_000.0).compute(&Executor::quiet(), &Until(1.0)), Err(JobError::Interrupted));
+        assert!(
+            (900.0..2500.0).contains(&exponent.duration) && exponent.value.abs() < 1e-2,
+            "{exponent:?}"
+        );
+        assert_eq!(
+            turning(30_000.0).compute(&Executor::quiet(), &Until(1.0)),
+            Err(JobError::Interrupted)
+        );
     }
 }

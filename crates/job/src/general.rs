@@ -8,7 +8,9 @@ use twofold_hybrid::motion::tangent::{Return, closed_orbit, exponents};
 use twofold_hybrid::motion::{Exit, Record};
 use twofold_hybrid::rests::rests;
 use twofold_hybrid::selection::Intersection;
-use twofold_hybrid::{Definition, Ending, Equation, HybridError, Model, Options, Point, follow, follow_watched};
+use twofold_hybrid::{
+    Definition, Ending, Equation, HybridError, Model, Options, Point, follow, follow_watched,
+};
 use twofold_integrate::Monitor;
 use twofold_system::System;
 
@@ -52,12 +54,14 @@ pub struct GeneralRun {
 /// If it has two surfaces.
 pub fn model_of(system: &System) -> Result<Model, JobError> {
     if system.definition().second().is_some() {
-        let why = "exponents of Filippov motion are computed for one switching function h; write two with sign(...) in f = [...]";
+        let why = "exponents of Filippov motion are computed for one switching function h; write \
+            two with sign(...) in f = [...]";
         return Err(HybridError::Bad(why.into()).into());
     }
     let text = serde_json::to_string(&system.canonical()).unwrap_or_default();
     let name = if system.name().is_empty() { "the system" } else { system.name() };
-    let definition = Definition::from_json(&text, name).map_err(|e| HybridError::Bad(e.to_string()))?;
+    let definition =
+        Definition::from_json(&text, name).map_err(|e| HybridError::Bad(e.to_string()))?;
     Ok(Model::new(definition))
 }
 
@@ -73,7 +77,9 @@ impl GeneralRun {
             "t_start": o.t_start,
             "t_end": o.t_end,
             "start": o.start.clone().or_else(|| self.model.start().ok().flatten()),
-            "method": { "name": o.method.name(), "rtol": o.rtol, "atol": o.atol, "max_step": o.max_step.is_finite().then_some(o.max_step), "max_steps": o.max_steps },
+            "method": { "name": o.method.name(), "rtol": o.rtol, "atol": o.atol,
+                "max_step": o.max_step.is_finite().then_some(o.max_step),
+                    "max_steps": o.max_steps },
             "observe": match &o.record {
                 Record::Path { chord } => json!({ "path": { "chord": chord } }),
                 Record::Times { every } => json!({ "times": { "every": every } }),
@@ -84,7 +90,8 @@ impl GeneralRun {
                 Intersection::Bilinear => json!("bilinear"),
                 Intersection::HullLeastNorm => json!("hull-least-norm"),
                 Intersection::Order(named) => {
-                    json!({ "order": named.iter().map(ToString::to_string).collect::<Vec<String>>() })
+                    let order: Vec<String> = named.iter().map(ToString::to_string).collect();
+                    json!({ "order": order })
                 }
             },
             "exit": match o.exit {
@@ -100,10 +107,12 @@ impl GeneralRun {
         json!({ "kind": "general-run", "question": self.json() })
     }
 
-    /// An empty table for the points: time, states, and as far as the system has them the mode, the signs of its switching functions and the event.
+    /// An empty table for the points: time, states, and as far as the system has them the mode, the
+    /// signs of its switching functions and the event.
     pub fn table(&self) -> Table {
         let definition = self.model.definition();
-        let name = if matches!(self.options.record, Record::Section(_)) { "section" } else { "path" };
+        let name =
+            if matches!(self.options.record, Record::Section(_)) { "section" } else { "path" };
         let unit = |unit: &str| if unit.is_empty() { "1".to_owned() } else { unit.to_owned() };
         let mut columns = vec![Column::numbers("t")];
         columns.extend(definition.states().iter().map(|s| {
@@ -135,18 +144,21 @@ impl GeneralRun {
     }
 
     fn row(&self, columns: &[&str], point: &Point) -> Vec<Entry> {
-        let mut row: Vec<Entry> = std::iter::once(point.t).chain(point.x.iter().copied()).map(Entry::Number).collect();
+        let mut row: Vec<Entry> =
+            std::iter::once(point.t).chain(point.x.iter().copied()).map(Entry::Number).collect();
         row.extend(columns.iter().map(|column| match *column {
             "mode" => Entry::Word(self.model.definition().modes()[point.mode].name.clone()),
             "signs" => Entry::Word(point.signs.to_owned()),
-            "direction" => Entry::Word(if point.direction > Some(0.0) { "up" } else { "down" }.to_owned()),
+            "direction" => {
+                Entry::Word(if point.direction > Some(0.0) { "up" } else { "down" }.to_owned())
+            }
             _ => Entry::Word(point.event.unwrap_or_default().to_owned()),
         }));
         row
     }
 
-    /// Follows the system and hands its rows on in parts, which may come before an error; `more` says whether more is wanted.
-    /// The answer holds facts, and no rows.
+    /// Follows the system and hands its rows on in parts, which may come before an error; `more`
+    /// says whether more is wanted. The answer holds facts, and no rows.
     ///
     /// # Errors
     /// As [`follow`].
@@ -181,13 +193,15 @@ impl GeneralRun {
                 Record::Section(e) => Some(e),
                 _ => None,
             };
-            answer = answer.with_fact("signs", &Equation::new(&self.model, section)?.switching_functions());
+            answer = answer
+                .with_fact("signs", &Equation::new(&self.model, section)?.switching_functions());
         }
         match &outcome.ending {
             Ending::Finished => {}
             Ending::Stopped(event) => answer = answer.with_fact("stopped_by", event),
             Ending::Zeno { event, t, error } => {
-                answer = answer.with_fact("zeno", &json!({ "event": event, "t": t, "error": error }));
+                answer =
+                    answer.with_fact("zeno", &json!({ "event": event, "t": t, "error": error }));
             }
             Ending::Interrupted => {}
         }
@@ -279,8 +293,9 @@ impl Question for GeneralOrbit {
         self.settle
     }
 
-    /// Facts: `states` (their names), `point`, `period`, `multipliers` (real and imaginary parts, the largest first) and `gap` (how far the orbit is from closed,
-    /// relative to its largest state).
+    /// Facts: `states` (their names), `point`, `period`, `multipliers` (real and imaginary parts,
+    /// the largest first) and `gap` (how far the orbit is from closed, relative to its largest
+    /// state).
     fn compute(&self, _: &Executor<'_>, monitor: &dyn Monitor) -> Result<Answer, JobError> {
         let GeneralRun { model, options } = &self.run;
         let mut options = options.clone();
@@ -291,8 +306,13 @@ impl Question for GeneralOrbit {
         };
         if settle > 0.0 {
             let t_end = options.t_start + settle;
-            let settling = Options { t_end, record: Record::Times { every: f64::INFINITY }, ..options.clone() };
-            let end = follow(model, &settling, &mut |point| monitor.reached(point.t).is_continue())?;
+            let settling = Options {
+                t_end,
+                record: Record::Times { every: f64::INFINITY },
+                ..options.clone()
+            };
+            let end =
+                follow(model, &settling, &mut |point| monitor.reached(point.t).is_continue())?;
             if end.ending == Ending::Interrupted {
                 return Err(JobError::Interrupted);
             }
@@ -355,7 +375,10 @@ impl Question for GeneralExponents {
             .values
             .iter()
             .zip(&found.errors)
-            .map(|(value, error)| MeanRate { value: value.is_finite().then_some(*value), half_width: *error })
+            .map(|(value, error)| MeanRate {
+                value: value.is_finite().then_some(*value),
+                half_width: *error,
+            })
             .collect();
         Ok(Answer::of_tables(Vec::new())
             .with_fact("from", &found.times.0)
@@ -392,19 +415,27 @@ impl Question for GeneralSensitivities {
         self.run.cost() * (self.run.model.coordinates().len() + self.by.len()) as f64
     }
 
-    /// The table `sensitivities` has a row a state: its name, its `value` at the end and its derivatives by each component of the start (`start.x`) and by each
-    /// parameter (`params.p`). Fact: `t`, when the run ended.
+    /// The table `sensitivities` has a row a state: its name, its `value` at the end and its
+    /// derivatives by each component of the start (`start.x`) and by each parameter (`params.p`).
+    /// Fact: `t`, when the run ended.
     fn compute(&self, _: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
         let by: Vec<&str> = self.by.iter().map(String::as_str).collect();
         let found = sensitivities(&self.run.model, &self.run.options, &by)?;
         let states = self.run.model.coordinates();
-        let names = states.iter().map(|s| format!("start.{s}")).chain(by.iter().map(|p| format!("params.{p}")));
+        let names = states
+            .iter()
+            .map(|s| format!("start.{s}"))
+            .chain(by.iter().map(|p| format!("params.{p}")));
         let mut columns = vec![Column::words("state"), Column::numbers("value")];
         columns.extend(names.map(|name| Column::numbers(&name)));
         let mut table = Table::new("sensitivities", columns);
         for (i, state) in states.iter().enumerate() {
-            let row = [found.x[i]].into_iter().chain(found.by_start[i].iter().chain(&found.by_parameter[i]).copied());
-            table.push(std::iter::once(Entry::Word((*state).to_owned())).chain(row.map(Entry::Number)));
+            let row = [found.x[i]]
+                .into_iter()
+                .chain(found.by_start[i].iter().chain(&found.by_parameter[i]).copied());
+            table.push(
+                std::iter::once(Entry::Word((*state).to_owned())).chain(row.map(Entry::Number)),
+            );
         }
         Ok(Answer::of_tables(vec![table]).with_fact("t", &found.t))
     }
@@ -480,7 +511,8 @@ pub enum RestPlace {
         surfaces: Vec<String>,
         /// Of each, the share of the fields with the function above zero.
         weights: Vec<f64>,
-        /// Whether motion comes to all of them, or leaves one; nothing if that depends on how fast each of them switches.
+        /// Whether motion comes to all of them, or leaves one; nothing if that depends on how fast
+        /// each of them switches.
         attracting: Option<bool>,
     },
     /// In a field, away from surfaces.
@@ -522,13 +554,18 @@ impl Question for GeneralRests {
                         attracting: rest.attracting,
                     },
                 },
-                family: rest.family.as_ref().map(|f| Family { dimension: f.dimension, ends: f.ends.clone() }),
+                family: rest
+                    .family
+                    .as_ref()
+                    .map(|f| Family { dimension: f.dimension, ends: f.ends.clone() }),
                 eigenvalues: rest.eigenvalues.clone(),
                 kind: rest.kind(),
                 behind: rest.behind.clone(),
             })
             .collect();
-        Ok(Answer::of_tables(Vec::new()).with_fact("states", &self.model.coordinates()).with_fact("rests", &list))
+        Ok(Answer::of_tables(Vec::new())
+            .with_fact("states", &self.model.coordinates())
+            .with_fact("rests", &list))
     }
 }
 
@@ -543,11 +580,12 @@ mod tests {
 
     const DRIVEN: &str = "states = ['x']\nstart = [0]\nf = ['-x + 4*if(mod(t, 1) < 0.5, 1, 0)']";
 
-    /// x' = -x + 4 in the first half of each period of 1, -x in the other: the multiplier is 1/e, and from x at the period's start it is
-    /// x/e + 4 (1 - e^(-1/2)) e^(-1/2) at its end.
+    /// x' = -x + 4 in the first half of each period of 1, -x in the other: the multiplier is 1/e,
+    /// and from x at the period's start it is x/e + 4 (1 - e^(-1/2)) e^(-1/2) at its end.
     #[test]
     fn a_driven_orbit_closes_as_its_formula_says() {
-        let question = GeneralOrbit { run: run(DRIVEN, 10.0), settle: 0.5, after: Return::Period(1.0) };
+        let question =
+            GeneralOrbit { run: run(DRIVEN, 10.0), settle: 0.5, after: Return::Period(1.0) };
         let answer = Executor::quiet().ask(&question).unwrap();
         let point: Vec<f64> = answer.fact("point").unwrap();
         let multipliers: Vec<[f64; 2]> = answer.fact("multipliers").unwrap();
@@ -564,7 +602,8 @@ mod tests {
             [[event]]\nfrom = 'a'\nwhen = 'x - 1'\ndirection = 'up'\nmode = 'b'\n\
             [[event]]\nfrom = 'b'\nwhen = 'x - 2'\ndirection = 'up'\nmode = 'a'\nset = { x = 0 }";
         let mut run = run(text, 10.0);
-        run.options.record = Record::Section(twofold_system::Expression::parse_general("x - 0.5", &["x"]).unwrap());
+        run.options.record =
+            Record::Section(twofold_system::Expression::parse_general("x - 0.5", &["x"]).unwrap());
         let question = GeneralOrbit { run, settle: 1.5, after: Return::Crossings(1) };
         let period: f64 = Executor::quiet().ask(&question).unwrap().fact("period").unwrap();
         assert!((period - 2.0).abs() < 1e-9, "{period}");

@@ -12,13 +12,16 @@ use super::spec::{MethodSpec, Observation, RunSpec, SpecError, finest_extended};
 use super::table::{Column, Entry, Table};
 use twofold_integrate::{Method, Monitor, PRECISIONS, Tolerance, taylor};
 
-/// The time up to which an orbit computed with [`Method::TaylorExtended`] agrees with two others: one of the next precision, at
-/// its finest tolerance, and one of the same precision and another order. Rounding shows in the first comparison, the series' truncation in both.
+/// The time up to which an orbit computed with [`Method::TaylorExtended`] agrees with two others:
+/// one of the next precision, at its finest tolerance, and one of the same precision and another
+/// order. Rounding shows in the first comparison, the series' truncation in both.
 ///
-/// Compared are the states at [`Horizon::SAMPLES`] even times, in units of 1 + the state's largest component.
+/// Compared are the states at [`Horizon::SAMPLES`] even times, in units of 1 + the state's largest
+/// component.
 ///
-/// Facts: `horizon`, the last of these times before the first at which either differs by more than `within`; `by_precision` and `by_order`, the same for
-/// each alone; `precision`, `other_precision`, `order`, `other_order`. Table `horizon`: the differences at each time.
+/// Facts: `horizon`, the last of these times before the first at which either differs by more than
+/// `within`; `by_precision` and `by_order`, the same for each alone; `precision`,
+/// `other_precision`, `order`, `other_order`. Table `horizon`: the differences at each time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Horizon {
     /// The orbit. Its observation is ignored.
@@ -47,7 +50,8 @@ impl Question for Horizon {
     }
 
     fn json(&self) -> Value {
-        json!({ "run": Run(self.run.clone()).json(), "within": self.within, "more_degrees": MORE_DEGREES })
+        json!({ "run": Run(self.run.clone()).json(), "within": self.within,
+            "more_degrees": MORE_DEGREES })
     }
 
     fn label(&self) -> String {
@@ -61,15 +65,19 @@ impl Question for Horizon {
     fn compute(&self, executor: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
         let method = &self.run.method;
         if method.name != Method::TaylorExtended {
-            let rule =
-                "only orbits of taylor-extended have a horizon: other methods' errors are those of their tolerance";
-            return Err(SpecError { field: "method", value: method.name.name().to_owned(), rule }.into());
+            let rule = "only orbits of taylor-extended have a horizon: other methods' errors are \
+                those of their tolerance";
+            return Err(
+                SpecError { field: "method", value: method.name.name().to_owned(), rule }.into()
+            );
         }
         let bits = method.precision.unwrap_or(PRECISIONS[0]);
-        // Of the highest precision there is no better one: it is compared with the next lower, whose horizon it then shows.
+        // Of the highest precision there is no better one: it is compared with the next lower,
+        // whose horizon it then shows.
         let at = PRECISIONS.iter().position(|b| *b == bits).unwrap_or(0);
         let other = PRECISIONS.get(at + 1).copied().unwrap_or(PRECISIONS[PRECISIONS.len() - 2]);
-        let order = method.order.unwrap_or(taylor::order_for(method.tolerance, finest_extended(bits)));
+        let order =
+            method.order.unwrap_or(taylor::order_for(method.tolerance, finest_extended(bits)));
         let finest = Tolerance { rtol: finest_extended(other), atol: finest_extended(other) };
         let runs = [
             self.variant(bits, method.order, method.tolerance),
@@ -80,18 +88,27 @@ impl Question for Horizon {
         let answers = runs.iter().map(|r| executor.ask(&**r)).collect::<Result<Vec<_>, _>>()?;
         let names = self.run.system.coordinates();
         let rows = answers.iter().map(|a| a.tables[0].len()).min().unwrap_or(0);
-        let stop = answers.iter().map(|a| a.stop).find(|s| *s != Stop::Finished).unwrap_or(Stop::Finished);
+        let stop =
+            answers.iter().map(|a| a.stop).find(|s| *s != Stop::Finished).unwrap_or(Stop::Finished);
         // States by answer and coordinate.
-        let columns: Vec<Vec<&[f64]>> =
-            answers.iter().map(|a| names.iter().map(|n| a.tables[0].numbers(n)).collect()).collect();
-        let mut table = Table::new("horizon", ["t", "by_precision", "by_order"].map(Column::numbers));
+        let columns: Vec<Vec<&[f64]>> = answers
+            .iter()
+            .map(|a| names.iter().map(|n| a.tables[0].numbers(n)).collect())
+            .collect();
+        let mut table =
+            Table::new("horizon", ["t", "by_precision", "by_order"].map(Column::numbers));
         let mut horizons = [None::<f64>; 2];
         let mut before = 0.0;
         for row in 0..rows {
             let t = answers[0].tables[0].numbers("t")[row];
             let size = 1.0 + columns[0].iter().map(|c| c[row].abs()).fold(0.0, f64::max);
             let apart = [1, 2].map(|k| {
-                columns[0].iter().zip(&columns[k]).map(|(a, b)| (a[row] - b[row]).abs()).fold(0.0, f64::max) / size
+                columns[0]
+                    .iter()
+                    .zip(&columns[k])
+                    .map(|(a, b)| (a[row] - b[row]).abs())
+                    .fold(0.0, f64::max)
+                    / size
             });
             for (horizon, apart) in horizons.iter_mut().zip(apart) {
                 if horizon.is_none() && apart > self.within {
@@ -153,7 +170,8 @@ mod tests {
             assert_eq!(fact("horizon"), fact("by_precision").min(fact("by_order")));
             fact("horizon")
         };
-        // Up to the first visit to the singularity, at about t = 13, little is lost; there 1e-15 becomes visible.
+        // Up to the first visit to the singularity, at about t = 13, little is lost; there 1e-15
+        // becomes visible.
         let coarse = horizon(1e-15);
         assert!(coarse < 16.0 && coarse > 10.0, "{coarse}");
         assert_eq!(horizon(1e-32), 20.0);
@@ -174,12 +192,16 @@ mod tests {
         {
             let answer = decay(precision, Some(30), rtol).compute(&Executor::quiet(), &()).unwrap();
             let fact = |name: &str| answer.fact::<u16>(name).unwrap();
-            assert_eq!([fact("precision"), fact("other_precision"), fact("order")], [bits, other, 30]);
+            assert_eq!(
+                [fact("precision"), fact("other_precision"), fact("order")],
+                [bits, other, 30]
+            );
             assert_eq!(fact("other_order"), 38);
         }
     }
 
-    /// Of the order 4 against the solution, which the other precision has to all its digits, and against the order 12: in units of 1 + the largest state.
+    /// Of the order 4 against the solution, which the other precision has to all its digits, and
+    /// against the order 12: in units of 1 + the largest state.
     #[test]
     fn differences_are_in_units_of_one_and_the_state() {
         let mut horizon = decay(None, Some(4), 1e-6);
@@ -203,7 +225,9 @@ mod tests {
                 let found = table.numbers(column)[row];
                 assert!((found - wanted).abs() < 1e-15, "{column} {t}: {found:e} {wanted:e}");
             }
-            if table.numbers("by_precision")[row].max(table.numbers("by_order")[row]) > horizon.within {
+            if table.numbers("by_precision")[row].max(table.numbers("by_order")[row])
+                > horizon.within
+            {
                 first_beyond = first_beyond.or(Some(row));
             }
         }
@@ -236,8 +260,9 @@ mod tests {
 
     #[test]
     fn other_methods_have_none() {
-        let error =
-            Horizon { run: run(Method::Lsoda, 1e-9), within: 1e-9 }.compute(&Executor::quiet(), &()).unwrap_err();
+        let error = Horizon { run: run(Method::Lsoda, 1e-9), within: 1e-9 }
+            .compute(&Executor::quiet(), &())
+            .unwrap_err();
         assert!(error.to_string().contains("taylor-extended"), "{error}");
     }
 }

@@ -1,8 +1,9 @@
 //! The job: a question as data, its computation, and its answer.
 //!
-//! A [`Question`] says everything that a computation depends on. Its [`Answer`] is named columns with units, facts, the work that
-//! it took, and why it ended. An [`Executor`] computes each question once and keeps answers in a [`Store`]. Everything that is shown, checked
-//! or published is a view of answers.
+//! A [`Question`] says everything that a computation depends on. Its [`Answer`] is named columns
+//! with units, facts, the work that it took, and why it ended. An [`Executor`] computes each
+//! question once and keeps answers in a [`Store`]. Everything that is shown, checked or published
+//! is a view of answers.
 //!
 //! | question | asks |
 //! |---|---|
@@ -38,7 +39,8 @@
 //! # Ok::<(), twofold_job::JobError>(())
 //! ```
 #![forbid(unsafe_code)]
-#![cfg_attr(test, allow(clippy::disallowed_methods))] // tests compare with tolerances, not with hashes
+// tests compare with tolerances, not with hashes
+#![cfg_attr(test, allow(clippy::disallowed_methods))]
 
 pub mod answer;
 pub mod classification;

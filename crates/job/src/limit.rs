@@ -18,7 +18,8 @@ use twofold_integrate::Monitor;
 use twofold_integrate::filippov::Mode;
 use twofold_system::{System, Transition};
 
-/// Distance of smoothed orbits from the Filippov orbit before its first visit to a two-fold. Table `before`: a row per eps and time.
+/// Distance of smoothed orbits from the Filippov orbit before its first visit to a two-fold. Table
+/// `before`: a row per eps and time.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SmoothingLimit {
     /// The system.
@@ -46,19 +47,28 @@ impl Question for SmoothingLimit {
 
     fn compute(&self, _: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
         let found = instances::sliding(&self.system)?.convergence(&self.compared)?;
-        let columns =
-            [Column::numbers("eps"), Column::numbers("t"), Column::words("mode"), Column::numbers("distance")];
+        let columns = [
+            Column::numbers("eps"),
+            Column::numbers("t"),
+            Column::words("mode"),
+            Column::numbers("distance"),
+        ];
         let mut table = Table::new("before", columns);
         for row in &found.rows {
             let mode = if row.mode == Mode::SlidingAttracting { "sliding" } else { "free" };
             table.push([row.eps.into(), row.t.into(), mode.into(), row.distance.into()]);
         }
-        Ok(Answer { statistics: Some(found.statistics), stop: Stop::Finished, ..Answer::of_tables(vec![table]) })
+        Ok(Answer {
+            statistics: Some(found.statistics),
+            stop: Stop::Finished,
+            ..Answer::of_tables(vec![table])
+        })
     }
 }
 
-/// Where smoothed orbits go after the first visit to a two-fold, and the member of the funnel of Filippov futures that goes nearest. Tables: `funnel`, a
-/// row per future that makes the crossing; `after`, a row per eps. Facts: `t_visit`, `width` (the funnel's, at the crossing).
+/// Where smoothed orbits go after the first visit to a two-fold, and the member of the funnel of
+/// Filippov futures that goes nearest. Tables: `funnel`, a row per future that makes the crossing;
+/// `after`, a row per eps. Facts: `t_visit`, `width` (the funnel's, at the crossing).
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct AfterVisit {
     /// The system.
@@ -75,7 +85,10 @@ impl AfterVisit {
     fn passages(&self) -> Result<Vec<TwoFoldPassage>, JobError> {
         let AfterVisitQuestion { start, eps, beyond, t_end, .. } = &self.compared;
         let [x, y, z] = start[..] else {
-            return Err(JobError::Other(format!("the start has {} components, not three", start.len())));
+            return Err(JobError::Other(format!(
+                "the start has {} components, not three",
+                start.len()
+            )));
         };
         let followed = PassageQuestion::far([x, y, z], *beyond, *t_end);
         let passage = |&eps: &f64| {
@@ -93,7 +106,8 @@ impl AfterVisit {
             let eps = passage.eps;
             let answer = executor.ask(&passage)?;
             let far = |c: &str| answer.table("passage").and_then(|t| t.numbers(c).first().copied());
-            let place: Option<Vec<f64>> = ["far_x", "far_y", "far_z"].into_iter().map(far).collect();
+            let place: Option<Vec<f64>> =
+                ["far_x", "far_y", "far_z"].into_iter().map(far).collect();
             found.push((eps, place.filter(|p| p.iter().all(|c| c.is_finite()))));
         }
         Ok(found)
@@ -118,21 +132,34 @@ impl Question for AfterVisit {
     }
 
     fn rests_on(&self) -> Vec<AnyQuestion> {
-        self.passages().unwrap_or_default().into_iter().map(|passage| Arc::new(passage) as _).collect()
+        self.passages()
+            .unwrap_or_default()
+            .into_iter()
+            .map(|passage| Arc::new(passage) as _)
+            .collect()
     }
 
     fn compute(&self, executor: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
         let crossings = self.smoothed(executor)?;
-        let mut crossing = |eps: f64| Ok(crossings.iter().find(|c| c.0 == eps).and_then(|c| c.1.clone()));
+        let mut crossing =
+            |eps: f64| Ok(crossings.iter().find(|c| c.0 == eps).and_then(|c| c.1.clone()));
         let found = instances::sliding(&self.system)?.after_visit(&self.compared, &mut crossing)?;
-        let kinds = |name: &str| if name.ends_with("side") { Column::words(name) } else { Column::numbers(name) };
+        let kinds = |name: &str| {
+            if name.ends_with("side") { Column::words(name) } else { Column::numbers(name) }
+        };
         let names = self.system.coordinates();
         let (b, c) = (names[1], names[2]);
         let mut members = Table::new("funnel", ["exit_time", "side", b, c].map(kinds));
         for m in &found.members {
-            members.push([m.exit_time.into(), side_word(m.side).into(), m.crossing[1].into(), m.crossing[2].into()]);
+            members.push([
+                m.exit_time.into(),
+                side_word(m.side).into(),
+                m.crossing[1].into(),
+                m.crossing[2].into(),
+            ]);
         }
-        let columns = ["eps", b, c, "nearest_exit_time", "nearest_side", "distance", "width", "t_visit"];
+        let columns =
+            ["eps", b, c, "nearest_exit_time", "nearest_side", "distance", "width", "t_visit"];
         let mut after = Table::new("after", columns.map(kinds));
         for r in &found.rows {
             let mut row: Vec<Entry> =
@@ -160,13 +187,19 @@ mod tests {
         Caricature::with_reinjection(0.1, 1e-5).into()
     }
 
-    /// Free at t = 2, sliding at t = 9, before the visit at t = 13.196: distances of first order in eps. A file's equations say the same.
+    /// Free at t = 2, sliding at t = 9, before the visit at t = 13.196: distances of first order in
+    /// eps. A file's equations say the same.
     #[test]
     fn distances_before_the_visit_halve_with_eps() {
         let (eps, times) = (vec![4e-3, 2e-3], vec![2.0, 9.0]);
-        let compared =
-            ConvergenceQuestion { start: vec![0.2, 0.0, -1.0], times, eps, settings: FilippovOptions::default() };
-        let recorded = cases::of(&caricature().definition().to_toml().replace("\"-y\"", "\"0 - y\""));
+        let compared = ConvergenceQuestion {
+            start: vec![0.2, 0.0, -1.0],
+            times,
+            eps,
+            settings: FilippovOptions::default(),
+        };
+        let recorded =
+            cases::of(&caricature().definition().to_toml().replace("\"-y\"", "\"0 - y\""));
         let tables = [caricature(), recorded].map(|system| {
             let question = SmoothingLimit { system, compared: compared.clone() };
             question.compute(&Executor::quiet(), &()).unwrap().tables.remove(0)
@@ -181,14 +214,25 @@ mod tests {
         for k in 0..2 {
             assert!((distance[k] / distance[k + 2] - 2.0).abs() < 0.2, "{distance:?}");
         }
-        assert!(distance.iter().zip(tables[1].numbers("distance")).all(|(a, b)| (a - b).abs() < 1e-6 * a));
+        assert!(
+            distance
+                .iter()
+                .zip(tables[1].numbers("distance"))
+                .all(|(a, b)| (a - b).abs() < 1e-6 * a)
+        );
     }
 
     /// Crossings that are known already, one of which never came so far.
     #[test]
     fn where_smoothed_orbits_cross_is_their_passages_far_place() {
-        let grid =
-            FunnelGrid { shortest: 0.1, longest: 1.0, times: 3, horizon: 5.0, until_two_fold: true, per_step: 1 };
+        let grid = FunnelGrid {
+            shortest: 0.1,
+            longest: 1.0,
+            times: 3,
+            horizon: 5.0,
+            until_two_fold: true,
+            per_step: 1,
+        };
         let mut question = AfterVisit {
             system: caricature(),
             compared: AfterVisitQuestion {
@@ -216,11 +260,20 @@ mod tests {
         assert_eq!(question.smoothed(&executor).unwrap(), crossings);
         // So the table after the visit has the one place, and no row of the other.
         let after = question.compute(&executor, &()).unwrap().tables.remove(1);
-        assert_eq!([after.numbers("eps"), after.numbers("y"), after.numbers("z")], [[1e-2], [2.0], [3.0]]);
+        assert_eq!(
+            [after.numbers("eps"), after.numbers("y"), after.numbers("z")],
+            [[1e-2], [2.0], [3.0]]
+        );
         let keys: Vec<_> = question.rests_on().iter().map(|q| key(&**q)).collect();
         assert_eq!(keys, passages.iter().map(|p| key(p)).collect::<Vec<_>>());
         question.compared.start.pop();
         assert!(question.rests_on().is_empty());
-        assert!(question.compute(&executor, &()).unwrap_err().to_string().contains("2 components, not three"));
+        assert!(
+            question
+                .compute(&executor, &())
+                .unwrap_err()
+                .to_string()
+                .contains("2 components, not three")
+        );
     }
 }

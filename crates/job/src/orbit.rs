@@ -13,7 +13,9 @@ use super::rest::{self, Rest};
 use super::run::Run;
 use super::spec::{Observation, RunSpec, SpecError, SwitchSpec};
 use super::table::{Column, Entry, Table};
-use twofold_analyse::branch::{self, BranchOptions, End, Newton, Obstacle, Orbit, ReturnMap, Trouble};
+use twofold_analyse::branch::{
+    self, BranchOptions, End, Newton, Obstacle, Orbit, ReturnMap, Trouble,
+};
 use twofold_analyse::filippov_return;
 use twofold_analyse::floquet::{self, ReturnPlane, Returned};
 use twofold_instances::{Motions, Returns};
@@ -22,14 +24,17 @@ use twofold_num::elementary::sqrt;
 use twofold_num::tape::Program;
 use twofold_system::{Bound, BoundField, Field, System};
 
-/// The closed orbit through a plane near a start, by Newton's method, and its branch along a parameter if one is named.
+/// The closed orbit through a plane near a start, by Newton's method, and its branch along a
+/// parameter if one is named.
 ///
-/// Smoothed and hysteretic systems: the return map's derivative is exact (variational equation). Discontinuous ones: by differences,
-/// through crossings and sliding; grazing and set-valued orbits are refused (see [`filippov_return`]).
+/// Smoothed and hysteretic systems: the return map's derivative is exact (variational equation).
+/// Discontinuous ones: by differences, through crossings and sliding; grazing and set-valued orbits
+/// are refused (see [`filippov_return`]).
 ///
-/// Tables: `orbit` (its crossings of the plane), `branch` (a row per orbit) and `bifurcations` if a parameter is followed. Facts: `period`,
-/// `multipliers` (real, imaginary), `multiplier_error`, `stability`, `largest_modulus`, `rate`, `residual`, `iterations`, `returns`, `point`; `end` of the branch.
-/// Where the motion comes to a rest: the table `rest` and the fact `rest` alone.
+/// Tables: `orbit` (its crossings of the plane), `branch` (a row per orbit) and `bifurcations` if a
+/// parameter is followed. Facts: `period`, `multipliers` (real, imaginary), `multiplier_error`,
+/// `stability`, `largest_modulus`, `rate`, `residual`, `iterations`, `returns`, `point`; `end` of
+/// the branch. Where the motion comes to a rest: the table `rest` and the fact `rest` alone.
 ///
 /// ```
 /// use twofold_analyse::floquet::ReturnPlane;
@@ -78,11 +83,13 @@ fn has_past(switch: SwitchSpec) -> Option<SpecError> {
     let (value, rule) = match switch {
         SwitchSpec::Delayed { .. } => (
             "delayed",
-            "a closed orbit of a delayed switch is a closed path of pasts, which this method does not look for; see what a long run settles on",
+            "a closed orbit of a delayed switch is a closed path of pasts, which this method does \
+                not look for; see what a long run settles on",
         ),
         SwitchSpec::Relay { .. } => (
             "relay",
-            "a closed orbit of a relay with memory has its mode as a state, which this method does not carry; see what a long run settles on",
+            "a closed orbit of a relay with memory has its mode as a state, which this method does \
+                not carry; see what a long run settles on",
         ),
         _ => return None,
     };
@@ -104,10 +111,12 @@ pub struct Along {
     pub most: usize,
 }
 
-/// Largest |P(u) - u| that counts as closed, in relative tolerances of the orbit's extent; and never less than [`LEAST_CLOSED`].
+/// Largest |P(u) - u| that counts as closed, in relative tolerances of the orbit's extent; and
+/// never less than [`LEAST_CLOSED`].
 const CLOSED: f64 = 100.0;
 const LEAST_CLOSED: f64 = 1e-10;
-/// Returns from which the loop's size is taken: the first may have been computed with too large an error.
+/// Returns from which the loop's size is taken: the first may have been computed with too large an
+/// error.
 const SIZINGS: usize = 2;
 /// A search that has come to a rest to this share of its way has found the rest.
 const AT_REST: f64 = 1e-3;
@@ -117,7 +126,8 @@ const ROUGHLY: f64 = 10.0;
 const ITERATIONS: usize = 30;
 /// Most returns that are looked for in a settled motion.
 const MOST_RETURNS: usize = 32;
-/// Two crossings this near, in shares of their size, are taken for one when returns are counted: Newton's method then decides.
+/// Two crossings this near, in shares of their size, are taken for one when returns are counted:
+/// Newton's method then decides.
 const SAME_PASSAGE: f64 = 1e-3;
 /// Systems with up to so many states; a hysteretic switch adds one.
 const MOST_STATES: usize = 8;
@@ -150,14 +160,21 @@ impl Question for ClosedOrbit {
             Guess::Rest(rest) => return Ok(self.at_rest(&rest)),
         };
         let value = self.along.as_ref().map_or(0.0, |a| a.from);
-        let mut map = Map { question: self, returns, tolerance: self.tolerance, failure: RefCell::new(None) };
+        let mut map =
+            Map { question: self, returns, tolerance: self.tolerance, failure: RefCell::new(None) };
         // The absolute error is one of the loop's size, whatever its unit.
         for _ in 0..SIZINGS {
             let Ok(r) = map.returned(&guess, value, false) else { break };
-            map.tolerance.atol = self.tolerance.atol.min(self.tolerance.rtol * r.extent).max(f64::MIN_POSITIVE);
+            map.tolerance.atol =
+                self.tolerance.atol.min(self.tolerance.rtol * r.extent).max(f64::MIN_POSITIVE);
         }
         let Tolerance { rtol, atol } = map.tolerance;
-        let newton = Newton { closed: (CLOSED * rtol).max(LEAST_CLOSED), atol, rtol, iterations: ITERATIONS };
+        let newton = Newton {
+            closed: (CLOSED * rtol).max(LEAST_CLOSED),
+            atol,
+            rtol,
+            iterations: ITERATIONS,
+        };
         let first = match branch::closed_orbit(&map, &guess, value, newton) {
             Ok(first) => first,
             Err(trouble) => {
@@ -177,8 +194,9 @@ impl Question for ClosedOrbit {
             newton,
         };
         let width = (along.to - along.from).abs();
-        let mut go_on =
-            |orbit: &Orbit| monitor.reached(((orbit.parameter - along.from) / width).abs().min(1.0)).is_continue();
+        let mut go_on = |orbit: &Orbit| {
+            monitor.reached(((orbit.parameter - along.from) / width).abs().min(1.0)).is_continue()
+        };
         let found = branch::follow(&map, first, &options, &mut go_on);
         if found.end == End::Interrupted {
             answer.stop = Stop::Interrupted;
@@ -186,7 +204,11 @@ impl Question for ClosedOrbit {
         answer.tables.push(self.branch_table(&found.orbits));
         let mut table = Table::new(
             "bifurcations",
-            [Column::words("change"), Column::numbers(&along.parameter), Column::numbers("uncertainty")],
+            [
+                Column::words("change"),
+                Column::numbers(&along.parameter),
+                Column::numbers("uncertainty"),
+            ],
         );
         for b in &found.bifurcations {
             table.push([b.change.word().into(), b.parameter.into(), b.uncertainty.into()]);
@@ -209,11 +231,19 @@ enum Guess {
 
 impl ClosedOrbit {
     /// The rest that the search came to, if it came to one.
-    fn rest_instead(&self, trouble: &Trouble, guess: &[f64], value: f64) -> Result<Option<Rest>, JobError> {
+    fn rest_instead(
+        &self,
+        trouble: &Trouble,
+        guess: &[f64],
+        value: f64,
+    ) -> Result<Option<Rest>, JobError> {
         let Obstacle::Point(point) = &trouble.obstacle else { return Ok(None) };
         let (system, switch) = self.at(value)?;
-        let apart = |a: &[f64], b: &[f64]| sqrt(a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum());
-        let there = |r: &Rest| apart(&r.state, point) <= AT_REST * apart(&r.state, guess).max(apart(point, guess));
+        let apart =
+            |a: &[f64], b: &[f64]| sqrt(a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum());
+        let there = |r: &Rest| {
+            apart(&r.state, point) <= AT_REST * apart(&r.state, guess).max(apart(point, guess))
+        };
         Ok(rest::near(&system, switch, point).filter(there))
     }
 
@@ -249,7 +279,11 @@ impl ClosedOrbit {
             for end in [along.from, along.to] {
                 if let Err(error) = self.at(end) {
                     let value = format!("\"{}\" ({error})", along.parameter);
-                    return wrong("along", value, "name a parameter of the system and values that it may have, or eps");
+                    return wrong(
+                        "along",
+                        value,
+                        "name a parameter of the system and values that it may have, or eps",
+                    );
                 }
             }
             if along.from == along.to || along.steps == 0 {
@@ -264,7 +298,8 @@ impl ClosedOrbit {
             return wrong(
                 "returns",
                 "0".into(),
-                "a closed orbit crosses its plane at least once per turn: ask for one return or more",
+                "a closed orbit crosses its plane at least once per turn: ask for one return or \
+                    more",
             );
         }
         Ok(())
@@ -282,13 +317,19 @@ impl ClosedOrbit {
                     SwitchSpec::Hysteretic { eps: value, eps_prime, relaxation, phi0 }
                 }
                 SwitchSpec::Filippov { .. } => {
-                    return Err(JobError::Other("the discontinuous system has no eps to follow".into()));
+                    return Err(JobError::Other(
+                        "the discontinuous system has no eps to follow".into(),
+                    ));
                 }
                 _ => return Err(JobError::Other(format!("eps = {value}: it is above 0"))),
             };
             return Ok((self.system.clone(), switch));
         }
-        let system = self.system.clone().with(&along.parameter, value).map_err(|e| JobError::Other(e.to_string()))?;
+        let system = self
+            .system
+            .clone()
+            .with(&along.parameter, value)
+            .map_err(|e| JobError::Other(e.to_string()))?;
         Ok((system, self.switch))
     }
 
@@ -311,7 +352,10 @@ impl ClosedOrbit {
                     order: None,
                 },
                 schedule: Schedule::default(),
-                observe: Observation::Section { coordinate: self.plane.axis, value: self.plane.value },
+                observe: Observation::Section {
+                    coordinate: self.plane.axis,
+                    value: self.plane.value,
+                },
             };
             let settled = executor.ask(&Run(spec.clone()))?;
             if settled.stop == Stop::Interrupted {
@@ -320,15 +364,23 @@ impl ClosedOrbit {
             if let Some(rest) = rest::at_end(executor, &spec, &settled)? {
                 return Ok(Guess::Rest(rest));
             }
-            let section = settled.table("section").ok_or_else(|| JobError::Other("a section was asked for".into()))?;
-            let columns: Vec<&[f64]> = system.coordinates().iter().map(|name| section.numbers(name)).collect();
+            let section = settled
+                .table("section")
+                .ok_or_else(|| JobError::Other("a section was asked for".into()))?;
+            let columns: Vec<&[f64]> =
+                system.coordinates().iter().map(|name| section.numbers(name)).collect();
             let wanted = if self.plane.upward { "up" } else { "down" };
-            let rows: Vec<usize> =
-                section.words("direction").enumerate().filter(|(_, w)| *w == wanted).map(|(row, _)| row).collect();
+            let rows: Vec<usize> = section
+                .words("direction")
+                .enumerate()
+                .filter(|(_, w)| *w == wanted)
+                .map(|(row, _)| row)
+                .collect();
             let state = |row: usize| columns.iter().map(|c| c[row]).collect::<Vec<f64>>();
             let Some(last) = rows.last() else {
                 return Err(JobError::Other(format!(
-                    "the motion from the start does not pass the plane {}wards within t = {}: choose another plane or start, or \
+                    "the motion from the start does not pass the plane {}wards within t = {}: \
+                        choose another plane or start, or \
                      let it settle for longer",
                     wanted, self.settle
                 )));
@@ -339,8 +391,9 @@ impl ClosedOrbit {
                 let d = state(row).iter().zip(&point).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
                 sqrt(d) < SAME_PASSAGE * size
             };
-            returns =
-                returns.or_else(|| (1..=MOST_RETURNS.min(rows.len() - 1)).find(|k| near(rows[rows.len() - 1 - k])));
+            returns = returns.or_else(|| {
+                (1..=MOST_RETURNS.min(rows.len() - 1)).find(|k| near(rows[rows.len() - 1 - k]))
+            });
         }
         point[self.plane.axis] = self.plane.value;
         if let SwitchSpec::Hysteretic { .. } = switch {
@@ -357,7 +410,8 @@ impl ClosedOrbit {
     }
 
     fn names(&self) -> Vec<String> {
-        let mut names: Vec<String> = self.system.coordinates().into_iter().map(Into::into).collect();
+        let mut names: Vec<String> =
+            self.system.coordinates().into_iter().map(Into::into).collect();
         if self.states() > names.len() {
             names.push(if names.iter().any(|n| n == "phi") { "phi_".into() } else { "phi".into() });
         }
@@ -390,18 +444,21 @@ impl ClosedOrbit {
     fn branch_table(&self, orbits: &[Orbit]) -> Table {
         let parameter = self.along.as_ref().map_or("", |a| a.parameter.as_str());
         let multipliers = orbits.iter().map(|o| o.multipliers.len()).max().unwrap_or(0);
-        let numbered = (1..=multipliers).flat_map(|k| [format!("multiplier{k}_re"), format!("multiplier{k}_im")]);
-        let columns = [Column::numbers(parameter), Column::numbers("period"), Column::words("stability")]
-            .into_iter()
-            .chain(self.names().into_iter().map(|n| Column::numbers(&n)))
-            .chain(numbered.map(|n| Column::numbers(&n)));
+        let numbered = (1..=multipliers)
+            .flat_map(|k| [format!("multiplier{k}_re"), format!("multiplier{k}_im")]);
+        let columns =
+            [Column::numbers(parameter), Column::numbers("period"), Column::words("stability")]
+                .into_iter()
+                .chain(self.names().into_iter().map(|n| Column::numbers(&n)))
+                .chain(numbered.map(|n| Column::numbers(&n)));
         let mut table = Table::new("branch", columns);
         for o in orbits {
-            let mut row: Vec<Entry> = vec![o.parameter.into(), o.period.into(), o.stability().word().into()];
+            let mut row: Vec<Entry> =
+                vec![o.parameter.into(), o.period.into(), o.stability().word().into()];
             row.extend(o.point.iter().map(|x| Entry::Number(*x)));
-            row.extend(
-                (0..multipliers).flat_map(|k| o.multipliers.get(k).map_or([f64::NAN; 2], |m| *m).map(Entry::Number)),
-            );
+            row.extend((0..multipliers).flat_map(|k| {
+                o.multipliers.get(k).map_or([f64::NAN; 2], |m| *m).map(Entry::Number)
+            }));
             table.push(row);
         }
         table
@@ -449,7 +506,9 @@ impl Map<'_> {
         let found = tangent.return_map(self.question.plane, self.returns, &start, settings);
         found.map_err(|error| {
             let (obstacle, said) = match error {
-                floquet::Error::Integration(failure) => (Obstacle::Other, without_tangents(failure, N).to_string()),
+                floquet::Error::Integration(failure) => {
+                    (Obstacle::Other, without_tangents(failure, N).to_string())
+                }
                 // From a rest, or beside one: whether it is, is looked at elsewhere.
                 floquet::Error::NoReturn { .. } => (Obstacle::Point(u.to_vec()), error.to_string()),
                 _ => (Obstacle::Other, error.to_string()),
@@ -471,7 +530,8 @@ impl Map<'_> {
     {
         let start = SVector::<f64, N>::from_column_slice(u);
         let system = system.bind::<N>().map_err(JobError::from)?;
-        let found = system.return_map(self.question.plane, self.returns, &start, settings, derivative);
+        let found =
+            system.return_map(self.question.plane, self.returns, &start, settings, derivative);
         found.map_err(|error| {
             let obstacle = match error {
                 filippov_return::Error::Grazing { .. } => Obstacle::Grazing,
@@ -491,7 +551,13 @@ impl Map<'_> {
         }
     }
 
-    fn find(&self, u: &[f64], p: f64, tolerance: Tolerance, derivative: bool) -> Result<Returned, Failed> {
+    fn find(
+        &self,
+        u: &[f64],
+        p: f64,
+        tolerance: Tolerance,
+        derivative: bool,
+    ) -> Result<Returned, Failed> {
         let settings = &self.settings(tolerance);
         let (system, switch) = self.question.at(p)?;
         let field = match switch {
@@ -507,7 +573,9 @@ impl Map<'_> {
                     n => Err(JobError::Other(format!("no closed orbits with {n} states")).into()),
                 };
             }
-            SwitchSpec::Delayed { .. } | SwitchSpec::Relay { .. } => unreachable!("refused by `validate`"),
+            SwitchSpec::Delayed { .. } | SwitchSpec::Relay { .. } => {
+                unreachable!("refused by `validate`")
+            }
             SwitchSpec::Smoothed { eps, transition } => Field::smoothed(&system, transition, eps),
             SwitchSpec::Hysteretic { eps, eps_prime, relaxation, .. } => {
                 Field::hysteretic(&system, eps, eps_prime, relaxation)
@@ -543,7 +611,13 @@ fn without_tangents(mut failure: Failure, states: usize) -> Failure {
 }
 
 impl Map<'_> {
-    fn tried(&self, u: &[f64], p: f64, tolerance: Tolerance, derivative: bool) -> Result<Returned, Trouble> {
+    fn tried(
+        &self,
+        u: &[f64],
+        p: f64,
+        tolerance: Tolerance,
+        derivative: bool,
+    ) -> Result<Returned, Trouble> {
         if !u.iter().all(|x| x.is_finite()) {
             return Err(format!(
                 "the search left the finite numbers; start nearer ({})",
@@ -614,14 +688,18 @@ mod tests {
         }
     }
 
-    /// Turns about the origin at unit speed, r' = side (mu r - r^3): the circle r^2 = mu has the multiplier exp(-4 pi mu side). Beside it decays at the
-    /// rates 1, 2, 3 ..., whose multipliers are exp(-2 pi k).
+    /// Turns about the origin at unit speed, r' = side (mu r - r^3): the circle r^2 = mu has the
+    /// multiplier exp(-4 pi mu side). Beside it decays at the rates 1, 2, 3 ..., whose multipliers
+    /// are exp(-2 pi k).
     fn circle(states: usize) -> System {
         let decays = 1..=states - 2;
-        let names: Vec<String> =
-            ["x".into(), "y".into()].into_iter().chain(decays.clone().map(|k| format!("a{k}"))).collect();
+        let names: Vec<String> = ["x".into(), "y".into()]
+            .into_iter()
+            .chain(decays.clone().map(|k| format!("a{k}")))
+            .collect();
         let turn = ["side*x*(mu - x*x - y*y) - y".into(), "side*y*(mu - x*x - y*y) + x".into()];
-        let field: Vec<String> = turn.into_iter().chain(decays.map(|k| format!("-{k}*a{k}"))).collect();
+        let field: Vec<String> =
+            turn.into_iter().chain(decays.map(|k| format!("-{k}*a{k}"))).collect();
         let text = format!("states = {names:?}\nh = 'x'\nplus = {field:?}\nminus = {field:?}\n");
         cases::of(&format!("{text}[parameters]\nmu = 0.1\nside = 1\n"))
     }
@@ -637,13 +715,18 @@ mod tests {
         let known = (-0.4 * PI).exp();
         for n in 2..=8 {
             for switch in switches() {
-                let answer = question(circle(n), switch, 1).compute(&Executor::quiet(), &()).unwrap();
+                let answer =
+                    question(circle(n), switch, 1).compute(&Executor::quiet(), &()).unwrap();
                 let fact = |name: &str| answer.fact::<f64>(name).unwrap();
-                let near = |a: f64, b: f64, by: f64| assert!((a - b).abs() < by, "{n} {switch:?}: {a} {b}");
+                let near = |a: f64, b: f64, by: f64| {
+                    assert!((a - b).abs() < by, "{n} {switch:?}: {a} {b}")
+                };
                 near(fact("period"), 2.0 * PI, 1e-6);
                 near(fact("largest_modulus"), known, 1e-4);
                 near(fact("rate"), 0.2, 1e-4);
-                assert!(fact("residual") < 1e-7 && fact("iterations") >= 1.0 && fact("returns") == 1.0);
+                assert!(
+                    fact("residual") < 1e-7 && fact("iterations") >= 1.0 && fact("returns") == 1.0
+                );
                 let multipliers: Vec<[f64; 2]> = answer.fact("multipliers").unwrap();
                 let phi = usize::from(matches!(switch, SwitchSpec::Hysteretic { .. }));
                 assert_eq!(multipliers.len(), n - 1 + phi);
@@ -698,7 +781,10 @@ mod tests {
             assert_eq!((answer.stop, answer.fact("end")), (Stop::Finished, Ok(End::Reached)));
             let branch = answer.table("branch").unwrap();
             let names: Vec<&str> = branch.columns.iter().map(|c| c.name.as_str()).collect();
-            assert_eq!(names, ["mu", "period", "stability", "x", "y", "multiplier1_re", "multiplier1_im"]);
+            assert_eq!(
+                names,
+                ["mu", "period", "stability", "x", "y", "multiplier1_re", "multiplier1_im"]
+            );
             let mu = branch.numbers("mu");
             assert!(mu.len() > 4 && mu[0] == from && mu[mu.len() - 1] == to, "{mu:?}");
             assert!(
@@ -723,19 +809,22 @@ mod tests {
             assert!(changes.is_empty() && changes.columns[1].name == "mu");
             // Told of each orbit but the first, in shares of the way.
             let heard = heard.0.into_inner().unwrap();
-            let shares: Vec<f64> = mu[1..].iter().map(|mu| ((mu - from) / (to - from)).min(1.0)).collect();
+            let shares: Vec<f64> =
+                mu[1..].iter().map(|mu| ((mu - from) / (to - from)).min(1.0)).collect();
             assert!(
-                heard.len() == shares.len() && heard.iter().zip(shares).all(|(a, b)| (a - b).abs() < 1e-12),
+                heard.len() == shares.len()
+                    && heard.iter().zip(shares).all(|(a, b)| (a - b).abs() < 1e-12),
                 "{heard:?}"
             );
         }
-        let cut = along(1.0, 0.1, 0.3).compute(&Executor::quiet(), &Heard(Mutex::default(), 2)).unwrap();
+        let cut =
+            along(1.0, 0.1, 0.3).compute(&Executor::quiet(), &Heard(Mutex::default(), 2)).unwrap();
         assert_eq!((cut.stop, cut.fact("end")), (Stop::Interrupted, Ok(End::Interrupted)));
         assert_eq!(cut.table("branch").unwrap().len(), 3);
     }
 
-    /// On the unit circle z is cos 2 theta: it passes 0 twice a turn in each direction, upwards at (1, -1)/sqrt 2 and opposite. What settles there is seen to come back at the
-    /// second crossing.
+    /// On the unit circle z is cos 2 theta: it passes 0 twice a turn in each direction, upwards at
+    /// (1, -1)/sqrt 2 and opposite. What settles there is seen to come back at the second crossing.
     #[test]
     fn returns_are_counted_in_the_settled_motion() {
         let field = ["x*(1 - x*x - y*y) - y", "y*(1 - x*x - y*y) + x", "-z + x*x - y*y - 4*x*y"];
@@ -747,9 +836,13 @@ mod tests {
         let orbit = answer.table("orbit").unwrap();
         assert_eq!(orbit.words("direction").collect::<Vec<_>>(), ["up", "up", "down", "down"]);
         let (x, y) = (orbit.numbers("x"), orbit.numbers("y"));
-        assert!((0..2).all(|k| (x[k] + y[k]).abs() < 1e-6) && (x[0] + x[1]).abs() < 1e-6, "{x:?} {y:?}");
+        assert!(
+            (0..2).all(|k| (x[k] + y[k]).abs() < 1e-6) && (x[0] + x[1]).abs() < 1e-6,
+            "{x:?} {y:?}"
+        );
         assert!((0..4).all(|k| (x[k].abs() - 0.5_f64.sqrt()).abs() < 1e-6));
-        for (upward, word) in [(true, "upwards within t = 40"), (false, "downwards within t = 40")] {
+        for (upward, word) in [(true, "upwards within t = 40"), (false, "downwards within t = 40")]
+        {
             let plane = ReturnPlane { axis: 2, value: 5.0, upward };
             let missed = ClosedOrbit { plane, ..question.clone() };
             let said = missed.compute(&Executor::quiet(), &()).unwrap_err().to_string();
@@ -773,19 +866,21 @@ mod tests {
         assert_eq!(long.compute(&Executor::new(None, &Never), &()), Err(JobError::Interrupted));
     }
 
-    /// Two turns beside each other, of (x, y) at unit speed and of (u, v) at a third of it and a little more: at x = 4,
-    /// where y = 0 is passed upwards, u and v are again what they were after three crossings, but for `apart`. That
-    /// counts as the same within a thousandth of 1 + 4.
+    /// Two turns beside each other, of (x, y) at unit speed and of (u, v) at a third of it and a
+    /// little more: at x = 4, where y = 0 is passed upwards, u and v are again what they were after
+    /// three crossings, but for `apart`. That counts as the same within a thousandth of 1 + 4.
     #[test]
     fn a_passage_is_the_same_within_a_thousandth_of_its_size() {
         let guess = |apart: f64, passages: f64| {
             let speed = 1.0 / 3.0 + apart / (6.0 * PI);
-            let field = ["-y".to_owned(), "x".into(), format!("-{speed:?}*v"), format!("{speed:?}*u")];
+            let field =
+                ["-y".to_owned(), "x".into(), format!("-{speed:?}*v"), format!("{speed:?}*u")];
             let field: Vec<&str> = field.iter().map(String::as_str).collect();
             let system = cases::smooth(&["x", "y", "u", "v"], "x + 9", &field);
             let start = vec![4.0 * 0.5_f64.cos(), -4.0 * 0.5_f64.sin(), 1.0, 0.0];
             let settle = 1.0 + 2.0 * PI * (passages - 1.0);
-            let question = ClosedOrbit { settle, start, ..question(system, SwitchSpec::tanh(1e-2), 1) };
+            let question =
+                ClosedOrbit { settle, start, ..question(system, SwitchSpec::tanh(1e-2), 1) };
             match question.guess(&Executor::quiet()).unwrap() {
                 Guess::Loop { point, returns } => (point, returns),
                 Guess::Rest(rest) => panic!("{rest:?}"),
@@ -793,14 +888,18 @@ mod tests {
         };
         for (apart, returns) in [(4.5e-3, 3), (5.5e-3, 1)] {
             let (point, found) = guess(apart, 6.0);
-            assert!((point[0] - 4.0).abs() < 1e-6 && point[1] == 0.0 && found == returns, "{apart}: {found} {point:?}");
+            assert!(
+                (point[0] - 4.0).abs() < 1e-6 && point[1] == 0.0 && found == returns,
+                "{apart}: {found} {point:?}"
+            );
         }
         // Three crossings are too few to see it; one return is tried.
         assert_eq!(guess(0.0, 3.0).1, 1);
         assert_eq!(guess(0.0, 4.0).1, 3);
     }
 
-    /// Not in half of the time that a turn takes; and a period is as good as the tolerance that was asked for.
+    /// Not in half of the time that a turn takes; and a period is as good as the tolerance that was
+    /// asked for.
     #[test]
     fn a_return_is_computed_as_it_is_asked_for() {
         let question = question(circle(2), SwitchSpec::tanh(1e-2), 1);
@@ -809,7 +908,9 @@ mod tests {
         assert!(said.contains(&format!("within t = {PI}")), "{said}");
         let period = |tolerance: f64| -> f64 {
             let tolerance = Tolerance { rtol: tolerance, atol: tolerance };
-            let answer = ClosedOrbit { tolerance, ..question.clone() }.compute(&Executor::quiet(), &()).unwrap();
+            let answer = ClosedOrbit { tolerance, ..question.clone() }
+                .compute(&Executor::quiet(), &())
+                .unwrap();
             (answer.fact::<f64>("period").unwrap() - 2.0 * PI).abs()
         };
         assert!(period(1e-4) > 1e-8 && period(1e-12) < 1e-10, "{} {}", period(1e-4), period(1e-12));
@@ -823,7 +924,10 @@ mod tests {
             (question.start, question.plane.value) = (vec![x, 7.0, 8.0], 2.0);
             let guess = Guess::Loop { point: vec![x, 2.0, 8.0, phi], returns: 1 };
             assert_eq!(question.guess(&Executor::quiet()).unwrap(), guess);
-            assert_eq!((question.states(), question.names()), (4, ["x", "y", "a1", "phi"].map(String::from).to_vec()));
+            assert_eq!(
+                (question.states(), question.names()),
+                (4, ["x", "y", "a1", "phi"].map(String::from).to_vec())
+            );
         }
         let phi = question(cases::smooth(&["x", "phi"], "x", &["phi", "-x"]), switches()[1], 1);
         assert_eq!(phi.names(), ["x", "phi", "phi_"]);
@@ -838,26 +942,40 @@ mod tests {
             ClosedOrbit { along: Some(along), ..question(system, switch, 1) }.at(value)
         };
         let [smoothed, _, filippov] = switches();
-        let hysteretic =
-            |eps| SwitchSpec::Hysteretic { eps, eps_prime: 0.3, relaxation: Relaxation::Single, phi0: 0.7 };
-        for (switch, wanted) in [(smoothed, SwitchSpec::tanh(0.5)), (hysteretic(0.1), hysteretic(0.5))] {
+        let hysteretic = |eps| SwitchSpec::Hysteretic {
+            eps,
+            eps_prime: 0.3,
+            relaxation: Relaxation::Single,
+            phi0: 0.7,
+        };
+        for (switch, wanted) in
+            [(smoothed, SwitchSpec::tanh(0.5)), (hysteretic(0.1), hysteretic(0.5))]
+        {
             assert_eq!(at(switch, circle(2), 0.5).unwrap(), (circle(2), wanted));
             for value in [0.0, -1.0, f64::NAN] {
-                assert!(at(switch, circle(2), value).unwrap_err().to_string().contains("above 0"), "{value}");
+                assert!(
+                    at(switch, circle(2), value).unwrap_err().to_string().contains("above 0"),
+                    "{value}"
+                );
             }
         }
         assert!(at(filippov, circle(2), 0.5).unwrap_err().to_string().contains("no eps"));
         // A system's own parameter of that name comes first.
         let own = cases::of(
-            "states = ['x', 'y']\nh = 'x'\nplus = ['y', '-eps*x']\nminus = ['y', '-x']\n[parameters]\neps = 2",
+            "states = ['x', 'y']\nh = 'x'\nplus = ['y', '-eps*x']\nminus = ['y', \
+                '-x']\n[parameters]\neps = 2",
         );
-        assert_eq!(at(smoothed, own.clone(), 0.5).unwrap(), (own.with("eps", 0.5).unwrap(), smoothed));
+        assert_eq!(
+            at(smoothed, own.clone(), 0.5).unwrap(),
+            (own.with("eps", 0.5).unwrap(), smoothed)
+        );
     }
 
     #[test]
     fn wrong_questions_are_refused() {
-        let along =
-            |parameter: &str, from, to, steps| Some(Along { parameter: parameter.into(), from, to, steps, most: 9 });
+        let along = |parameter: &str, from, to, steps| {
+            Some(Along { parameter: parameter.into(), from, to, steps, most: 9 })
+        };
         let [smoothed, _, filippov] = switches();
         let good = question(circle(2), smoothed, 1);
         assert_eq!(good.validate(), Ok(()));
@@ -866,35 +984,65 @@ mod tests {
             (of(1), "system", "2 to 8 states"),
             (of(9), "system", "2 to 8 states"),
             (question(circle(2), smoothed, 2), "section", "count from 0"),
-            (ClosedOrbit { along: along("nu", 0.1, 0.2, 4), ..good.clone() }, "along", "name a parameter"),
-            (ClosedOrbit { along: along("mu", 0.1, f64::NAN, 4), ..good.clone() }, "along", "name a parameter"),
-            (ClosedOrbit { along: along("eps", 0.1, -0.1, 4), ..good.clone() }, "along", "name a parameter"),
-            (ClosedOrbit { along: along("eps", 0.0, 0.1, 4), ..good.clone() }, "along", "name a parameter"),
+            (
+                ClosedOrbit { along: along("nu", 0.1, 0.2, 4), ..good.clone() },
+                "along",
+                "name a parameter",
+            ),
+            (
+                ClosedOrbit { along: along("mu", 0.1, f64::NAN, 4), ..good.clone() },
+                "along",
+                "name a parameter",
+            ),
+            (
+                ClosedOrbit { along: along("eps", 0.1, -0.1, 4), ..good.clone() },
+                "along",
+                "name a parameter",
+            ),
+            (
+                ClosedOrbit { along: along("eps", 0.0, 0.1, 4), ..good.clone() },
+                "along",
+                "name a parameter",
+            ),
             (
                 ClosedOrbit { along: along("eps", 0.1, 0.2, 4), switch: filippov, ..good.clone() },
                 "along",
                 "name a parameter",
             ),
             (ClosedOrbit { along: along("mu", 0.1, 0.1, 4), ..good.clone() }, "along", "two ends"),
-            (ClosedOrbit { along: along("mu", 0.1, 0.2, 0), ..good.clone() }, "along", "at least one step"),
+            (
+                ClosedOrbit { along: along("mu", 0.1, 0.2, 0), ..good.clone() },
+                "along",
+                "at least one step",
+            ),
             (ClosedOrbit { returns: Some(0), ..good.clone() }, "returns", "at least once"),
         ] {
             match wrong.compute(&Executor::quiet(), &()) {
                 Err(JobError::Spec(error)) => {
-                    assert!(error.field == field && error.rule.contains(word), "{field}, {word}: {error}");
+                    assert!(
+                        error.field == field && error.rule.contains(word),
+                        "{field}, {word}: {error}"
+                    );
                 }
                 other => panic!("{field}, {word}: {other:?}"),
             }
         }
     }
 
-    /// A search that leaves the finite numbers, and one that finds nothing: in words, of the orbit's states alone.
+    /// A search that leaves the finite numbers, and one that finds nothing: in words, of the
+    /// orbit's states alone.
     #[test]
     fn a_search_that_fails_says_why() {
         let leaving = cases::smooth(&["x", "y"], "x + 9", &["x*x*x", "x"]);
-        let said = question(leaving, switches()[0], 1).compute(&Executor::quiet(), &()).unwrap_err().to_string();
+        let said = question(leaving, switches()[0], 1)
+            .compute(&Executor::quiet(), &())
+            .unwrap_err()
+            .to_string();
         assert!(!said.is_empty());
         let failure = Failure::NotFinite { t: 1.0, state: vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0] };
-        assert_eq!(without_tangents(failure, 2), Failure::NotFinite { t: 1.0, state: vec![1.0, 2.0] });
+        assert_eq!(
+            without_tangents(failure, 2),
+            Failure::NotFinite { t: 1.0, state: vec![1.0, 2.0] }
+        );
     }
 }

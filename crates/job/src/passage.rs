@@ -14,10 +14,11 @@ use twofold_instances::{self as instances, How, Orbits};
 use twofold_integrate::{DriveOptions, Method, Monitor, Schedule, Statistics, StepCap, Tolerance};
 use twofold_system::{System, Transition};
 
-/// How the smoothed orbit passes the two-fold at the origin. Table `passage`: one row with the visit's time and the places of leaving (`left_`), of the first
-/// passage through x = 0 (`surface_`), of the exit on y = 0 (`exit_`) and of the far exit (`far_`); blank what did not happen. Table `growth`: a row
-/// per moment at which disturbances are made (`offset`, in units of sqrt(eps) after the visit), with the growth in each direction; -infinity stands for
-/// t = 0.
+/// How the smoothed orbit passes the two-fold at the origin. Table `passage`: one row with the
+/// visit's time and the places of leaving (`left_`), of the first passage through x = 0
+/// (`surface_`), of the exit on y = 0 (`exit_`) and of the far exit (`far_`); blank what did not
+/// happen. Table `growth`: a row per moment at which disturbances are made (`offset`, in units of
+/// sqrt(eps) after the visit), with the growth in each direction; -infinity stands for t = 0.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TwoFoldPassage {
     /// The system; three states, the first one its switching function.
@@ -46,7 +47,8 @@ impl Question for TwoFoldPassage {
     fn cost(&self) -> f64 {
         // Sliding in f64, then a fixed number of short orbits in extended precision.
         let sliding = 0.1 / self.eps.max(1e-12);
-        (if self.followed.carried == 0.0 { sliding } else { 4.0 * sliding }) + 2e3 * self.followed.offsets.len() as f64
+        (if self.followed.carried == 0.0 { sliding } else { 4.0 * sliding })
+            + 2e3 * self.followed.offsets.len() as f64
     }
 
     fn compute(&self, _: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
@@ -73,9 +75,14 @@ fn cells(place: Option<[f64; 3]>) -> [Entry; 3] {
 impl TwoFoldPassage {
     fn tables(&self, found: &PassageAnswer) -> Vec<Table> {
         let places = ["left", "surface", "exit", "far"].into_iter().flat_map(place);
-        let mut one = Table::new("passage", ["eps", "t_visit"].map(Column::numbers).into_iter().chain(places));
+        let mut one = Table::new(
+            "passage",
+            ["eps", "t_visit"].map(Column::numbers).into_iter().chain(places),
+        );
         let mut row: Vec<Entry> = vec![self.eps.into(), found.visit.unwrap_or(f64::NAN).into()];
-        row.extend([found.leaving, found.surface, found.exit, found.far].into_iter().flat_map(cells));
+        row.extend(
+            [found.leaving, found.surface, found.exit, found.far].into_iter().flat_map(cells),
+        );
         one.push(row);
         let columns = ["eps", "offset", "across", "along_y", "along_z"].map(Column::numbers);
         let mut growth = Table::new("growth", columns);
@@ -92,8 +99,9 @@ impl TwoFoldPassage {
     }
 }
 
-/// Where orbits leave the switching surface behind the two-fold at the origin, whatever decides their switching: smoothing or hysteresis, with or
-/// without kicks. Table `leaving`: a row per run; blank if the orbit was not there in time.
+/// Where orbits leave the switching surface behind the two-fold at the origin, whatever decides
+/// their switching: smoothing or hysteresis, with or without kicks. Table `leaving`: a row per run;
+/// blank if the orbit was not there in time.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Leaving {
     /// The system; three states, the first one its switching function.
@@ -116,7 +124,8 @@ impl Leaving {
             SwitchSpec::Smoothed { eps, .. } | SwitchSpec::Hysteretic { eps, .. } => Ok(eps),
             SwitchSpec::Delayed { .. } | SwitchSpec::Relay { .. } => Err(SpecError {
                 field: "switch",
-                value: if let SwitchSpec::Relay { .. } = self.switch { "relay" } else { "delayed" }.into(),
+                value: if let SwitchSpec::Relay { .. } = self.switch { "relay" } else { "delayed" }
+                    .into(),
                 rule: "leaving is measured in units of eps, for smoothed and hysteretic runs",
             }
             .into()),
@@ -147,14 +156,19 @@ impl Leaving {
                 ..DriveOptions::to(self.by)
             };
             let tolerance = Tolerance { rtol: self.tolerance, atol: self.tolerance };
-            let how = How { method: Method::Dopri5, tolerance, precision: None, order: None, options };
+            let how =
+                How { method: Method::Dopri5, tolerance, precision: None, order: None, options };
             let end = field.orbit(start(*at), &how, &mut leaving, &())?.within_budget()?;
             work += &end.statistics;
             let mut row: Vec<Entry> = vec![eps.into()];
             row.extend(cells(leaving.place()));
             table.push(row);
         }
-        Ok(Answer { statistics: Some(work), stop: Stop::Finished, ..Answer::of_tables(vec![table]) })
+        Ok(Answer {
+            statistics: Some(work),
+            stop: Stop::Finished,
+            ..Answer::of_tables(vec![table])
+        })
     }
 }
 
@@ -213,7 +227,8 @@ mod tests {
         question.compute(&Executor::quiet(), &()).unwrap().tables.remove(0)
     }
 
-    /// On a straight line that passes the origin at time 1/2 and has x = 3 eps at 4/5; and one that passes it at no time.
+    /// On a straight line that passes the origin at time 1/2 and has x = 3 eps at 4/5; and one that
+    /// passes it at no time.
     #[test]
     fn orbits_leave_at_three_widths() {
         let line = cases::smooth(&["x", "y", "z"], "x", &["0.01", "1", "0"]);
@@ -223,20 +238,31 @@ mod tests {
             assert_eq!(table.numbers("eps"), [1e-3; 3]);
             for (row, z) in [(0, 0.0), (2, 1e-3)] {
                 for (name, wanted) in [("left_x", 0.003), ("left_y", 0.3), ("left_z", z)] {
-                    assert!((table.numbers(name)[row] - wanted).abs() < 1e-9, "{name}: {}", table.numbers(name)[row]);
+                    assert!(
+                        (table.numbers(name)[row] - wanted).abs() < 1e-9,
+                        "{name}: {}",
+                        table.numbers(name)[row]
+                    );
                 }
             }
-            assert!(["left_x", "left_y", "left_z"].iter().all(|name| table.numbers(name)[1].is_nan()));
-            assert!(leaving(line.clone(), switch, &starts[..1], 0.7).numbers("left_x")[0].is_nan(), "too late");
+            assert!(
+                ["left_x", "left_y", "left_z"].iter().all(|name| table.numbers(name)[1].is_nan())
+            );
+            assert!(
+                leaving(line.clone(), switch, &starts[..1], 0.7).numbers("left_x")[0].is_nan(),
+                "too late"
+            );
         }
-        let [a, b] = caricatures().map(|system| leaving(system, SwitchSpec::tanh(1e-2), &[[0.2, 0.0, -1.0]], 40.0));
+        let [a, b] = caricatures()
+            .map(|system| leaving(system, SwitchSpec::tanh(1e-2), &[[0.2, 0.0, -1.0]], 40.0));
         for name in ["left_x", "left_y", "left_z"] {
             let (a, b) = (a.numbers(name)[0], b.numbers(name)[0]);
             assert!((a - b).abs() < 1e-6, "{name}: {a} {b}");
         }
     }
 
-    /// What happened in its columns, what did not blank; what was carried from the start before all that was made near the visit.
+    /// What happened in its columns, what did not blank; what was carried from the start before all
+    /// that was made near the visit.
     #[test]
     fn a_passage_is_two_tables() {
         let question = TwoFoldPassage {
@@ -255,20 +281,27 @@ mod tests {
             ..PassageAnswer::default()
         };
         let tables = question.tables(&found);
-        let names = |t: &Table| t.columns.iter().map(|c| c.name.clone()).collect::<Vec<_>>().join(" ");
+        let names =
+            |t: &Table| t.columns.iter().map(|c| c.name.clone()).collect::<Vec<_>>().join(" ");
         assert_eq!(
             names(&tables[0]),
-            "eps t_visit left_x left_y left_z surface_x surface_y surface_z exit_x exit_y exit_z far_x far_y far_z"
+            "eps t_visit left_x left_y left_z surface_x surface_y surface_z exit_x exit_y exit_z \
+                far_x far_y far_z"
         );
         let cells = |t: &Table, row: usize| {
             t.rows()[row].iter().map(|c| format!("{:?}", c.value())).collect::<Vec<_>>().join(" ")
         };
-        assert_eq!(cells(&tables[0], 0), "0.001 13.0 1.0 2.0 3.0 NaN NaN NaN 4.0 5.0 6.0 7.0 8.0 9.0");
+        assert_eq!(
+            cells(&tables[0], 0),
+            "0.001 13.0 1.0 2.0 3.0 NaN NaN NaN 4.0 5.0 6.0 7.0 8.0 9.0"
+        );
         assert_eq!(names(&tables[1]), "eps offset across along_y along_z");
         assert_eq!(cells(&tables[1], 0), "0.001 -inf 13.0 14.0 15.0");
         assert_eq!(cells(&tables[1], 1), "0.001 -2.0 10.0 11.0 12.0");
         let nothing = question.tables(&PassageAnswer::default());
-        assert!(nothing[1].is_empty() && nothing[0].rows()[0][1..].iter().all(|c| c.value().is_nan()));
+        assert!(
+            nothing[1].is_empty() && nothing[0].rows()[0][1..].iter().all(|c| c.value().is_nan())
+        );
     }
 
     #[test]
@@ -283,6 +316,9 @@ mod tests {
             by: 9.0,
         };
         let error = leaving.compute(&Executor::quiet(), &()).unwrap_err();
-        assert!(error.is_bad_question() && error.to_string().contains("exit rule's choice"), "{error}");
+        assert!(
+            error.is_bad_question() && error.to_string().contains("exit rule's choice"),
+            "{error}"
+        );
     }
 }

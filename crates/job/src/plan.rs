@@ -59,13 +59,19 @@ impl QuestionPlan {
         if let Some(place) = known.get(&hash) {
             return *place;
         }
-        let before: BTreeSet<usize> = question.rests_on().iter().map(|q| self.enter(q, known)).collect();
+        let before: BTreeSet<usize> =
+            question.rests_on().iter().map(|q| self.enter(q, known)).collect();
         let place = self.tasks.len();
         for task in &before {
             self.tasks[*task].followers.push(place);
         }
         let waits_for = AtomicUsize::new(before.len());
-        self.tasks.push(Task { question: question.clone(), followers: Vec::new(), waits_for, rank: 0 });
+        self.tasks.push(Task {
+            question: question.clone(),
+            followers: Vec::new(),
+            waits_for,
+            rank: 0,
+        });
         known.insert(hash, place);
         place
     }
@@ -81,7 +87,11 @@ impl QuestionPlan {
     }
 
     /// Does the first of the tasks that are ready. There is one for every call.
-    fn do_next<'scope, A: Fn(&AnyQuestion) + Sync>(&'scope self, scope: &rayon::Scope<'scope>, ask: &'scope A) {
+    fn do_next<'scope, A: Fn(&AnyQuestion) + Sync>(
+        &'scope self,
+        scope: &rayon::Scope<'scope>,
+        ask: &'scope A,
+    ) {
         let Some(rank) = self.ready().pop_first() else { return };
         let task = &self.tasks[self.by_rank[rank]];
         ask(&task.question);
@@ -123,7 +133,10 @@ mod tests {
             self.0 as f64
         }
         fn rests_on(&self) -> Vec<AnyQuestion> {
-            (1..self.0).filter(|n| self.0.is_multiple_of(*n)).map(|n| Arc::new(Number(n)) as _).collect()
+            (1..self.0)
+                .filter(|n| self.0.is_multiple_of(*n))
+                .map(|n| Arc::new(Number(n)) as _)
+                .collect()
         }
         fn compute(&self, _: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
             Ok(Answer::of_tables(Vec::new()))
@@ -131,7 +144,8 @@ mod tests {
     }
 
     fn order(threads: usize, numbers: &[u64]) -> Vec<u64> {
-        let questions: Vec<AnyQuestion> = numbers.iter().map(|n| Arc::new(Number(*n)) as _).collect();
+        let questions: Vec<AnyQuestion> =
+            numbers.iter().map(|n| Arc::new(Number(*n)) as _).collect();
         let plan = QuestionPlan::of(&questions);
         let done = Mutex::new(Vec::new());
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -154,7 +168,10 @@ mod tests {
             assert_eq!(done.len(), 199);
             // Notes are taken when a task is over, and none begins before those it rests on are.
             for (at, n) in done.iter().enumerate() {
-                assert!(done[at..].iter().skip(1).all(|later| n % later != 0), "{n} before a divisor: {done:?}");
+                assert!(
+                    done[at..].iter().skip(1).all(|later| n % later != 0),
+                    "{n} before a divisor: {done:?}"
+                );
             }
         }
     }

@@ -15,14 +15,15 @@ use twofold_integrate::filippov::FilippovError;
 use twofold_integrate::{Failure, Monitor};
 use twofold_system::BindError;
 
-/// Version of the numerics: a digest of the sources that numbers depend on, made when the program is built. Answers of another version
-/// are never taken for this one's.
+/// Version of the numerics: a digest of the sources that numbers depend on, made when the program
+/// is built. Answers of another version are never taken for this one's.
 pub const NUMERICS: &str = env!("TWOFOLD_NUMERICS");
 
 /// A computation as data: everything that its answer depends on, and nothing else.
 ///
-/// Two equal questions have equal answers, to the last bit, on any machine. A question computes on the thread that asks it and starts no
-/// others: parallel is only what is asked side by side ([`Executor::gather`]).
+/// Two equal questions have equal answers, to the last bit, on any machine. A question computes on
+/// the thread that asks it and starts no others: parallel is only what is asked side by side
+/// ([`Executor::gather`]).
 pub trait Question: fmt::Debug + Send + Sync {
     /// What kind of computation it is: "run".
     fn kind(&self) -> &'static str;
@@ -45,14 +46,15 @@ pub trait Question: fmt::Debug + Send + Sync {
         1.0
     }
 
-    /// Expected work in arbitrary units, the same for all kinds, without that of the questions it rests on: it decides only in which order things
-    /// are done.
+    /// Expected work in arbitrary units, the same for all kinds, without that of the questions it
+    /// rests on: it decides only in which order things are done.
     fn cost(&self) -> f64 {
         1.0
     }
 
-    /// Questions that computing this one will ask, as far as they are known beforehand. [`Executor::gather`] has them answered first, so that no
-    /// thread waits for another; nothing else depends on it.
+    /// Questions that computing this one will ask, as far as they are known beforehand.
+    /// [`Executor::gather`] has them answered first, so that no thread waits for another; nothing
+    /// else depends on it.
     fn rests_on(&self) -> Vec<AnyQuestion> {
         Vec::new()
     }
@@ -73,9 +75,11 @@ pub fn question_hash(question: &dyn Question) -> Hash {
     Hash::of_json(&json!({ "kind": question.kind(), "question": question.json() }))
 }
 
-/// The key under which an answer is kept: digest of the question and of the code that computes its answer.
+/// The key under which an answer is kept: digest of the question and of the code that computes its
+/// answer.
 pub fn key(question: &dyn Question) -> Hash {
-    let mut key = json!({ "kind": question.kind(), "question": question.json(), "numerics": NUMERICS });
+    let mut key =
+        json!({ "kind": question.kind(), "question": question.json(), "numerics": NUMERICS });
     if let Some(code) = question.code() {
         key["code"] = code.into();
     }
@@ -96,7 +100,9 @@ pub enum JobError {
     Filippov(#[from] FilippovError),
     /// More points than fit in memory.
     #[error(
-        "more than {limit} points were recorded by t = {t}, the most that are kept in memory (0.6 GB): record crossings of a plane instead of the path, give a larger chord, or an earlier end time"
+        "more than {limit} points were recorded by t = {t}, the most that are kept in memory (0.6 \
+            GB): record crossings of a plane instead of the path, give a larger chord, or an \
+            earlier end time"
     )]
     TooManyPoints {
         /// Time reached.
@@ -136,7 +142,10 @@ impl JobError {
         match self {
             JobError::Spec(_) | JobError::Dimension(_) => true,
             JobError::General(e) => {
-                matches!(**e, HybridError::Equation(_) | HybridError::Start(_) | HybridError::Bad(_))
+                matches!(
+                    **e,
+                    HybridError::Equation(_) | HybridError::Start(_) | HybridError::Bad(_)
+                )
             }
             JobError::Rests(e) => !matches!(e, RestError::Driven),
             _ => false,
@@ -166,25 +175,45 @@ mod tests {
     #[test]
     fn a_question_is_at_fault_or_its_computation_is() {
         let spec = SpecError { field: "start", value: "x".into(), rule: "give numbers" };
-        let run = cases::run(cases::decays(2), SwitchSpec::tanh(1e-3), 9.0, Observation::Times { every: 1.0 });
+        let run = cases::run(
+            cases::decays(2),
+            SwitchSpec::tanh(1e-3),
+            9.0,
+            Observation::Times { every: 1.0 },
+        );
         let dimension = run.system.bind::<3>().map(|_| ()).unwrap_err();
         for bad in [JobError::Spec(spec), JobError::Dimension(dimension)] {
             assert!(bad.is_bad_question(), "{bad}");
         }
-        for other in [JobError::Interrupted, JobError::TooManyPoints { t: 1.0, limit: 2 }, JobError::Other("no".into())]
-        {
+        for other in [
+            JobError::Interrupted,
+            JobError::TooManyPoints { t: 1.0, limit: 2 },
+            JobError::Other("no".into()),
+        ] {
             assert!(!other.is_bad_question(), "{other}");
         }
     }
 
-    /// One of each kind: stores and files know it by this name, and it is what makes two questions of one shape different.
+    /// One of each kind: stores and files know it by this name, and it is what makes two questions
+    /// of one shape different.
     #[test]
     fn every_kind_of_question_has_a_name_of_its_own() {
         let system = System::from(Caricature::with_reinjection(0.1, 1e-5));
-        let run = cases::run(system.clone(), SwitchSpec::tanh(1e-3), 9.0, Observation::Times { every: 1.0 });
+        let run = cases::run(
+            system.clone(),
+            SwitchSpec::tanh(1e-3),
+            9.0,
+            Observation::Times { every: 1.0 },
+        );
         let (start, eps) = (vec![0.2, 0.0, -1.0], vec![1e-3]);
-        let grid =
-            FunnelGrid { shortest: 0.1, longest: 1.0, times: 3, horizon: 5.0, until_two_fold: true, per_step: 1 };
+        let grid = FunnelGrid {
+            shortest: 0.1,
+            longest: 1.0,
+            times: 3,
+            horizon: 5.0,
+            until_two_fold: true,
+            per_step: 1,
+        };
         let tolerance = Tolerance { rtol: 1e-9, atol: 1e-9 };
         let questions: [(AnyQuestion, &str); 12] = [
             (Arc::new(Run(run.clone())), "run"),
@@ -284,12 +313,16 @@ mod tests {
         for (question, kind) in &questions {
             assert_eq!(question.kind(), *kind);
             assert!(question.json().as_object().is_some_and(|asked| !asked.is_empty()), "{kind}");
-            keys.extend([key(&**question).as_str().to_owned(), question_hash(&**question).as_str().to_owned()]);
+            keys.extend([
+                key(&**question).as_str().to_owned(),
+                question_hash(&**question).as_str().to_owned(),
+            ]);
         }
         assert_eq!(keys.len(), 2 * questions.len());
     }
 
-    /// A key is of the kind, of what is asked, and of the version; a question's digest, of the first two.
+    /// A key is of the kind, of what is asked, and of the version; a question's digest, of the
+    /// first two.
     #[test]
     fn a_key_is_of_kind_question_and_version() {
         #[derive(Debug)]
@@ -307,9 +340,15 @@ mod tests {
         }
         let text = |numerics: &str| format!("{{\"kind\":\"a\",{numerics}\"question\":1}}");
         assert_eq!(question_hash(&Asked("a", 1)), Hash::of(text("").as_bytes()));
-        assert_eq!(key(&Asked("a", 1)), Hash::of(text(&format!("\"numerics\":\"{NUMERICS}\",")).as_bytes()));
+        assert_eq!(
+            key(&Asked("a", 1)),
+            Hash::of(text(&format!("\"numerics\":\"{NUMERICS}\",")).as_bytes())
+        );
         for other in [Asked("b", 1), Asked("a", 2)] {
-            assert!(key(&other) != key(&Asked("a", 1)) && question_hash(&other) != question_hash(&Asked("a", 1)));
+            assert!(
+                key(&other) != key(&Asked("a", 1))
+                    && question_hash(&other) != question_hash(&Asked("a", 1))
+            );
         }
     }
 }

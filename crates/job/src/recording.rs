@@ -108,36 +108,46 @@ impl<const D: usize> Recording<D> {
             Data::Motion(motion) => motion_tables(&names, &[Member { motion, future: None }], 0),
             Data::Funnel { approach, futures } => {
                 let mut members = vec![Member { motion: approach, future: None }];
-                members
-                    .extend(futures.iter().map(|f| Member { motion: &f.motion, future: Some((f.exit_time, f.side)) }));
+                members.extend(
+                    futures
+                        .iter()
+                        .map(|f| Member { motion: &f.motion, future: Some((f.exit_time, f.side)) }),
+                );
                 motion_tables(&names, &members, 0)
             }
         };
         let tables = tables.into_iter().map(|table| signed(run, table)).collect();
-        let answer =
-            Answer { statistics: Some(self.statistics.clone()), stop: self.stop.into(), ..Answer::of_tables(tables) }
-                .with_fact("t", &self.t)
-                .with_fact("state", &self.x.as_slice())
-                .with_fact("most_steps_in_segment", &self.most_steps_in_segment);
+        let answer = Answer {
+            statistics: Some(self.statistics.clone()),
+            stop: self.stop.into(),
+            ..Answer::of_tables(tables)
+        }
+        .with_fact("t", &self.t)
+        .with_fact("state", &self.x.as_slice())
+        .with_fact("most_steps_in_segment", &self.most_steps_in_segment);
         match run.switch {
             SwitchSpec::Delayed { history, .. } => answer.with_fact("history", &history),
             SwitchSpec::Relay { band, inside } => {
                 let plus = inside.begins_with_plus(switching(&run.system, &run.start), band);
-                answer.with_fact("inside", &inside).with_fact("begins", if plus { &Side::Plus } else { &Side::Minus })
+                answer
+                    .with_fact("inside", &inside)
+                    .with_fact("begins", if plus { &Side::Plus } else { &Side::Minus })
             }
             _ => answer,
         }
     }
 
-    /// The table of points that [`Recording::to_answer`] begins with, of a part of a recording. Pieces of a motion are counted from
-    /// `first_piece` on. A funnel has no parts.
+    /// The table of points that [`Recording::to_answer`] begins with, of a part of a recording.
+    /// Pieces of a motion are counted from `first_piece` on. A funnel has no parts.
     pub(super) fn part(run: &RunSpec, data: &Data<D>, first_piece: usize) -> Option<Table> {
         let names = run.system.coordinates();
         let table = match data {
             Data::Path(samples) => Some(path_table(&names, samples)),
             Data::Section(crossings) => Some(section_table(&names, crossings)),
             Data::Motion(motion) => {
-                motion_tables(&names, &[Member { motion, future: None }], first_piece).into_iter().next()
+                motion_tables(&names, &[Member { motion, future: None }], first_piece)
+                    .into_iter()
+                    .next()
             }
             Data::Funnel { .. } => None,
         };
@@ -154,10 +164,16 @@ impl<const D: usize> Recording<D> {
         let data = if let Some(table) = answer.table("path") {
             Data::Path(samples(&names, table))
         } else if let Some(table) = answer.table("section") {
-            let directions = table.words("direction").map(|w| if w == "up" { Direction::Up } else { Direction::Down });
+            let directions = table
+                .words("direction")
+                .map(|w| if w == "up" { Direction::Up } else { Direction::Down });
             let points = samples(&names, table).into_iter().zip(directions);
-            Data::Section(points.map(|(s, direction)| Crossing { t: s.t, x: s.x, direction }).collect())
-        } else if let (Some(motion), Some(events)) = (answer.table("motion"), answer.table("events")) {
+            Data::Section(
+                points.map(|(s, direction)| Crossing { t: s.t, x: s.x, direction }).collect(),
+            )
+        } else if let (Some(motion), Some(events)) =
+            (answer.table("motion"), answer.table("events"))
+        {
             let mut members = members_of(&names, motion, events)?;
             let approach = members.remove(0).1;
             // A funnel may be empty, a motion never has futures: the question says which it is.
@@ -202,10 +218,12 @@ impl<const D: usize> Recording<D> {
     }
 }
 
-/// A Filippov motion's table with a column `signs` if the system has two switching surfaces: the signs of both functions, 0 on the
-/// surface ("+-", "0+"). With one surface the mode says it.
+/// A Filippov motion's table with a column `signs` if the system has two switching surfaces: the
+/// signs of both functions, 0 on the surface ("+-", "0+"). With one surface the mode says it.
 fn signed(run: &RunSpec, mut table: Table) -> Table {
-    if run.system.definition().second().is_none() || !matches!(table.name.as_str(), "motion" | "events") {
+    if run.system.definition().second().is_none()
+        || !matches!(table.name.as_str(), "motion" | "events")
+    {
         return table;
     }
     let (names, n) = (run.system.coordinates(), run.system.dimension());
@@ -235,7 +253,10 @@ fn signed(run: &RunSpec, mut table: Table) -> Table {
 }
 
 fn point_columns(names: &[&str]) -> Vec<Column> {
-    std::iter::once(&"t").chain(names).map(|name| Column::new(name, PURE, super::table::ColumnKind::Number)).collect()
+    std::iter::once(&"t")
+        .chain(names)
+        .map(|name| Column::new(name, PURE, super::table::ColumnKind::Number))
+        .collect()
 }
 
 fn point<const D: usize>(t: f64, x: [f64; D]) -> Vec<Entry> {
@@ -249,7 +270,8 @@ fn path_table<const D: usize>(names: &[&str], samples: &[Sample<D>]) -> Table {
 }
 
 fn section_table<const D: usize>(names: &[&str], crossings: &[Crossing<D>]) -> Table {
-    let mut table = Table::new("section", point_columns(names).into_iter().chain([Column::words("direction")]));
+    let mut table =
+        Table::new("section", point_columns(names).into_iter().chain([Column::words("direction")]));
     for c in crossings {
         let mut row = point(c.t, c.x);
         row.push(c.direction.word().into());
@@ -259,7 +281,8 @@ fn section_table<const D: usize>(names: &[&str], crossings: &[Crossing<D>]) -> T
 }
 
 fn samples<const D: usize>(names: &[&str], table: &Table) -> Vec<Sample<D>> {
-    let columns: [&[f64]; D] = std::array::from_fn(|i| names.get(i).map_or(&[][..], |name| table.numbers(name)));
+    let columns: [&[f64]; D] =
+        std::array::from_fn(|i| names.get(i).map_or(&[][..], |name| table.numbers(name)));
     let rows = columns.iter().map(|c| c.len()).min().unwrap_or(0);
     let times = table.numbers("t").iter().take(rows).enumerate();
     times.map(|(row, t)| Sample { t: *t, x: columns.map(|c| c[row]) }).collect()
@@ -297,7 +320,11 @@ fn mode_of(word: &str) -> Option<Mode> {
     MODES.iter().find(|(_, w)| *w == word).map(|(m, _)| *m)
 }
 
-fn motion_tables<const D: usize>(names: &[&str], members: &[Member<'_, D>], first_piece: usize) -> Vec<Table> {
+fn motion_tables<const D: usize>(
+    names: &[&str],
+    members: &[Member<'_, D>],
+    first_piece: usize,
+) -> Vec<Table> {
     let future = || {
         [
             Column::integers("future"),
@@ -307,7 +334,10 @@ fn motion_tables<const D: usize>(names: &[&str], members: &[Member<'_, D>], firs
     };
     let mut points = Table::new(
         "motion",
-        point_columns(names).into_iter().chain([Column::words("mode"), Column::integers("piece")]).chain(future()),
+        point_columns(names)
+            .into_iter()
+            .chain([Column::words("mode"), Column::integers("piece")])
+            .chain(future()),
     );
     let mut events = Table::new(
         "events",
@@ -320,7 +350,8 @@ fn motion_tables<const D: usize>(names: &[&str], members: &[Member<'_, D>], firs
     );
     for (number, member) in members.iter().enumerate() {
         let which = || {
-            let (time, side) = member.future.map_or((f64::NAN, ""), |(time, side)| (time, side_word(side)));
+            let (time, side) =
+                member.future.map_or((f64::NAN, ""), |(time, side)| (time, side_word(side)));
             [(number as i64).into(), time.into(), side.into()]
         };
         for (piece, (mode, samples)) in member.motion.pieces.iter().enumerate() {
@@ -352,13 +383,19 @@ fn event_cells<const D: usize>(event: &ModeEvent<D>) -> [Entry; 9] {
         EventKind::StartedOnSurface => ("started-on-surface", None, [none; 4], None),
         EventKind::EnteredRepelling => ("entered-repelling", None, [none; 4], None),
         EventKind::Accumulation { leg } => ("accumulation", None, [leg, none, none, none], None),
-        EventKind::TwoFoldReached { leg, error } => ("two-fold-reached", None, [leg, error, none, none], None),
-        EventKind::Exit { to, time, arc, rule } => ("exit", Some(to), [none, none, time, arc], Some(rule)),
+        EventKind::TwoFoldReached { leg, error } => {
+            ("two-fold-reached", None, [leg, error, none, none], None)
+        }
+        EventKind::Exit { to, time, arc, rule } => {
+            ("exit", Some(to), [none, none, time, arc], Some(rule))
+        }
         EventKind::ExitAtBoundary { to, time, arc, rule } => {
             ("exit-at-boundary", Some(to), [none, none, time, arc], Some(rule))
         }
     };
-    let rule = rule.map_or_else(String::new, |rule| String::from_utf8_lossy(&canonical_json(&rule)).into_owned());
+    let rule = rule.map_or_else(String::new, |rule| {
+        String::from_utf8_lossy(&canonical_json(&rule)).into_owned()
+    });
     [
         word.into(),
         mode_word(event.from).into(),
@@ -375,17 +412,26 @@ fn event_cells<const D: usize>(event: &ModeEvent<D>) -> [Entry; 9] {
 /// Each motion of the tables with its future, in order; at least the approach, which may be empty.
 type Members<const D: usize> = Vec<(Option<(f64, Side)>, Motion<D>)>;
 
-fn members_of<const D: usize>(names: &[&str], points: &Table, events: &Table) -> Result<Members<D>, NoSuchFact> {
+fn members_of<const D: usize>(
+    names: &[&str],
+    points: &Table,
+    events: &Table,
+) -> Result<Members<D>, NoSuchFact> {
     let wrong = |why: &str| NoSuchFact { name: "motion".into(), why: why.into() };
     let mut members: Members<D> = vec![(None, Motion::default())];
     let mut last_piece = None;
-    let futures = points.integers("future").iter().zip(points.numbers("exit_time")).zip(points.words("exit_side"));
+    let futures = points
+        .integers("future")
+        .iter()
+        .zip(points.numbers("exit_time"))
+        .zip(points.words("exit_side"));
     let modes = points.words("mode").zip(points.integers("piece"));
     for ((sample, (mode, piece)), ((future, exit_time), side)) in
         samples(names, points).into_iter().zip(modes).zip(futures)
     {
         let mode = mode_of(mode).ok_or_else(|| wrong("an unknown mode"))?;
-        let member = member(&mut members, *future, *exit_time, side).ok_or_else(|| wrong("futures out of order"))?;
+        let member = member(&mut members, *future, *exit_time, side)
+            .ok_or_else(|| wrong("futures out of order"))?;
         if last_piece != Some((*future, *piece)) {
             last_piece = Some((*future, *piece));
             member.pieces.push((mode, Vec::new()));
@@ -394,10 +440,17 @@ fn members_of<const D: usize>(names: &[&str], points: &Table, events: &Table) ->
             piece.push(sample);
         }
     }
-    let futures = events.integers("future").iter().zip(events.numbers("exit_time")).zip(events.words("exit_side"));
-    for ((row, sample), ((future, exit_time), side)) in samples(names, events).into_iter().enumerate().zip(futures) {
+    let futures = events
+        .integers("future")
+        .iter()
+        .zip(events.numbers("exit_time"))
+        .zip(events.words("exit_side"));
+    for ((row, sample), ((future, exit_time), side)) in
+        samples(names, events).into_iter().enumerate().zip(futures)
+    {
         let event = event_of(events, row, &sample).ok_or_else(|| wrong("an unknown event"))?;
-        let member = member(&mut members, *future, *exit_time, side).ok_or_else(|| wrong("futures out of order"))?;
+        let member = member(&mut members, *future, *exit_time, side)
+            .ok_or_else(|| wrong("futures out of order"))?;
         member.events.push(event);
     }
     Ok(members)
@@ -430,12 +483,19 @@ fn event_of<const D: usize>(events: &Table, row: usize, at: &Sample<D>) -> Optio
         "left-by-tangency" => EventKind::LeftByTangency { to: side()? },
         "started-on-surface" => EventKind::StartedOnSurface,
         "entered-repelling" => EventKind::EnteredRepelling,
-        "two-fold-reached" => EventKind::TwoFoldReached { leg: number("leg"), error: number("error") },
-        "accumulation" => EventKind::Accumulation { leg: number("leg") },
-        "exit" => EventKind::Exit { to: side()?, time: number("time"), arc: number("arc"), rule: rule()? },
-        "exit-at-boundary" => {
-            EventKind::ExitAtBoundary { to: side()?, time: number("time"), arc: number("arc"), rule: rule()? }
+        "two-fold-reached" => {
+            EventKind::TwoFoldReached { leg: number("leg"), error: number("error") }
         }
+        "accumulation" => EventKind::Accumulation { leg: number("leg") },
+        "exit" => {
+            EventKind::Exit { to: side()?, time: number("time"), arc: number("arc"), rule: rule()? }
+        }
+        "exit-at-boundary" => EventKind::ExitAtBoundary {
+            to: side()?,
+            time: number("time"),
+            arc: number("arc"),
+            rule: rule()?,
+        },
         _ => return None,
     };
     Some(ModeEvent {
@@ -479,14 +539,27 @@ mod tests {
     fn every_kind_of_recording_comes_back_from_its_tables() {
         let path = Observation::Path { chord: 1e-2 };
         let section = Observation::Section { coordinate: 1, value: 0.0 };
-        let random =
-            ExitRule::Random { law: SlidingLaw::Exponential { mean: 0.5 }, plus_probability: 0.5, seed: 1, stream: 2 };
-        let funnel = FunnelSpec { shortest: 0.1, longest: 1.0, times: 3, horizon: 5.0, until_two_fold: true };
+        let random = ExitRule::Random {
+            law: SlidingLaw::Exponential { mean: 0.5 },
+            plus_probability: 0.5,
+            seed: 1,
+            stream: 2,
+        };
+        let funnel = FunnelSpec {
+            shortest: 0.1,
+            longest: 1.0,
+            times: 3,
+            horizon: 5.0,
+            until_two_fold: true,
+        };
         for run in [
             run(SwitchSpec::tanh(1e-2), path),
             run(SwitchSpec::hysteretic(1e-2, Relaxation::Single), section),
             run(SwitchSpec::tanh(1e-2), Observation::Times { every: 0.7 }),
-            run(SwitchSpec::Filippov { exit: random, funnel: None }, Observation::Times { every: 0.7 }),
+            run(
+                SwitchSpec::Filippov { exit: random, funnel: None },
+                Observation::Times { every: 0.7 },
+            ),
             run(SwitchSpec::Filippov { exit: random, funnel: None }, path),
             run(SwitchSpec::Filippov { exit: random, funnel: None }, section),
             run(SwitchSpec::Filippov { exit: ExitRule::All, funnel: Some(funnel) }, path),
@@ -510,7 +583,10 @@ mod tests {
     /// Every kind of event and every mode, on either side.
     #[test]
     fn every_event_comes_back_from_its_table() {
-        let run = run(SwitchSpec::Filippov { exit: ExitRule::All, funnel: None }, Observation::Path { chord: 1e-2 });
+        let run = run(
+            SwitchSpec::Filippov { exit: ExitRule::All, funnel: None },
+            Observation::Path { chord: 1e-2 },
+        );
         let rule = ExitRule::AfterTime { time: 0.3, side: Side::Minus };
         let kinds = [Side::Plus, Side::Minus].into_iter().flat_map(|side| {
             [
@@ -537,7 +613,9 @@ mod tests {
                 to: mode(i + 1),
             })
             .collect();
-        let piece = |(i, mode): (usize, Mode)| (mode, vec![Sample { t: i as f64, x: [1.0, 2.0, i as f64] }; i + 1]);
+        let piece = |(i, mode): (usize, Mode)| {
+            (mode, vec![Sample { t: i as f64, x: [1.0, 2.0, i as f64] }; i + 1])
+        };
         let pieces = MODES.iter().map(|(mode, _)| *mode).enumerate().map(piece).collect();
         let recording = Recording {
             data: Data::Motion(Motion { pieces, events }),
@@ -550,20 +628,28 @@ mod tests {
         let answer = recording.to_answer(&run);
         assert_eq!(Recording::of_answer(&run, &answer).unwrap(), recording);
         assert_eq!((recording.data.len(), answer.stop), (10, Stop::SetValued));
-        assert!(Data::<3>::Path(Vec::new()).is_empty() && Data::<3>::Motion(Motion::default()).is_empty());
+        assert!(
+            Data::<3>::Path(Vec::new()).is_empty()
+                && Data::<3>::Motion(Motion::default()).is_empty()
+        );
     }
 
     /// On a straight line through both surfaces: x = 0 at time 1, y = 0 at time 2.
     #[test]
     fn two_surfaces_have_their_signs_beside_each_point() {
         let field = "plus = ['1', '2', '3']\nminus = ['1', '2', '3']\n";
-        let system = crate::cases::of(&format!("states = ['x', 'y', 'z']\nh = 'x'\n{field}[second]\nh = 'y'\n{field}"));
+        let system = crate::cases::of(&format!(
+            "states = ['x', 'y', 'z']\nh = 'x'\n{field}[second]\nh = 'y'\n{field}"
+        ));
         let exit = ExitRule::AtOnce { side: Side::Plus };
-        let mut run = run(SwitchSpec::Filippov { exit, funnel: None }, Observation::Times { every: 0.5 });
+        let mut run =
+            run(SwitchSpec::Filippov { exit, funnel: None }, Observation::Times { every: 0.5 });
         (run.system, run.start, run.t_end) = (system, vec![-1.0, -4.0, 0.0], 3.0);
         let answer = crate::simulate::answer(&run, &()).unwrap();
         let points = &answer.tables[0];
-        for ((t, signs), z) in points.numbers("t").iter().zip(points.words("signs")).zip(points.numbers("z")) {
+        for ((t, signs), z) in
+            points.numbers("t").iter().zip(points.words("signs")).zip(points.numbers("z"))
+        {
             let sign = |h: f64| {
                 if h.abs() < 1e-6 {
                     '0'
@@ -580,13 +666,17 @@ mod tests {
         assert_eq!(events, ["0-", "+0"]);
     }
 
-    /// "On" is within so many parts of 1 + the largest component: at 9 ten times as far as near the origin.
+    /// "On" is within so many parts of 1 + the largest component: at 9 ten times as far as near the
+    /// origin.
     #[test]
     fn a_surface_is_as_thick_as_the_state_is_large() {
         let field = "plus = ['1', '2', '3']\nminus = ['1', '2', '3']\n";
-        let system = crate::cases::of(&format!("states = ['x', 'y', 'z']\nh = 'x'\n{field}[second]\nh = 'y'\n{field}"));
+        let system = crate::cases::of(&format!(
+            "states = ['x', 'y', 'z']\nh = 'x'\n{field}[second]\nh = 'y'\n{field}"
+        ));
         let exit = ExitRule::AtOnce { side: Side::Plus };
-        let mut run = run(SwitchSpec::Filippov { exit, funnel: None }, Observation::Times { every: 0.5 });
+        let mut run =
+            run(SwitchSpec::Filippov { exit, funnel: None }, Observation::Times { every: 0.5 });
         run.system = system;
         let mut points = Table::new("motion", ["x", "y", "z"].map(Column::numbers));
         for [x, y, z] in [[5.0, -20.0, 9.0], [0.5, -2.0, 0.0]] {

@@ -1,9 +1,11 @@
 //! Rests: equilibria and pseudo-equilibria at which a motion ends.
 //!
-//! A rest is a zero of the equation that holds there: of a smooth field, of f+ where h > 0, of f- where h < 0, or of a mixture of both on
-//! h = 0 (a pseudo-equilibrium; Filippov 1988, sec. 19; di Bernardo, Budd, Champneys & Kowalczyk 2008, sec. 5.1). It is found by Newton's
-//! method from where a run ended. That the run ends there is another statement: it is made if the distance from the rest goes on falling
-//! as the rest's eigenvalues say. Nothing here has a unit: distances are compared with distances.
+//! A rest is a zero of the equation that holds there: of a smooth field, of f+ where h > 0, of f-
+//! where h < 0, or of a mixture of both on h = 0 (a pseudo-equilibrium; Filippov 1988, sec. 19; di
+//! Bernardo, Budd, Champneys & Kowalczyk 2008, sec. 5.1). It is found by Newton's method from where
+//! a run ended. That the run ends there is another statement: it is made if the distance from the
+//! rest goes on falling as the rest's eigenvalues say. Nothing here has a unit: distances are
+//! compared with distances.
 
 use serde::{Deserialize, Serialize};
 
@@ -37,7 +39,8 @@ pub enum Stability {
     Attracts,
     /// Some leave.
     Repels,
-    /// The largest real part of an eigenvalue is zero within its rounding: linear terms do not decide.
+    /// The largest real part of an eigenvalue is zero within its rounding: linear terms do not
+    /// decide.
     Neutral,
 }
 
@@ -49,8 +52,8 @@ pub struct Rest {
     pub kind: RestKind,
     /// Where; with phi as last state, if the switch is hysteretic.
     pub state: Vec<f64>,
-    /// Eigenvalues (real, imaginary) of the equation there, by falling real part; along the surface, of a pseudo-equilibrium. None where
-    /// the equation has no derivative.
+    /// Eigenvalues (real, imaginary) of the equation there, by falling real part; along the
+    /// surface, of a pseudo-equilibrium. None where the equation has no derivative.
     pub eigenvalues: Vec<[f64; 2]>,
     /// The stability implied by the eigenvalues and by the fields on both sides.
     pub stability: Stability,
@@ -84,8 +87,9 @@ fn linearised(n: usize, f: &DualMap<'_>, outputs: usize, x: &[f64]) -> Jet {
     let mut jet = Jet { value: vec![0.0; outputs], rows: vec![0.0; outputs * n] };
     let mut out = vec![Dual::constant(0.0); outputs];
     for j in 0..n {
-        let at: Vec<Dual<f64, 1>> =
-            (0..n).map(|i| if i == j { Dual::variable(x[i], 0) } else { Dual::constant(x[i]) }).collect();
+        let at: Vec<Dual<f64, 1>> = (0..n)
+            .map(|i| if i == j { Dual::variable(x[i], 0) } else { Dual::constant(x[i]) })
+            .collect();
         f(&at, &mut out);
         for (i, o) in out.iter().enumerate() {
             jet.value[i] = o.value;
@@ -109,8 +113,8 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
     sqrt(a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum())
 }
 
-/// A zero near `from` of as many equations as unknowns: the point, if Newton's method comes to one. Only the first `states` unknowns are
-/// looked at to see that it did.
+/// A zero near `from` of as many equations as unknowns: the point, if Newton's method comes to one.
+/// Only the first `states` unknowns are looked at to see that it did.
 fn zero(from: &[f64], states: usize, equations: &dyn Fn(&[f64]) -> Jet) -> Option<Vec<f64>> {
     let mut x = from.to_vec();
     let mut before = f64::INFINITY;
@@ -123,7 +127,8 @@ fn zero(from: &[f64], states: usize, equations: &dyn Fn(&[f64]) -> Jet) -> Optio
         let step = solve_any(&jet.rows, &right, 0.0)?;
         x.iter_mut().zip(&step).for_each(|(x, s)| *x += s);
         let step = size(&step[..states]);
-        let small = step <= 1e-13 * size(&x[..states]) || step <= 1e-10 * distance(&x[..states], &from[..states]);
+        let small = step <= 1e-13 * size(&x[..states])
+            || step <= 1e-10 * distance(&x[..states], &from[..states]);
         if small && step >= 0.5 * before || step <= 1e-15 * size(&x[..states]) || step == 0.0 {
             return x.iter().all(|v| v.is_finite()).then_some(x);
         }
@@ -150,7 +155,9 @@ fn stability_of(matrix: &[f64], n: usize) -> Option<(Vec<[f64; 2]>, Stability)> 
 pub(super) fn field(system: &System, switch: SwitchSpec) -> Option<Field> {
     match switch {
         SwitchSpec::Smoothed { eps, transition } => Some(Field::smoothed(system, transition, eps)),
-        SwitchSpec::Hysteretic { eps, eps_prime, relaxation, .. } if system.definition().second().is_none() => {
+        SwitchSpec::Hysteretic { eps, eps_prime, relaxation, .. }
+            if system.definition().second().is_none() =>
+        {
             Some(Field::hysteretic(system, eps, eps_prime, relaxation))
         }
         _ => None,
@@ -165,7 +172,8 @@ pub(super) fn switching<S: Elementary>(system: &System, x: &[S]) -> S {
     h
 }
 
-/// The rest that Newton's method finds from `from`, the equation's state, whether or not anything ends there.
+/// The rest that Newton's method finds from `from`, the equation's state, whether or not anything
+/// ends there.
 pub fn near(system: &System, switch: SwitchSpec, from: &[f64]) -> Option<Rest> {
     let regular = |field: &Field| {
         let n = field.dimension();
@@ -182,7 +190,9 @@ pub fn near(system: &System, switch: SwitchSpec, from: &[f64]) -> Option<Rest> {
     }
     let [plus, minus] = [Field::plus(system), Field::minus(system)];
     // A side's rest counts where that side is.
-    let on = |field: &Field, sign: f64| regular(field).filter(|r| sign * switching(system, &r.state) > 0.0);
+    let on = |field: &Field, sign: f64| {
+        regular(field).filter(|r| sign * switching(system, &r.state) > 0.0)
+    };
     let candidates = [pseudo(system, &plus, &minus, from), on(&plus, 1.0), on(&minus, -1.0)];
     let there = |r: &Rest| distance(&r.state, from);
     candidates.into_iter().flatten().min_by(|a, b| there(a).total_cmp(&there(b)))
@@ -211,11 +221,13 @@ fn pseudo(system: &System, plus: &Field, minus: &Field, from: &[f64]) -> Option<
     // The mixture that is nearest to rest: exactly one if the fields are opposite.
     let (p, m) = (of(plus, from), of(minus, from));
     let along: Vec<f64> = p.iter().zip(&m).map(|(p, m)| p - m).collect();
-    let weight = -m.iter().zip(&along).map(|(m, a)| m * a).sum::<f64>() / along.iter().map(|a| a * a).sum::<f64>();
+    let weight = -m.iter().zip(&along).map(|(m, a)| m * a).sum::<f64>()
+        / along.iter().map(|a| a * a).sum::<f64>();
     let mut start = from.to_vec();
     start.push(if weight.is_finite() { weight } else { 0.5 });
     let Some(found) = zero(&start, n, &equations) else {
-        // Where the fields have no derivative the run may have come to the very point (in finite time).
+        // Where the fields have no derivative the run may have come to the very point (in finite
+        // time).
         let left: Vec<f64> = m.iter().zip(&along).map(|(m, a)| m + weight * a).collect();
         let at_rest = size(&left) <= 1e-6 * size(&p).max(size(&m)) && (0.0..=1.0).contains(&weight);
         let h = linearised(n, &|x, out| out[0] = switching(system, x), 1, from);
@@ -251,8 +263,10 @@ fn pseudo(system: &System, plus: &Field, minus: &Field, from: &[f64]) -> Option<
     // Along the surface: the coordinate that h depends on most is a function of the others.
     let k = (0..n).max_by(|i, j| h[*i].abs().total_cmp(&h[*j].abs()))?;
     let kept: Vec<usize> = (0..n).filter(|i| *i != k).collect();
-    let entry = |i: usize, j: usize| (full.rows[i * n + j] - full.rows[i * n + k] * h[j] / h[k]) / towards;
-    let matrix: Vec<f64> = kept.iter().flat_map(|i| kept.iter().map(|j| entry(*i, *j)).collect::<Vec<_>>()).collect();
+    let entry =
+        |i: usize, j: usize| (full.rows[i * n + j] - full.rows[i * n + k] * h[j] / h[k]) / towards;
+    let matrix: Vec<f64> =
+        kept.iter().flat_map(|i| kept.iter().map(|j| entry(*i, *j)).collect::<Vec<_>>()).collect();
     let (eigenvalues, along) = stability_of(&matrix, n - 1)?;
     let stability = if towards > 0.0 { along } else { Stability::Repels };
     Some(Rest { kind: RestKind::PseudoEquilibrium, state, eigenvalues, stability })
@@ -265,12 +279,17 @@ const POINTS: usize = 32;
 /// Share of the linear rate at which the distance has to fall at least.
 const AS_FAST: f64 = 0.75;
 
-/// The rest at which `run` ends, if it ends at one; `answer` is what it came to, with its section. A run that is kicked ends nowhere.
+/// The rest at which `run` ends, if it ends at one; `answer` is what it came to, with its section.
+/// A run that is kicked ends nowhere.
 ///
 /// # Errors
 ///
 /// If it was interrupted.
-pub fn at_end(executor: &Executor<'_>, run: &RunSpec, answer: &Answer) -> Result<Option<Rest>, JobError> {
+pub fn at_end(
+    executor: &Executor<'_>,
+    run: &RunSpec,
+    answer: &Answer,
+) -> Result<Option<Rest>, JobError> {
     if run.schedule.kick.is_some() || answer.stop == Stop::Interrupted {
         return Ok(None);
     }
@@ -297,8 +316,13 @@ pub fn at_end(executor: &Executor<'_>, run: &RunSpec, answer: &Answer) -> Result
         return Ok(Some(rest));
     }
     let leading = rest.eigenvalues.first().copied().unwrap_or([f64::NAN; 2]);
-    // Long enough for a turn, and for the longest time between late passages: a closed orbit does not come nearer in it.
-    let turn = if leading[1] == 0.0 { 0.5 / leading[0].abs() } else { std::f64::consts::TAU / leading[1].abs() };
+    // Long enough for a turn, and for the longest time between late passages: a closed orbit does
+    // not come nearer in it.
+    let turn = if leading[1] == 0.0 {
+        0.5 / leading[0].abs()
+    } else {
+        std::f64::consts::TAU / leading[1].abs()
+    };
     let late = answer.table("section").map_or(&[][..], |s| s.numbers("t"));
     let late = late.iter().skip_while(|t| **t < 0.5 * run.t_end).copied().collect::<Vec<_>>();
     let window = 1.25 * late.windows(2).map(|w| w[1] - w[0]).fold(turn, f64::max);
@@ -333,7 +357,8 @@ pub fn at_end(executor: &Executor<'_>, run: &RunSpec, answer: &Answer) -> Result
         Err(_) => return Ok(None),
     };
     let table = &answer.tables[0];
-    let columns: Vec<&[f64]> = run.system.coordinates().iter().map(|name| table.numbers(name)).collect();
+    let columns: Vec<&[f64]> =
+        run.system.coordinates().iter().map(|name| table.numbers(name)).collect();
     let farthest = |k: usize| {
         (k * POINTS..((k + 1) * POINTS + 1).min(table.len()))
             .map(|row| from(&columns.iter().map(|c| c[row]).collect::<Vec<_>>()))
@@ -347,8 +372,12 @@ pub fn at_end(executor: &Executor<'_>, run: &RunSpec, answer: &Answer) -> Result
             let rate = leading[0].abs();
             last <= first * exp(-AS_FAST * rate * time) || last <= 1e-8 * size(&end)
         }
-        // Slower than any exponential: at least as its last power would be, and not by the method's own errors.
-        _ => ln(first / last) > 1e-7 * time.max(1.0) && last < first * (1.0 - 0.05 * time / (run.t_end + time)),
+        // Slower than any exponential: at least as its last power would be, and not by the method's
+        // own errors.
+        _ => {
+            ln(first / last) > 1e-7 * time.max(1.0)
+                && last < first * (1.0 - 0.05 * time / (run.t_end + time))
+        }
     };
     Ok(falls.then_some(rest))
 }

@@ -9,9 +9,9 @@ use super::simulate;
 use super::spec::{Method, RunSpec, SwitchSpec};
 use twofold_integrate::Monitor;
 
-/// A run, and what is recorded of it: see [`Recording`](super::Recording) for the answer's tables. Facts: `t` and `state` at the end,
-/// `most_steps_in_segment`; of a delayed switch its `history`; of a relay what it takes
-/// `inside` its band, and whether it `begins` with f+ or f-.
+/// A run, and what is recorded of it: see [`Recording`](super::Recording) for the answer's tables.
+/// Facts: `t` and `state` at the end, `most_steps_in_segment`; of a delayed switch its `history`;
+/// of a relay what it takes `inside` its band, and whether it `begins` with f+ or f-.
 ///
 /// ```
 /// use twofold_job::{Executor, Run, spec::*};
@@ -44,7 +44,11 @@ impl Question for Run {
     }
 
     fn label(&self) -> String {
-        let every = self.0.schedule.restart_every.map_or_else(String::new, |t| format!(", restarts every {t}"));
+        let every = self
+            .0
+            .schedule
+            .restart_every
+            .map_or_else(String::new, |t| format!(", restarts every {t}"));
         format!("{} to t = {}{every}", self.0.method.name.name(), self.0.t_end)
     }
 

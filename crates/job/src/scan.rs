@@ -31,7 +31,8 @@ pub enum Subject {
     General(Box<GeneralRun>, Vec<Axis>),
 }
 
-/// Each run begins where that of the neighbouring value ended, so that an attractor is followed for as long as it attracts.
+/// Each run begins where that of the neighbouring value ended, so that an attractor is followed for
+/// as long as it attracts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Follow {
@@ -123,7 +124,8 @@ impl Progress for Asked<'_> {
 }
 
 impl Landing {
-    /// Whether this is where the other run ends, too: places count as one that are within `near` of each other.
+    /// Whether this is where the other run ends, too: places count as one that are within `near` of
+    /// each other.
     fn is_like(&self, other: &Self, near: f64) -> bool {
         let (a, b) = (&self.place, &other.place);
         let n = a.len();
@@ -132,12 +134,15 @@ impl Landing {
             square <= near * near
         };
         // The same turn may be cut at another crossing.
-        self.word == other.word && n == b.len() && (n == 0 || (0..n).any(|s| (0..n).all(|i| alike(i, (i + s) % n))))
+        self.word == other.word
+            && n == b.len()
+            && (n == 0 || (0..n).any(|s| (0..n).all(|i| alike(i, (i + s) % n))))
     }
 }
 
 impl Scan {
-    /// A scan over the axes of `subject`; `alike`: attractors this near, as a share of the largest number in any start or attractor, are one.
+    /// A scan over the axes of `subject`; `alike`: attractors this near, as a share of the largest
+    /// number in any start or attractor, are one.
     ///
     /// # Errors
     /// A message that names the settings that exclude each other.
@@ -146,7 +151,9 @@ impl Scan {
         let axes = scan.axes();
         if axes.iter().any(Axis::is_random) {
             return Err(
-                "FROM..TO without a count is drawn at random, which `twofold sweep` does; give FROM..TO:COUNT".into()
+                "FROM..TO without a count is drawn at random, which `twofold sweep` does; give \
+                    FROM..TO:COUNT"
+                    .into(),
             );
         }
         if let Subject::General(run, axes) = &scan.subject {
@@ -164,17 +171,22 @@ impl Scan {
             }
             if matches!(axes[0].coordinate, Coordinate::Start(_) | Coordinate::Shift(_)) {
                 return Err(
-                    "what is followed begins where the run before ended; vary something other than the start".into()
+                    "what is followed begins where the run before ended; vary something other than \
+                        the start".into()
                 );
             }
             if !matches!(axes[0].value(0, 0.5), Entry::Number(_) | Entry::Integer(_)) {
                 return Err("an attractor is followed along numbers".into());
             }
             if let Subject::Surfaces(sweep) = &scan.subject
-                && !matches!(sweep.run().switch, SwitchSpec::Smoothed { .. } | SwitchSpec::Filippov { .. })
+                && !matches!(
+                    sweep.run().switch,
+                    SwitchSpec::Smoothed { .. } | SwitchSpec::Filippov { .. }
+                )
             {
                 return Err(
-                    "of a switch with a memory more than the coordinates would have to be handed on; leave --follow out"
+                    "of a switch with a memory more than the coordinates would have to be handed \
+                        on; leave --follow out"
                         .into(),
                 );
             }
@@ -228,16 +240,16 @@ impl Scan {
             Subject::Surfaces(sweep) => json!(sweep.run()),
             Subject::General(run, _) => run.json(),
         };
-        let mut about =
-            json!({ "kind": "scan", "run": run, "over": self.axes(), "alike": self.is_map().then_some(self.alike) });
+        let mut about = json!({ "kind": "scan", "run": run, "over": self.axes(),
+            "alike": self.is_map().then_some(self.alike) });
         if let Some(follow) = self.follow {
             about["follow"] = json!(follow);
         }
         about
     }
 
-    /// Makes the runs, side by side on the current pool as far as none begins where another ends. `monitor` is told how many are finished and says
-    /// whether to go on.
+    /// Makes the runs, side by side on the current pool as far as none begins where another ends.
+    /// `monitor` is told how many are finished and says whether to go on.
     pub fn compute(&self, monitor: &dyn Monitor) -> Scanned {
         let finished = AtomicU64::new(0);
         let asked = Asked { monitor, finished: &finished };
@@ -258,7 +270,9 @@ impl Scan {
                 .collect(),
             Some(follow) => {
                 let mut up: Vec<u64> = (0..self.cells()).collect();
-                up.sort_by(|a, b| self.settings(*a)[0].value().total_cmp(&self.settings(*b)[0].value()));
+                up.sort_by(|a, b| {
+                    self.settings(*a)[0].value().total_cmp(&self.settings(*b)[0].value())
+                });
                 let down: Vec<u64> = up.iter().rev().copied().collect();
                 let along = |rows: &[u64], word: &'static str| {
                     let mut before = None;
@@ -266,8 +280,10 @@ impl Scan {
                     for row in rows {
                         let cell = self.cell(*row, before.as_ref(), &asked);
                         count(&cell);
-                        // A run that fails, or is ended by an event, hands nothing on: the next one begins at the start.
-                        before = cell.as_ref().and_then(|(_, found)| found.as_ref().ok()?.end.clone());
+                        // A run that fails, or is ended by an event, hands nothing on: the next one
+                        // begins at the start.
+                        before =
+                            cell.as_ref().and_then(|(_, found)| found.as_ref().ok()?.end.clone());
                         let stopped = cell.is_none();
                         cells.push((Some(word), cell));
                         if stopped {
@@ -280,7 +296,8 @@ impl Scan {
                     Follow::Up => along(&up, "up"),
                     Follow::Down => along(&down, "down"),
                     Follow::Both => {
-                        let (mut all, down) = rayon::join(|| along(&up, "up"), || along(&down, "down"));
+                        let (mut all, down) =
+                            rayon::join(|| along(&up, "up"), || along(&down, "down"));
                         all.extend(down);
                         all
                     }
@@ -289,7 +306,8 @@ impl Scan {
         };
         let errors = || cells.iter().filter_map(|(_, c)| c.as_ref()?.1.as_ref().err());
         let (failed, first_error) = (errors().count() as u64, errors().next().cloned());
-        let (table, basins) = if self.is_map() { self.endings(&cells) } else { (self.passages(&cells), Vec::new()) };
+        let (table, basins) =
+            if self.is_map() { self.endings(&cells) } else { (self.passages(&cells), Vec::new()) };
         Scanned { table, basins, finished: finished.into_inner(), failed, first_error }
     }
 
@@ -325,7 +343,10 @@ impl Scan {
         let executor = Executor::new(None, asked);
         if self.is_map() {
             let ending = question.ending(&executor, asked)?;
-            return Ok(Found { landing: Some(Landing { word: ending.outcome.word, place: ending.place }), ..none });
+            return Ok(Found {
+                landing: Some(Landing { word: ending.outcome.word, place: ending.place }),
+                ..none
+            });
         }
         let run = &mut question.0.run;
         if let Some((state, _)) = from {
@@ -353,7 +374,9 @@ impl Scan {
         // A shift is added to a start, so it comes after it.
         let is_shift = |axis: &Axis| matches!(axis.coordinate, Coordinate::Shift(_));
         let pairs = || axes.iter().zip(settings);
-        for (axis, value) in pairs().filter(|p| !is_shift(p.0)).chain(pairs().filter(|p| is_shift(p.0))) {
+        for (axis, value) in
+            pairs().filter(|p| !is_shift(p.0)).chain(pairs().filter(|p| is_shift(p.0)))
+        {
             run = apply(&run, &axis.coordinate, value).map_err(JobError::Other)?;
         }
         run.model.values().map_err(|e| JobError::Other(e.to_string()))?;
@@ -375,14 +398,19 @@ impl Scan {
             }
             true
         };
-        let outcome = follow_watched(&run.model, options, &mut observe, &|t| asked.reached(t).is_continue())?;
+        let outcome =
+            follow_watched(&run.model, options, &mut observe, &|t| asked.reached(t).is_continue())?;
         if outcome.ending == Outcome::Interrupted {
             return Err(JobError::Interrupted);
         }
         let landing = match &outcome.ending {
             _ if !self.is_map() => None,
-            Outcome::Stopped(event) => Some(Landing { word: format!("stopped by {event}"), place: Vec::new() }),
-            Outcome::Zeno { event, .. } => Some(Landing { word: format!("{event} accumulates"), place: Vec::new() }),
+            Outcome::Stopped(event) => {
+                Some(Landing { word: format!("stopped by {event}"), place: Vec::new() })
+            }
+            Outcome::Zeno { event, .. } => {
+                Some(Landing { word: format!("{event} accumulates"), place: Vec::new() })
+            }
             _ => Some(match rests_at(&run, &outcome.x, outcome.mode, asked)? {
                 Some(place) => Landing { word: "rest".into(), place: vec![place] },
                 None => settles_on(&section, options, strobed),
@@ -425,13 +453,20 @@ impl Scan {
     /// A row per run, and the endings in order of their first occurrence.
     fn endings(&self, cells: &[(Option<&str>, Cell)]) -> (Table, Vec<Basin>) {
         let mut columns = self.columns();
-        columns.extend([Column::words("ending"), Column::integers("number"), Column::words("reason")]);
+        columns.extend([
+            Column::words("ending"),
+            Column::integers("number"),
+            Column::words("reason"),
+        ]);
         let mut table = Table::new("endings", columns);
         let mut known: Vec<(Landing, Basin)> = Vec::new();
         let mut failed = Basin { name: "failed".into(), attracts: false, cells: Vec::new() };
-        let cells: Vec<&(Vec<Entry>, Result<Found, JobError>)> = cells.iter().filter_map(|(_, c)| c.as_ref()).collect();
-        let landing = |cell: &(Vec<Entry>, Result<Found, JobError>)| cell.1.as_ref().ok()?.landing.clone();
-        let places = cells.iter().filter_map(|c| landing(c)).flat_map(|l| l.place.into_iter().flatten());
+        let cells: Vec<&(Vec<Entry>, Result<Found, JobError>)> =
+            cells.iter().filter_map(|(_, c)| c.as_ref()).collect();
+        let landing =
+            |cell: &(Vec<Entry>, Result<Found, JobError>)| cell.1.as_ref().ok()?.landing.clone();
+        let places =
+            cells.iter().filter_map(|c| landing(c)).flat_map(|l| l.place.into_iter().flatten());
         let given = cells
             .iter()
             .flat_map(|c| self.axes().iter().zip(&c.0))
@@ -441,18 +476,23 @@ impl Scan {
             Subject::Surfaces(sweep) => sweep.run().start.clone(),
             Subject::General(run, _) => start_of(run).unwrap_or_default(),
         };
-        let near = self.alike * places.chain(start.into_iter().chain(given)).fold(0.0_f64, |a, x| a.max(x.abs()));
+        let near = self.alike
+            * places.chain(start.into_iter().chain(given)).fold(0.0_f64, |a, x| a.max(x.abs()));
         let height = self.axes().get(1).map_or(1, Axis::count).max(1) as usize;
         for (row, cell) in cells.iter().enumerate() {
             let at = (row / height, row % height);
             let (word, number, reason) = match (&cell.1, landing(cell)) {
                 (Ok(_), Some(landing)) => {
-                    let index = known.iter().position(|(e, _)| e.is_like(&landing, near)).unwrap_or_else(|| {
-                        let attracts = !landing.place.is_empty();
-                        let basin = Basin { name: landing.word.clone(), attracts, cells: Vec::new() };
-                        known.push((landing.clone(), basin));
-                        known.len() - 1
-                    });
+                    let index = known
+                        .iter()
+                        .position(|(e, _)| e.is_like(&landing, near))
+                        .unwrap_or_else(|| {
+                            let attracts = !landing.place.is_empty();
+                            let basin =
+                                Basin { name: landing.word.clone(), attracts, cells: Vec::new() };
+                            known.push((landing.clone(), basin));
+                            known.len() - 1
+                        });
                     known[index].1.cells.push(at);
                     (landing.word, index as i64 + 1, String::new())
                 }
@@ -485,14 +525,20 @@ fn late(t_end: f64, states: &[&str], answer: &Answer) -> Option<Vec<(f64, Vec<f6
     let section = answer.table("section")?;
     let columns: Vec<&[f64]> = states.iter().map(|n| section.numbers(n)).collect();
     let t = section.numbers("t");
-    let upward = section.words("direction").enumerate().filter(|(row, w)| *w == "up" && t[*row] > 0.5 * t_end);
+    let upward = section
+        .words("direction")
+        .enumerate()
+        .filter(|(row, w)| *w == "up" && t[*row] > 0.5 * t_end);
     Some(upward.map(|(row, _)| (t[row], columns.iter().map(|c| c[row]).collect())).collect())
 }
 
 /// Where a run begins.
 fn start_of(run: &GeneralRun) -> Result<Vec<f64>, String> {
-    let given = run.options.start.clone().map_or_else(|| run.model.start(), |start| Ok(Some(start)));
-    given.map_err(|e| e.to_string())?.ok_or_else(|| "the file has no start; give --start".to_owned())
+    let given =
+        run.options.start.clone().map_or_else(|| run.model.start(), |start| Ok(Some(start)));
+    given
+        .map_err(|e| e.to_string())?
+        .ok_or_else(|| "the file has no start; give --start".to_owned())
 }
 
 /// The run with this value, or why it would have no effect.
@@ -505,7 +551,9 @@ fn apply(run: &GeneralRun, coordinate: &Coordinate, value: &Entry) -> Result<Gen
         place.ok_or_else(|| format!("the system has no state {name}; it has {}", states.join(", ")))
     };
     match coordinate {
-        Coordinate::Parameter(name) => run.model = run.model.with(name, number).map_err(|e| e.to_string())?,
+        Coordinate::Parameter(name) => {
+            run.model = run.model.with(name, number).map_err(|e| e.to_string())?
+        }
         Coordinate::Start(name) | Coordinate::Shift(name) => {
             let i = component(name)?;
             let mut x = start_of(&run)?;
@@ -519,7 +567,8 @@ fn apply(run: &GeneralRun, coordinate: &Coordinate, value: &Entry) -> Result<Gen
         Coordinate::TEnd => run.options.t_end = number,
         other => {
             return Err(format!(
-                "{other} belongs to systems with h, plus and minus; of a general system vary params.NAME, start.NAME, shift.NAME, rtol, atol, tolerance, max-step or t-end"
+                "{other} belongs to systems with h, plus and minus; of a general system vary \
+                    params.NAME, start.NAME, shift.NAME, rtol, atol, tolerance, max-step or t-end"
             ));
         }
     }
@@ -531,9 +580,9 @@ fn plane(run: &GeneralRun) -> [Option<usize>; 2] {
     let names = run.model.coordinates();
     let fixed = match &run.options.record {
         Record::Section(Expression::Sub(a, b)) => names.iter().position(|n| {
-            [(a, b), (b, a)]
-                .iter()
-                .any(|(one, other)| one.to_string() == *n && matches!(***other, Expression::Number(_)))
+            [(a, b), (b, a)].iter().any(|(one, other)| {
+                one.to_string() == *n && matches!(***other, Expression::Number(_))
+            })
         }),
         _ => None,
     };
@@ -541,8 +590,14 @@ fn plane(run: &GeneralRun) -> [Option<usize>; 2] {
     [free.next(), free.next()]
 }
 
-/// The state at the end, if the motion rests there: over a further twentieth of the run it moves by less than 1e-6 of the size of its states.
-fn rests_at(run: &GeneralRun, x: &[f64], mode: usize, asked: &Asked<'_>) -> Result<Option<Vec<f64>>, JobError> {
+/// The state at the end, if the motion rests there: over a further twentieth of the run it moves by
+/// less than 1e-6 of the size of its states.
+fn rests_at(
+    run: &GeneralRun,
+    x: &[f64],
+    mode: usize,
+    asked: &Asked<'_>,
+) -> Result<Option<Vec<f64>>, JobError> {
     if run.model.depends_on_time() {
         return Ok(None);
     }
@@ -566,7 +621,8 @@ fn rests_at(run: &GeneralRun, x: &[f64], mode: usize, asked: &Asked<'_>) -> Resu
         Ok(outcome) if outcome.ending == Outcome::Interrupted => Err(JobError::Interrupted),
         Ok(outcome) => {
             let moved = outcome.x.iter().zip(x).fold(moved, |a, (p, q)| a.max((p - q).abs()));
-            Ok((outcome.ending == Outcome::Finished && moved <= 1e-6 * size.max(f64::MIN_POSITIVE)).then(|| x.to_vec()))
+            Ok((outcome.ending == Outcome::Finished && moved <= 1e-6 * size.max(f64::MIN_POSITIVE))
+                .then(|| x.to_vec()))
         }
         Err(HybridError::Equation(e)) => Err(HybridError::Equation(e).into()),
         // Where motion cannot go on it does not rest.
@@ -583,7 +639,9 @@ fn settles_on(section: &[SectionPoint], options: &Options, strobed: bool) -> Lan
     };
     let evidence = attractor::classify(section, &question, &Thresholds::default());
     let word = sweep::word_of(&evidence.verdict);
-    let place =
-        evidence.verdict.cycle().map_or(Vec::new(), |c| c.points.iter().take(c.period).map(|p| p.u.to_vec()).collect());
+    let place = evidence
+        .verdict
+        .cycle()
+        .map_or(Vec::new(), |c| c.points.iter().take(c.period).map(|p| p.u.to_vec()).collect());
     Landing { word, place }
 }

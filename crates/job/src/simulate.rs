@@ -10,13 +10,17 @@ use super::recording::{Data, Future, Recording};
 use super::spec::{FunnelSpec, MethodSpec, Observation, RunSpec, SpecError, SwitchSpec};
 use super::table::Table;
 use twofold_analyse::path::MOST_POINTS;
-use twofold_analyse::{Motion, MotionRecorder, PathRecorder, Sample, SectionRecorder, TimedMotion, TimesRecorder};
+use twofold_analyse::{
+    Motion, MotionRecorder, PathRecorder, Sample, SectionRecorder, TimedMotion, TimesRecorder,
+};
 use twofold_instances::{self as instances, How, Late, Motions, Orbits, TwoSurfaces};
 use twofold_integrate::delay::{DelayError, History};
 use twofold_integrate::filippov::{
     self, AllModes, ExitRule, Faces, FilippovObserver, FilippovSummary, FunnelGrid, Mode, ModeEvent,
 };
-use twofold_integrate::{DriveOptions, Flow, Monitor, Observer, Statistics, Step, StopReason, Summary};
+use twofold_integrate::{
+    DriveOptions, Flow, Monitor, Observer, Statistics, Step, StopReason, Summary,
+};
 use twofold_system::{Bound, BoundField, Field};
 
 /// Computes a run of a system with three states.
@@ -39,18 +43,24 @@ pub fn simulate(spec: &RunSpec, monitor: &dyn Monitor) -> Result<Recording, JobE
 /// Says of a state whether a run that has come there may end.
 pub type Until<'a> = &'a dyn Fn(&[f64]) -> bool;
 
-/// Computes the section of a smoothed or hysteretic run of a system with three states, and ends it at the first step's end of which `until`
-/// holds: the recording then stops with [`StopReason::Observer`], and is otherwise that of [`simulate`].
+/// Computes the section of a smoothed or hysteretic run of a system with three states, and ends it
+/// at the first step's end of which `until` holds: the recording then stops with
+/// [`StopReason::Observer`], and is otherwise that of [`simulate`].
 ///
 /// # Errors
 ///
 /// As [`simulate`].
-pub fn simulate_until(spec: &RunSpec, until: Until<'_>, monitor: &dyn Monitor) -> Result<Recording, JobError> {
+pub fn simulate_until(
+    spec: &RunSpec,
+    until: Until<'_>,
+    monitor: &dyn Monitor,
+) -> Result<Recording, JobError> {
     spec.validate()?;
     if spec.system.dimension() != 3 {
         return Err(too_many_states(spec, "three states are looked at here"));
     }
-    let recording = three_states(spec, &mut Aside { until: Some(until), ..Aside::default() }, monitor)?;
+    let recording =
+        three_states(spec, &mut Aside { until: Some(until), ..Aside::default() }, monitor)?;
     if recording.stop == StopReason::Observer && recording.data.len() >= MOST_POINTS {
         return Err(full(recording.t));
     }
@@ -99,7 +109,8 @@ pub struct Streamed {
 ///
 /// # Errors
 ///
-/// If the spec is wrong or a funnel (whose members are computed one after the other), or the orbit cannot be followed.
+/// If the spec is wrong or a funnel (whose members are computed one after the other), or the orbit
+/// cannot be followed.
 pub fn stream(
     spec: &RunSpec,
     rows: &mut dyn FnMut(&Table) -> bool,
@@ -171,7 +182,9 @@ fn streamed<const D: usize>(
     let within = stopped.get();
     let wanted = give(end.data) || stopped.get().is_some();
     match within {
-        Some(t) => Ok(Streamed { t, rows: count, statistics: end.statistics, stop: Stop::Interrupted }),
+        Some(t) => {
+            Ok(Streamed { t, rows: count, statistics: end.statistics, stop: Stop::Interrupted })
+        }
         None => {
             let stop = if wanted { end.stop.into() } else { Stop::Found };
             Ok(Streamed { t: end.t, rows: count, statistics: end.statistics, stop })
@@ -260,7 +273,8 @@ impl<R: Recorder<D>, const D: usize> Draining<'_, '_, R, D> {
         end
     }
 
-    /// Gives points away if there are enough of them. Who keeps everything has no limit below that of memory.
+    /// Gives points away if there are enough of them. Who keeps everything has no limit below that
+    /// of memory.
     fn drained(&mut self, flow: Flow) -> Flow {
         if let Some(sink) = self.aside.sink.as_mut()
             && self.recorder.kept() >= PART
@@ -271,7 +285,9 @@ impl<R: Recorder<D>, const D: usize> Draining<'_, '_, R, D> {
     }
 }
 
-impl<R: Recorder<D> + Observer<N>, const D: usize, const N: usize> Observer<N> for Draining<'_, '_, R, D> {
+impl<R: Recorder<D> + Observer<N>, const D: usize, const N: usize> Observer<N>
+    for Draining<'_, '_, R, D>
+{
     fn step(&mut self, step: &Step<'_, N>) -> Flow {
         let mut flow = self.recorder.step(step);
         flow = self.drained(flow);
@@ -289,7 +305,9 @@ impl<R: Recorder<D> + Observer<N>, const D: usize, const N: usize> Observer<N> f
     }
 }
 
-impl<R: Recorder<D> + FilippovObserver<D>, const D: usize> FilippovObserver<D> for Draining<'_, '_, R, D> {
+impl<R: Recorder<D> + FilippovObserver<D>, const D: usize> FilippovObserver<D>
+    for Draining<'_, '_, R, D>
+{
     fn step(&mut self, mode: Mode, step: &Step<'_, D>) -> Flow {
         let mut flow = self.recorder.step(mode, step);
         flow = self.drained(flow);
@@ -311,11 +329,17 @@ fn full(t: f64) -> JobError {
 
 /// The error for a number of states that is not compiled.
 fn too_many_states(spec: &RunSpec, rule: &'static str) -> JobError {
-    SpecError { field: "system", value: format!("one of {} states", spec.system.dimension()), rule }.into()
+    SpecError { field: "system", value: format!("one of {} states", spec.system.dimension()), rule }
+        .into()
 }
 
-/// Three states: by the paper's own equations where they are the system's, which give the same bits sooner.
-fn three_states(spec: &RunSpec, aside: &mut Aside<'_, 3>, monitor: &dyn Monitor) -> Result<Recording, JobError> {
+/// Three states: by the paper's own equations where they are the system's, which give the same bits
+/// sooner.
+fn three_states(
+    spec: &RunSpec,
+    aside: &mut Aside<'_, 3>,
+    monitor: &dyn Monitor,
+) -> Result<Recording, JobError> {
     let x0 = start::<3>(spec);
     match spec.switch {
         SwitchSpec::Smoothed { eps, transition } => {
@@ -328,9 +352,15 @@ fn three_states(spec: &RunSpec, aside: &mut Aside<'_, 3>, monitor: &dyn Monitor)
         SwitchSpec::Delayed { .. } | SwitchSpec::Relay { .. } => {
             late(spec, &*instances::late(&spec.system)?, x0, aside, monitor)
         }
-        SwitchSpec::Filippov { exit, funnel } if spec.system.faces().is_none() => {
-            discontinuous(spec, &*instances::sliding(&spec.system)?, x0, exit, funnel, aside, monitor)
-        }
+        SwitchSpec::Filippov { exit, funnel } if spec.system.faces().is_none() => discontinuous(
+            spec,
+            &*instances::sliding(&spec.system)?,
+            x0,
+            exit,
+            funnel,
+            aside,
+            monitor,
+        ),
         SwitchSpec::Filippov { .. } => record::<3, 4>(spec, aside, monitor),
     }
 }
@@ -362,7 +392,9 @@ where
             late(spec, &spec.system.bind::<D>()?, x0, aside, monitor)
         }
         SwitchSpec::Filippov { exit, funnel } => match spec.system.faces() {
-            None => discontinuous(spec, &spec.system.bind::<D>()?, x0, exit, funnel, aside, monitor),
+            None => {
+                discontinuous(spec, &spec.system.bind::<D>()?, x0, exit, funnel, aside, monitor)
+            }
             Some([[a, b], [c, d]]) => {
                 let faces = [[a.bind()?, b.bind()?], [c.bind()?, d.bind()?]];
                 watched(spec, aside, &mut |settings, observer| {
@@ -419,7 +451,8 @@ fn watched<const D: usize>(
     run: &mut FilippovRun<'_, D>,
 ) -> Result<Recording<D>, JobError> {
     let settings = settings(spec);
-    let mut run = |observer: &mut dyn FilippovObserver<D>| run(&settings, observer)?.within_budget();
+    let mut run =
+        |observer: &mut dyn FilippovObserver<D>| run(&settings, observer)?.within_budget();
     let recording = |data, summary: FilippovSummary<D>| Recording {
         data,
         t: summary.t,
@@ -436,14 +469,17 @@ fn watched<const D: usize>(
             Ok(recording(Data::Motion(draining.recorder.into_motion()), end))
         }
         Observation::Times { every } => {
-            let mut draining =
-                Draining { recorder: TimedMotion::new(&start(spec), every).at_most(aside.most()), aside };
+            let mut draining = Draining {
+                recorder: TimedMotion::new(&start(spec), every).at_most(aside.most()),
+                aside,
+            };
             let end = run(&mut draining);
             let end = draining.kept_if_failed(end)?;
             Ok(recording(Data::Motion(draining.recorder.into_motion()), end))
         }
         Observation::Section { coordinate, value } => {
-            let mut draining = Draining { recorder: SectionRecorder::new(coordinate, value), aside };
+            let mut draining =
+                Draining { recorder: SectionRecorder::new(coordinate, value), aside };
             let end = run(&mut AllModes(&mut draining));
             let end = draining.kept_if_failed(end)?;
             Ok(recording(Data::Section(draining.recorder.into_crossings()), end))
@@ -493,8 +529,9 @@ fn futures<P: Motions<D> + ?Sized, const D: usize>(
 const POINTS_PER_STEP: usize = 6;
 
 fn motion<const D: usize>(trajectory: filippov::Trajectory<D>) -> Motion<D> {
-    let samples =
-        |points: Vec<(f64, SVector<f64, D>)>| points.into_iter().map(|(t, x)| Sample { t, x: x.into() }).collect();
+    let samples = |points: Vec<(f64, SVector<f64, D>)>| {
+        points.into_iter().map(|(t, x)| Sample { t, x: x.into() }).collect()
+    };
     let pieces = trajectory.pieces.into_iter().map(|p| (p.mode, samples(p.points))).collect();
     Motion { pieces, events: trajectory.events }
 }
@@ -507,7 +544,9 @@ fn late<P: Late<D> + ?Sized, const D: usize>(
     aside: &mut Aside<'_, D>,
     monitor: &dyn Monitor,
 ) -> Result<Recording<D>, JobError> {
-    let Some(switch) = spec.switch.late() else { return Err(JobError::Other("this switch has no past".into())) };
+    let Some(switch) = spec.switch.late() else {
+        return Err(JobError::Other("this switch has no past".into()));
+    };
     observed(spec, x0, aside, &mut |observer| {
         let end = system.late_orbit(&spec.system, switch, x0, &how(spec, D), observer, monitor);
         let end = end.map_err(|error| match error {
@@ -530,11 +569,14 @@ fn observe<F: Orbits<N> + ?Sized, const D: usize, const N: usize>(
     aside: &mut Aside<'_, D>,
     monitor: &dyn Monitor,
 ) -> Result<Recording<D>, JobError> {
-    observed(spec, x0, aside, &mut |observer| Ok(field.orbit(x0, &how(spec, D), observer, monitor)?.within_budget()?))
+    observed(spec, x0, aside, &mut |observer| {
+        Ok(field.orbit(x0, &how(spec, D), observer, monitor)?.within_budget()?)
+    })
 }
 
 /// A run, given what looks on.
-type AnyRun<'a, const N: usize> = dyn FnMut(&mut dyn Observer<N>) -> Result<Summary<N>, JobError> + 'a;
+type AnyRun<'a, const N: usize> =
+    dyn FnMut(&mut dyn Observer<N>) -> Result<Summary<N>, JobError> + 'a;
 
 /// A run, and what is to be recorded of it.
 fn observed<const D: usize, const N: usize>(
@@ -545,7 +587,8 @@ fn observed<const D: usize, const N: usize>(
 ) -> Result<Recording<D>, JobError> {
     let (summary, data) = match spec.observe {
         Observation::Path { chord } => {
-            let mut draining = Draining { recorder: PathRecorder::<D>::new(&x0, chord), aside: &mut *aside };
+            let mut draining =
+                Draining { recorder: PathRecorder::<D>::new(&x0, chord), aside: &mut *aside };
             let end = run(&mut draining);
             (draining.kept_if_failed(end)?, Data::Path(draining.recorder.into_samples()))
         }
@@ -556,7 +599,10 @@ fn observed<const D: usize, const N: usize>(
             (draining.kept_if_failed(end)?, Data::Path(draining.recorder.into_samples()))
         }
         Observation::Section { coordinate, value } => {
-            let mut draining = Draining { recorder: SectionRecorder::<D>::new(coordinate, value), aside: &mut *aside };
+            let mut draining = Draining {
+                recorder: SectionRecorder::<D>::new(coordinate, value),
+                aside: &mut *aside,
+            };
             let end = run(&mut draining);
             (draining.kept_if_failed(end)?, Data::Section(draining.recorder.into_crossings()))
         }
@@ -574,8 +620,13 @@ fn observed<const D: usize, const N: usize>(
 /// How the run is made; `states` of the equation's components are the system's.
 fn how(spec: &RunSpec, states: usize) -> How {
     let MethodSpec { name, tolerance, step_cap, max_steps, precision, order } = spec.method;
-    let options =
-        DriveOptions { t_end: spec.t_end, schedule: spec.schedule, step_cap, max_steps, kicked_states: states };
+    let options = DriveOptions {
+        t_end: spec.t_end,
+        schedule: spec.schedule,
+        step_cap,
+        max_steps,
+        kicked_states: states,
+    };
     How { method: name, tolerance, precision, order, options }
 }
 
@@ -620,7 +671,10 @@ mod tests {
                 for k in 1..=n {
                     let state = points.numbers(&format!("a{k}"));
                     let right = |(t, x): (&f64, &f64)| (x - (-(k as f64) * t).exp()).abs() < 1e-10;
-                    assert!(points.numbers("t").iter().zip(state).all(right), "{n} {switch:?}: {state:?}");
+                    assert!(
+                        points.numbers("t").iter().zip(state).all(right),
+                        "{n} {switch:?}: {state:?}"
+                    );
                 }
                 let state: Vec<f64> = whole.fact("state").unwrap();
                 assert_eq!((state.len(), state[n - 1]), (n, points.numbers(&format!("a{n}"))[4]));
@@ -632,8 +686,14 @@ mod tests {
             }
         }
         for switch in switches() {
-            let many = cases::run(cases::decays(9), switch, 1.0, Observation::Section { coordinate: 0, value: 0.5 });
-            let said = [answer(&many, &()).unwrap_err(), stream(&many, &mut |_| true, &()).unwrap_err()];
+            let many = cases::run(
+                cases::decays(9),
+                switch,
+                1.0,
+                Observation::Section { coordinate: 0, value: 0.5 },
+            );
+            let said =
+                [answer(&many, &()).unwrap_err(), stream(&many, &mut |_| true, &()).unwrap_err()];
             assert!(said.iter().all(|e| e.to_string().contains("up to eight states")), "{said:?}");
         }
     }
@@ -647,7 +707,10 @@ mod tests {
         for (name, from, rate) in [("a1", 0.3, 1.0), ("a2", -0.7, 2.0)] {
             let state = points.numbers(name);
             let right = |(t, x): (&f64, &f64)| (x - from * (-rate * t).exp()).abs() < 1e-10;
-            assert!(state[0] == from && points.numbers("t").iter().zip(state).all(right), "{state:?}");
+            assert!(
+                state[0] == from && points.numbers("t").iter().zip(state).all(right),
+                "{state:?}"
+            );
         }
     }
 
@@ -660,7 +723,8 @@ mod tests {
                 assert!(found.unwrap_err().to_string().contains("three states are looked at"));
             }
         }
-        let (whole, all) = (simulate(&run(3), &()).unwrap(), simulate_until(&run(3), &|_| false, &()).unwrap());
+        let (whole, all) =
+            (simulate(&run(3), &()).unwrap(), simulate_until(&run(3), &|_| false, &()).unwrap());
         assert_eq!(whole, all);
         // a2 = 1/16 at 2 ln 2: the first step's end after that.
         let until = simulate_until(&run(3), &|x| x[1] < 0.0625, &()).unwrap();
@@ -668,10 +732,12 @@ mod tests {
         assert!(until.x[1] < 0.0625 && until.t < 2.0 && whole.t == 10.0);
     }
 
-    /// A ball that falls to x = 0 from either side, passing once in two units of time: parts are cut inside pieces of its motion.
+    /// A ball that falls to x = 0 from either side, passing once in two units of time: parts are
+    /// cut inside pieces of its motion.
     #[test]
     fn parts_are_the_whole() {
-        let ball = cases::of("states = ['x', 'v']\nh = 'x'\nplus = ['v', '-1']\nminus = ['v', '1']");
+        let ball =
+            cases::of("states = ['x', 'v']\nh = 'x'\nplus = ['v', '-1']\nminus = ['v', '1']");
         let turning = cases::smooth(&["x", "v"], "x + 9", &["v", "-x"]);
         let [tanh, _, filippov] = switches();
         let times = Observation::Times { every: 1e-3 };
@@ -687,7 +753,12 @@ mod tests {
             let whole = answer(&run, &()).unwrap();
             let (end, rows, parts) = in_parts(&run);
             let (last, full) = parts.split_last().unwrap();
-            assert!(full.len() >= 2 && full.iter().all(|n| (PART..3 * PART).contains(n)) && *last < PART, "{parts:?}");
+            assert!(
+                full.len() >= 2
+                    && full.iter().all(|n| (PART..3 * PART).contains(n))
+                    && *last < PART,
+                "{parts:?}"
+            );
             assert!(whole.tables[0].integers("piece").last().is_none_or(|last| *last == pieces));
             // Blanks are not equal to each other, but look alike.
             assert!(format!("{rows:?}") == format!("{:?}", whole.tables[0].rows()), "{observe:?}");
@@ -720,11 +791,15 @@ mod tests {
             let (end, rows, parts) = in_parts(&run);
             assert!(end.statistics.steps < 1000 && parts.iter().all(|n| *n <= PART), "{parts:?}");
             assert_eq!((end.rows, end.t, end.stop), (100_001, 1.0, Stop::Finished));
-            assert!(format!("{rows:?}") == format!("{:?}", answer(&run, &()).unwrap().tables[0].rows()));
+            assert!(
+                format!("{rows:?}") == format!("{:?}", answer(&run, &()).unwrap().tables[0].rows())
+            );
             let stop = stream(&run, &mut |_| true, &UntilHalf).unwrap();
             assert_eq!(stop.stop, Stop::Interrupted);
             assert!(
-                stop.t >= 0.5 && stop.rows < 50_001 + PART as u64 && (stop.rows as usize).is_multiple_of(PART),
+                stop.t >= 0.5
+                    && stop.rows < 50_001 + PART as u64
+                    && (stop.rows as usize).is_multiple_of(PART),
                 "{stop:?}"
             );
         }
@@ -732,12 +807,19 @@ mod tests {
 
     #[test]
     fn sections_are_given_away_in_parts() {
-        let circle = cases::smooth(&["x", "y"], "x + 9", &["x*(1 - x*x - y*y) - y", "y*(1 - x*x - y*y) + x"]);
+        let circle = cases::smooth(
+            &["x", "y"],
+            "x + 9",
+            &["x*(1 - x*x - y*y) - y", "y*(1 - x*x - y*y) + x"],
+        );
         let section = Observation::Section { coordinate: 1, value: 0.0 };
         let mut run = cases::run(circle, SwitchSpec::tanh(1e-2), 30_000.0, section);
         run.method.tolerance = Tolerance { rtol: 1e-3, atol: 1e-3 };
         let (end, rows, parts) = in_parts(&run);
-        assert!(parts.len() == 2 && parts[0] == PART && end.rows as usize == rows.len(), "{parts:?}");
+        assert!(
+            parts.len() == 2 && parts[0] == PART && end.rows as usize == rows.len(),
+            "{parts:?}"
+        );
         assert!(rows == answer(&run, &()).unwrap().tables[0].rows());
     }
 
@@ -745,16 +827,26 @@ mod tests {
     #[test]
     fn kicks_are_seen_in_a_path() {
         let kick = Some(Kick { every: 0.3, size: 1e-3, law: KickLaw::Sphere, seed: 1, stream: 2 });
-        let mut run = cases::run(cases::decays(3), SwitchSpec::tanh(1e-2), 1.0, Observation::Path { chord: 1.0 });
+        let mut run = cases::run(
+            cases::decays(3),
+            SwitchSpec::tanh(1e-2),
+            1.0,
+            Observation::Path { chord: 1.0 },
+        );
         run.schedule = Schedule { restart_every: None, kick };
         let path = &answer(&run, &()).unwrap().tables[0];
         let t = path.numbers("t");
         let kicked: Vec<usize> = (1..t.len()).filter(|k| t[*k] == t[k - 1]).collect();
         assert_eq!(kicked.len(), 3, "{t:?}");
         for (k, time) in kicked.into_iter().zip([0.3, 0.6, 0.9]) {
-            let apart = ["a1", "a2", "a3"].map(|name| path.numbers(name)[k] - path.numbers(name)[k - 1]);
+            let apart =
+                ["a1", "a2", "a3"].map(|name| path.numbers(name)[k] - path.numbers(name)[k - 1]);
             let size = apart.iter().map(|d| d * d).sum::<f64>().sqrt();
-            assert!((t[k] - time).abs() < 1e-12 && (size - 1e-3).abs() < 1e-12, "{size} at {}", t[k]);
+            assert!(
+                (t[k] - time).abs() < 1e-12 && (size - 1e-3).abs() < 1e-12,
+                "{size} at {}",
+                t[k]
+            );
         }
     }
 
@@ -777,7 +869,13 @@ mod tests {
 
     #[test]
     fn a_funnel_has_no_parts() {
-        let funnel = FunnelSpec { shortest: 0.1, longest: 1.0, times: 3, horizon: 5.0, until_two_fold: true };
+        let funnel = FunnelSpec {
+            shortest: 0.1,
+            longest: 1.0,
+            times: 3,
+            horizon: 5.0,
+            until_two_fold: true,
+        };
         let switch = SwitchSpec::Filippov { exit: ExitRule::All, funnel: Some(funnel) };
         let run = cases::run(cases::decays(3), switch, 1.0, Observation::Path { chord: 1e-2 });
         let said = stream(&run, &mut |_| true, &()).unwrap_err().to_string();

@@ -1,14 +1,16 @@
 //! Runs as plain data: everything a computation depends on, and nothing else.
 //!
-//! A [`RunSpec`] can be written as JSON, hashed, and given back to `twofold run --spec`. Two equal specs give the same
-//! bytes on any machine.
+//! A [`RunSpec`] can be written as JSON, hashed, and given back to `twofold run --spec`. Two equal
+//! specs give the same bytes on any machine.
 
 use serde::{Deserialize, Serialize};
 
 use super::rest::switching;
 
 pub use twofold_integrate::Method;
-use twofold_integrate::delay::{History, Inside, LEAST_DELAY, LateSwitch, SHARP_METHODS, SMOOTH_METHODS};
+use twofold_integrate::delay::{
+    History, Inside, LEAST_DELAY, LateSwitch, SHARP_METHODS, SMOOTH_METHODS,
+};
 use twofold_integrate::filippov::ExitRule;
 use twofold_integrate::{PRECISIONS, Schedule, StepCap, Tolerance, layered};
 use twofold_num::elementary::exp10;
@@ -74,8 +76,8 @@ pub enum SwitchSpec {
         /// phi at the start.
         phi0: f64,
     },
-    /// The switch acts late (the end of sec. 4.3): f+ while h(x(t - delay)) > 0 and f- otherwise; with `eps`, phi is a function of
-    /// h(x(t - delay))/eps.
+    /// The switch acts late (the end of sec. 4.3): f+ while h(x(t - delay)) > 0 and f- otherwise;
+    /// with `eps`, phi is a function of h(x(t - delay))/eps.
     Delayed {
         /// The delay.
         delay: f64,
@@ -89,7 +91,8 @@ pub enum SwitchSpec {
         #[serde(default)]
         history: History,
     },
-    /// A relay with memory, sharp hysteresis: f+ until h falls to -band, then f- until it rises to band.
+    /// A relay with memory, sharp hysteresis: f+ until h falls to -band, then f- until it rises to
+    /// band.
     Relay {
         /// Half the width of the band.
         band: f64,
@@ -101,13 +104,15 @@ pub enum SwitchSpec {
     Filippov {
         /// How repelling sliding ends: the choice that the equations do not make.
         exit: ExitRule,
-        /// Which futures are followed if `exit` is [`ExitRule::All`]; required there, absent elsewhere.
+        /// Which futures are followed if `exit` is [`ExitRule::All`]; required there, absent
+        /// elsewhere.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         funnel: Option<FunnelSpec>,
     },
 }
 
-/// Which members of a funnel are computed: exit times, geometrically spaced, and both sides of each.
+/// Which members of a funnel are computed: exit times, geometrically spaced, and both sides of
+/// each.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FunnelSpec {
@@ -176,12 +181,13 @@ pub struct MethodSpec {
     pub order: Option<u16>,
 }
 
-/// A budget far above what any run of the paper needs; a run on the stiff far attractor reaches it within minutes.
+/// A budget far above what any run of the paper needs; a run on the stiff far attractor reaches it
+/// within minutes.
 pub const DEFAULT_MAX_STEPS: u64 = 400_000_000;
 
 impl MethodSpec {
-    /// NDSolve's defaults: AccuracyGoal = PrecisionGoal = MachinePrecision/2, so rtol = atol = 10^-7.97727; MaxStepFraction
-    /// = 1/10 of the interval.
+    /// NDSolve's defaults: AccuracyGoal = PrecisionGoal = MachinePrecision/2, so rtol = atol =
+    /// 10^-7.97727; MaxStepFraction = 1/10 of the interval.
     pub fn ndsolve_defaults(name: Method) -> Self {
         let tolerance = exp10(-7.97727);
         Self {
@@ -210,10 +216,15 @@ const FINEST_EXTENDED: f64 = 1e-32;
 /// Longest series that can be asked for: their cost grows with the square.
 const MOST_DEGREES: u16 = 1000;
 
-/// The finest tolerance that numbers of so many bits can hold: 1e-32 for 106, 2^(1 - bits) for more.
+/// The finest tolerance that numbers of so many bits can hold: 1e-32 for 106, 2^(1 - bits) for
+/// more.
 pub fn finest_extended(bits: u16) -> f64 {
     let most = PRECISIONS[PRECISIONS.len() - 1];
-    if bits <= PRECISIONS[0] { FINEST_EXTENDED } else { f64::from_bits((1024 - u64::from(bits.min(most))) << 52) }
+    if bits <= PRECISIONS[0] {
+        FINEST_EXTENDED
+    } else {
+        f64::from_bits((1024 - u64::from(bits.min(most))) << 52)
+    }
 }
 
 /// What is recorded of a run.
@@ -288,7 +299,11 @@ fn wrong_choice(field: &'static str, value: u16, rule: &'static str) -> Checked 
 }
 
 fn positive(field: &'static str, value: f64) -> Checked {
-    if value.is_finite() && value > 0.0 { Ok(()) } else { wrong(field, value, "give a finite number above zero") }
+    if value.is_finite() && value > 0.0 {
+        Ok(())
+    } else {
+        wrong(field, value, "give a finite number above zero")
+    }
 }
 
 fn finite(field: &'static str, value: f64) -> Checked {
@@ -304,7 +319,11 @@ impl RunSpec {
     pub fn validate(&self) -> Result<(), SpecError> {
         positive("t-end", self.t_end)?;
         if self.t_end > LATEST {
-            return wrong("t-end", self.t_end, "beyond 1e12 a time in f64 has no digits left for a step");
+            return wrong(
+                "t-end",
+                self.t_end,
+                "beyond 1e12 a time in f64 has no digits left for a step",
+            );
         }
         self.validate_system()?;
         match self.switch {
@@ -318,7 +337,8 @@ impl RunSpec {
                 return Err(SpecError {
                     field: "switch",
                     value: "hysteretic".into(),
-                    rule: "hysteresis is for systems with one switching surface; this one has two, so smooth them or take filippov",
+                    rule: "hysteresis is for systems with one switching surface; this one has two, \
+                        so smooth them or take filippov",
                 });
             }
             SwitchSpec::Hysteretic { eps, eps_prime, phi0, .. } => {
@@ -326,7 +346,9 @@ impl RunSpec {
                 positive("eps-prime", eps_prime)?;
                 finite("phi0", phi0)?;
             }
-            SwitchSpec::Delayed { delay, eps, transition, .. } => self.validate_delayed(delay, eps, transition)?,
+            SwitchSpec::Delayed { delay, eps, transition, .. } => {
+                self.validate_delayed(delay, eps, transition)?
+            }
             SwitchSpec::Relay { band, inside } => self.validate_relay(band, inside)?,
             SwitchSpec::Filippov { exit, funnel } => self.validate_filippov(exit, funnel)?,
         }
@@ -352,7 +374,11 @@ impl RunSpec {
         }
         if let Err(wrong) = self.system.check() {
             let value = format!("one in which {wrong}");
-            return Err(SpecError { field: "system", value, rule: "the equations make no sense with it" });
+            return Err(SpecError {
+                field: "system",
+                value,
+                rule: "the equations make no sense with it",
+            });
         }
         match states.iter().find(|s| COLUMNS.contains(s)) {
             Some(name) => Err(SpecError {
@@ -364,14 +390,21 @@ impl RunSpec {
         }
     }
 
-    fn validate_delayed(&self, delay: f64, eps: Option<f64>, transition: Option<Transition>) -> Checked {
+    fn validate_delayed(
+        &self,
+        delay: f64,
+        eps: Option<f64>,
+        transition: Option<Transition>,
+    ) -> Checked {
         positive("delay", delay)?;
         if delay >= self.t_end {
-            let rule = "the switch would never see the run: give a delay below the end time, or a later end";
+            let rule = "the switch would never see the run: give a delay below the end time, or a \
+                later end";
             return wrong("delay", delay, rule);
         }
         if delay < LEAST_DELAY * self.t_end {
-            let rule = "times near the end are too coarse in f64 to tell apart what happens in one delay: give a longer delay, or an earlier end";
+            let rule = "times near the end are too coarse in f64 to tell apart what happens in one \
+                delay: give a longer delay, or an earlier end";
             return wrong("delay", delay, rule);
         }
         self.validate_one_surface("delayed")?;
@@ -382,7 +415,8 @@ impl RunSpec {
             return Err(SpecError {
                 field: "transition",
                 value: if transition.is_some() { "given".into() } else { "missing".into() },
-                rule: "the smooth delayed switch has both eps and a transition, the sharp one neither",
+                rule: "the smooth delayed switch has both eps and a transition, the sharp one \
+                    neither",
             });
         }
         if let Some(Transition::PerturbedTanh { sigma }) = transition {
@@ -397,11 +431,14 @@ impl RunSpec {
                 rule: "it cannot follow an equation with a past; take dopri5 or radau5",
             });
         }
-        let events = [("restart", self.schedule.restart_every), ("kick-every", self.schedule.kick.map(|k| k.every))];
+        let events = [
+            ("restart", self.schedule.restart_every),
+            ("kick-every", self.schedule.kick.map(|k| k.every)),
+        ];
         for (field, every) in events {
             if let Some(every) = every.filter(|every| *every <= delay) {
-                let rule =
-                    "the first would come before the switch has seen the start: give an interval longer than the delay";
+                let rule = "the first would come before the switch has seen the start: give an \
+                    interval longer than the delay";
                 return wrong(field, every, rule);
             }
         }
@@ -428,7 +465,8 @@ impl RunSpec {
         Err(SpecError {
             field: "switch",
             value: switch.into(),
-            rule: "it is for systems with one switching surface; this one has two, so smooth them or take filippov",
+            rule: "it is for systems with one switching surface; this one has two, so smooth them \
+                or take filippov",
         })
     }
 
@@ -436,13 +474,16 @@ impl RunSpec {
     fn validate_sharp_method(&self) -> Checked {
         let name = self.method.name;
         if !SHARP_METHODS.contains(&name) {
-            let rule = "it cannot end its steps at the switches; take dopri5, taylor or taylor-extended";
+            let rule =
+                "it cannot end its steps at the switches; take dopri5, taylor or taylor-extended";
             return Err(SpecError { field: "method", value: name.name().into(), rule });
         }
         match self.method.precision.filter(|bits| *bits != PRECISIONS[0]) {
-            Some(bits) => {
-                wrong_choice("precision", bits, "such a switch is followed with 106 bits at most; leave it out")
-            }
+            Some(bits) => wrong_choice(
+                "precision",
+                bits,
+                "such a switch is followed with 106 bits at most; leave it out",
+            ),
             None => Ok(()),
         }
     }
@@ -450,14 +491,17 @@ impl RunSpec {
     fn validate_filippov(&self, exit: ExitRule, funnel: Option<FunnelSpec>) -> Checked {
         let wrong_exit = |rule| Err(SpecError { field: "exit", value: exit.to_string(), rule });
         if exit.validate().is_err() {
-            return wrong_exit("times and lengths are finite and not below 0, probabilities between 0 and 1");
+            return wrong_exit(
+                "times and lengths are finite and not below 0, probabilities between 0 and 1",
+            );
         }
         if (exit == ExitRule::All) != funnel.is_some() {
             return wrong_exit("\"all\" and a description of the funnel go together");
         }
         if funnel.is_some() && self.system.definition().second().is_some() {
             return wrong_exit(
-                "all futures are followed at one switching surface; this system has two, so give another rule",
+                "all futures are followed at one switching surface; this system has two, so give \
+                    another rule",
             );
         }
         if let Some(funnel) = funnel {
@@ -465,7 +509,11 @@ impl RunSpec {
             positive("funnel-longest", funnel.longest)?;
             positive("funnel-horizon", funnel.horizon)?;
             if funnel.times == 0 || funnel.times > 100_000 {
-                return wrong("funnel-times", funnel.times as f64, "give a number from 1 to 100000");
+                return wrong(
+                    "funnel-times",
+                    funnel.times as f64,
+                    "give a number from 1 to 100000",
+                );
             }
             match self.observe {
                 Observation::Path { .. } => {}
@@ -473,7 +521,9 @@ impl RunSpec {
                     return wrong_exit("a funnel is recorded as paths; leave out --section");
                 }
                 Observation::Times { .. } => {
-                    return wrong_exit("a funnel is recorded at fixed points of each step; leave out --every");
+                    return wrong_exit(
+                        "a funnel is recorded at fixed points of each step; leave out --every",
+                    );
                 }
             }
         }
@@ -495,14 +545,18 @@ impl RunSpec {
     }
 
     fn validate_layered(&self) -> Checked {
-        let refused = |rule| Err(SpecError { field: "method", value: Method::Layered.name().into(), rule });
+        let refused =
+            |rule| Err(SpecError { field: "method", value: Method::Layered.name().into(), rule });
         let SwitchSpec::Smoothed { eps, transition } = self.switch else {
-            return refused("it is for smoothed systems, whose layer it crosses; take lsoda or radau5");
+            return refused(
+                "it is for smoothed systems, whose layer it crosses; take lsoda or radau5",
+            );
         };
         match layered::applicable(Field::smoothed(&self.system, transition, eps).tape()) {
             Ok(()) => Ok(()),
             Err(_) => refused(
-                "it needs fields f+ and f- that are polynomials, and the transition tanh between them: this system has others; take taylor, lsoda or dopri5",
+                "it needs fields f+ and f- that are polynomials, and the transition tanh between \
+                    them: this system has others; take taylor, lsoda or dopri5",
             ),
         }
     }
@@ -511,13 +565,21 @@ impl RunSpec {
         if let Some(every) = self.schedule.restart_every {
             positive("restart", every)?;
             if self.t_end / every > 1e9 {
-                return wrong("restart", every, "that is more than 10^9 restarts; give a longer interval");
+                return wrong(
+                    "restart",
+                    every,
+                    "that is more than 10^9 restarts; give a longer interval",
+                );
             }
         }
         let Some(kick) = self.schedule.kick else { return Ok(()) };
         positive("kick-every", kick.every)?;
         if self.t_end / kick.every > 1e9 {
-            return wrong("kick-every", kick.every, "that is more than 10^9 kicks; give a longer interval");
+            return wrong(
+                "kick-every",
+                kick.every,
+                "that is more than 10^9 kicks; give a longer interval",
+            );
         }
         if !(kick.size.is_finite() && kick.size >= 0.0) {
             return wrong("kick-size", kick.size, "give a finite number, zero or above");
@@ -531,13 +593,21 @@ impl RunSpec {
             Observation::Times { every } => {
                 positive("every", every)?;
                 if self.t_end / every > 1e15 {
-                    return wrong("every", every, "f64 cannot count so many moments; give a longer interval");
+                    return wrong(
+                        "every",
+                        every,
+                        "f64 cannot count so many moments; give a longer interval",
+                    );
                 }
                 Ok(())
             }
             Observation::Section { coordinate, value } => {
                 if coordinate >= self.system.dimension() {
-                    return wrong("section", coordinate as f64, "that is not the number of a state; they count from 0");
+                    return wrong(
+                        "section",
+                        coordinate as f64,
+                        "that is not the number of a state; they count from 0",
+                    );
                 }
                 finite("section", value)
             }
@@ -558,12 +628,20 @@ impl MethodSpec {
                 );
             }
             if !PRECISIONS.contains(&bits) {
-                return wrong("precision", f64::from(bits), "numbers have 106 or 192 bits; give one of these");
+                return wrong(
+                    "precision",
+                    f64::from(bits),
+                    "numbers have 106 or 192 bits; give one of these",
+                );
             }
         }
         if let Some(order) = self.order {
             if self.name != Method::TaylorExtended {
-                return wrong_choice("order", order, "only taylor-extended has a choice of order; leave it out");
+                return wrong_choice(
+                    "order",
+                    order,
+                    "only taylor-extended has a choice of order; leave it out",
+                );
             }
             if !(4..=MOST_DEGREES).contains(&order) {
                 return wrong_choice("order", order, "series have 4 to 1000 degrees");
@@ -571,10 +649,14 @@ impl MethodSpec {
         }
         let (finest, rule) = match self.name {
             Method::TaylorExtended => match self.precision {
-                None | Some(106) => (FINEST_EXTENDED, "double-double arithmetic carries 32 digits; give 1e-32 or more"),
+                None | Some(106) => (
+                    FINEST_EXTENDED,
+                    "double-double arithmetic carries 32 digits; give 1e-32 or more",
+                ),
                 Some(bits) => (
                     finest_extended(bits),
-                    "numbers of that precision do not carry so many digits; give more, or raise the precision",
+                    "numbers of that precision do not carry so many digits; give more, or raise \
+                        the precision",
                 ),
             },
             Method::Taylor => (1e-17, "f64 carries 16 digits; give 1e-17 or more"),
@@ -584,7 +666,8 @@ impl MethodSpec {
             return wrong("rtol", self.tolerance.rtol, rule);
         }
         if self.tolerance.atol < FINEST_ATOL && self.precision.is_none() {
-            let rule = "errors are divided by it and squared, which f64 cannot hold below 1e-140; give that or more";
+            let rule = "errors are divided by it and squared, which f64 cannot hold below 1e-140; \
+                give that or more";
             return wrong("atol", self.tolerance.atol, rule);
         }
         match self.step_cap {
@@ -609,7 +692,12 @@ mod tests {
     const SECTION: Observation = Observation::Section { coordinate: 1, value: 0.0 };
 
     fn smoothed() -> RunSpec {
-        let run = cases::run(Caricature::with_reinjection(1e-1, 1e-5).into(), SwitchSpec::tanh(1e-3), 20.0, SECTION);
+        let run = cases::run(
+            Caricature::with_reinjection(1e-1, 1e-5).into(),
+            SwitchSpec::tanh(1e-3),
+            20.0,
+            SECTION,
+        );
         assert_eq!(run.validate(), Ok(()));
         run
     }
@@ -627,8 +715,13 @@ mod tests {
         run
     }
 
-    const FUNNEL: FunnelSpec =
-        FunnelSpec { shortest: 0.1, longest: 1.0, times: 100_000, horizon: 5.0, until_two_fold: true };
+    const FUNNEL: FunnelSpec = FunnelSpec {
+        shortest: 0.1,
+        longest: 1.0,
+        times: 100_000,
+        horizon: 5.0,
+        until_two_fold: true,
+    };
 
     fn funnel() -> RunSpec {
         let switch = SwitchSpec::Filippov { exit: ExitRule::All, funnel: Some(FUNNEL) };
@@ -642,7 +735,10 @@ mod tests {
             let mut run = good();
             change(&mut run);
             let error = run.validate().expect_err(&format!("case {i}, {field}: {word}"));
-            assert!(error.field == *field && error.rule.contains(word), "case {i}, {field}, {word}: {error}");
+            assert!(
+                error.field == *field && error.rule.contains(word),
+                "case {i}, {field}, {word}: {error}"
+            );
         }
     }
 
@@ -650,7 +746,8 @@ mod tests {
 
     fn extended(run: &mut RunSpec, precision: Option<u16>, order: Option<u16>, tolerance: f64) {
         let tolerance = Tolerance { rtol: tolerance, atol: tolerance };
-        run.method = MethodSpec { name: Method::TaylorExtended, tolerance, precision, order, ..run.method };
+        run.method =
+            MethodSpec { name: Method::TaylorExtended, tolerance, precision, order, ..run.method };
     }
 
     #[test]
@@ -662,8 +759,16 @@ mod tests {
             (|r| r.t_end = 1.1e12, "t-end", "no digits left"),
             (|r| r.start.truncate(2), "start", "one number for each"),
             (|r| r.start[2] = f64::NAN, "start", "finite"),
-            (|r| r.system = cases::smooth(&["x", "mode", "z"], "x", &["1", "1", "1"]), "system", "rename the state"),
-            (|r| r.system = cases::smooth(&["x", "y", "arc"], "x", &["1", "1", "1"]), "system", "rename the state"),
+            (
+                |r| r.system = cases::smooth(&["x", "mode", "z"], "x", &["1", "1", "1"]),
+                "system",
+                "rename the state",
+            ),
+            (
+                |r| r.system = cases::smooth(&["x", "y", "arc"], "x", &["1", "1", "1"]),
+                "system",
+                "rename the state",
+            ),
             (|r| r.switch = SwitchSpec::tanh(0.0), "eps", "above zero"),
             (|r| r.switch = SwitchSpec::tanh(f64::NAN), "eps", "finite"),
             (
@@ -684,9 +789,17 @@ mod tests {
             (|r| r.method.precision = Some(106), "precision", "leave it out"),
             (|r| r.method.order = Some(20), "order", "leave it out"),
             (|r| r.method.step_cap = StepCap::Absolute(0.0), "max-step", "above zero"),
-            (|r| r.method.step_cap = StepCap::FractionOfSegment(f64::NAN), "max-step fraction", "finite"),
+            (
+                |r| r.method.step_cap = StepCap::FractionOfSegment(f64::NAN),
+                "max-step fraction",
+                "finite",
+            ),
             (|r| r.method.max_steps = 0, "max-steps", "at least one"),
-            (|r| (r.method.name, r.method.tolerance.rtol) = (Method::Taylor, 9e-18), "rtol", "1e-17"),
+            (
+                |r| (r.method.name, r.method.tolerance.rtol) = (Method::Taylor, 9e-18),
+                "rtol",
+                "1e-17",
+            ),
             (|r| extended(r, None, None, 9e-33), "rtol", "1e-32"),
             (|r| extended(r, Some(106), None, 9e-33), "rtol", "1e-32"),
             (|r| extended(r, Some(192), None, 3e-58), "rtol", "raise the precision"),
@@ -714,12 +827,24 @@ mod tests {
             (|r| r.schedule.kick = Some(Kick { every: -1.0, ..KICK }), "kick-every", "above zero"),
             (|r| r.schedule.kick = Some(Kick { every: 1.9e-8, ..KICK }), "kick-every", "10^9"),
             (|r| r.schedule.kick = Some(Kick { size: -1.0, ..KICK }), "kick-size", "zero or above"),
-            (|r| r.schedule.kick = Some(Kick { size: f64::INFINITY, ..KICK }), "kick-size", "zero or above"),
+            (
+                |r| r.schedule.kick = Some(Kick { size: f64::INFINITY, ..KICK }),
+                "kick-size",
+                "zero or above",
+            ),
             (|r| r.observe = Observation::Path { chord: 0.0 }, "chord", "above zero"),
             (|r| r.observe = Observation::Times { every: 0.0 }, "every", "above zero"),
             (|r| r.observe = Observation::Times { every: 1.9e-14 }, "every", "cannot count"),
-            (|r| r.observe = Observation::Section { coordinate: 3, value: 0.0 }, "section", "count from 0"),
-            (|r| r.observe = Observation::Section { coordinate: 2, value: f64::NAN }, "section", "finite"),
+            (
+                |r| r.observe = Observation::Section { coordinate: 3, value: 0.0 },
+                "section",
+                "count from 0",
+            ),
+            (
+                |r| r.observe = Observation::Section { coordinate: 2, value: f64::NAN },
+                "section",
+                "finite",
+            ),
         ];
         refused(smoothed, cases);
     }
@@ -746,7 +871,12 @@ mod tests {
             |r| r.observe = Observation::Times { every: 2.1e-14 },
             |r| r.observe = Observation::Section { coordinate: 2, value: -1.0 },
             |r| r.method.max_steps = 1,
-            |r| r.switch = SwitchSpec::Smoothed { eps: 1e-3, transition: Transition::PerturbedTanh { sigma: -1.0 } },
+            |r| {
+                r.switch = SwitchSpec::Smoothed {
+                    eps: 1e-3,
+                    transition: Transition::PerturbedTanh { sigma: -1.0 },
+                }
+            },
         ];
         for (i, change) in cases.iter().enumerate() {
             let mut run = smoothed();
@@ -768,10 +898,20 @@ mod tests {
     #[test]
     fn every_rule_of_a_filippov_run_is_kept() {
         let law = SlidingLaw::Exponential { mean: 0.5 };
-        assert!(ExitRule::Random { law, plus_probability: 1.0, seed: 1, stream: 0 }.validate().is_ok());
+        assert!(
+            ExitRule::Random { law, plus_probability: 1.0, seed: 1, stream: 0 }.validate().is_ok()
+        );
         let cases: &[(Change, &str, &str)] = &[
-            (|r| exit(r, ExitRule::AfterTime { time: -1.0, side: Side::Plus }), "exit", "not below 0"),
-            (|r| exit(r, ExitRule::AfterArc { arc: f64::NAN, side: Side::Plus }), "exit", "not below 0"),
+            (
+                |r| exit(r, ExitRule::AfterTime { time: -1.0, side: Side::Plus }),
+                "exit",
+                "not below 0",
+            ),
+            (
+                |r| exit(r, ExitRule::AfterArc { arc: f64::NAN, side: Side::Plus }),
+                "exit",
+                "not below 0",
+            ),
             (
                 |r| {
                     let law = SlidingLaw::Uniform { longest: 1.0 };
@@ -839,7 +979,8 @@ mod tests {
     #[test]
     fn every_rule_of_a_delayed_run_is_kept() {
         fn smooth(run: &mut RunSpec, eps: Option<f64>, transition: Option<Transition>) {
-            run.switch = SwitchSpec::Delayed { delay: 1e-3, eps, transition, history: History::Flow };
+            run.switch =
+                SwitchSpec::Delayed { delay: 1e-3, eps, transition, history: History::Flow };
         }
         let cases: &[(Change, &str, &str)] = &[
             (|r| r.switch = SwitchSpec::delayed(0.0), "delay", "above zero"),
@@ -851,7 +992,11 @@ mod tests {
             (|r| smooth(r, Some(0.0), Some(Transition::Erf)), "eps", "above zero"),
             (|r| smooth(r, Some(1e-3), None), "transition", "both"),
             (|r| smooth(r, None, Some(Transition::Erf)), "transition", "neither"),
-            (|r| smooth(r, Some(1e-3), Some(Transition::PerturbedTanh { sigma: f64::NAN })), "sigma", "finite"),
+            (
+                |r| smooth(r, Some(1e-3), Some(Transition::PerturbedTanh { sigma: f64::NAN })),
+                "sigma",
+                "finite",
+            ),
             (|r| r.method.name = Method::Lsoda, "method", "taylor-extended"),
             (|r| r.method.name = Method::Radau5, "method", "taylor-extended"),
             (
@@ -864,7 +1009,11 @@ mod tests {
             ),
             (|r| extended(r, Some(192), None, 1e-30), "precision", "106 bits"),
             (|r| r.schedule.restart_every = Some(1e-3), "restart", "longer than the delay"),
-            (|r| r.schedule.kick = Some(Kick { every: 1e-4, ..KICK }), "kick-every", "longer than the delay"),
+            (
+                |r| r.schedule.kick = Some(Kick { every: 1e-4, ..KICK }),
+                "kick-every",
+                "longer than the delay",
+            ),
         ];
         refused(delayed, cases);
         let fine: [Change; 4] = [
@@ -892,7 +1041,10 @@ mod tests {
         }
         // Half of the digits of a double (53 bits are 15.95 of them).
         let half = MethodSpec::defaults(Method::Lsoda).tolerance;
-        assert!(half.rtol == half.atol && (-half.rtol.log10() - 0.5 * 53.0 * 2.0_f64.log10()).abs() < 1e-4);
+        assert!(
+            half.rtol == half.atol
+                && (-half.rtol.log10() - 0.5 * 53.0 * 2.0_f64.log10()).abs() < 1e-4
+        );
         let finest = MethodSpec::defaults(Method::TaylorExtended).tolerance;
         assert_eq!(finest, Tolerance { rtol: 1e-32, atol: 1e-32 });
     }

@@ -1,8 +1,10 @@
 //! Answers on disk, by key, so that nothing is computed twice.
 //!
-//! An entry is one file, written to a temporary name and renamed, so that several processes may use one store: who reads sees a whole entry or
-//! none. An entry names its question and carries the digest of its own bytes; one that is damaged, cut short, or belongs to another
-//! question is noticed and computed again. No link in a store is followed, and nothing in it is removed that is no entry. Nothing that is checked or published rests on a store: see `--fresh`.
+//! An entry is one file, written to a temporary name and renamed, so that several processes may use
+//! one store: who reads sees a whole entry or none. An entry names its question and carries the
+//! digest of its own bytes; one that is damaged, cut short, or belongs to another question is
+//! noticed and computed again. No link in a store is followed, and nothing in it is removed that is
+//! no entry. Nothing that is checked or published rests on a store: see `--fresh`.
 
 use std::fs::{self, FileType};
 use std::io;
@@ -106,12 +108,17 @@ impl Store {
         }
         let bytes = match files::read(&path) {
             Ok(bytes) => bytes,
-            Err(error) if error.source.kind() == std::io::ErrorKind::NotFound => return Kept::Nothing,
+            Err(error) if error.source.kind() == std::io::ErrorKind::NotFound => {
+                return Kept::Nothing;
+            }
             Err(error) => return Kept::Damaged(error.to_string()),
         };
         match read(&bytes) {
             Ok((header, answer)) => {
-                if header.key == *key && header.kind == question.kind() && header.question == question.json() {
+                if header.key == *key
+                    && header.kind == question.kind()
+                    && header.question == question.json()
+                {
                     Kept::Answer(answer)
                 } else {
                     Kept::Damaged(format!("{} answers another question", path.display()))
@@ -126,7 +133,12 @@ impl Store {
     /// # Errors
     ///
     /// If the file cannot be written.
-    pub fn put(&self, key: &Hash, question: &dyn Question, answer: &Answer) -> Result<(), FileError> {
+    pub fn put(
+        &self,
+        key: &Hash,
+        question: &dyn Question,
+        answer: &Answer,
+    ) -> Result<(), FileError> {
         let header = Header {
             key: key.clone(),
             kind: question.kind().to_owned(),
@@ -153,14 +165,19 @@ impl Store {
         for place in [path.parent(), Some(path)].into_iter().flatten() {
             if fs::symlink_metadata(place).is_ok_and(|m| m.is_symlink()) {
                 let source = io::Error::other("it is a link, and a store follows none; remove it");
-                return Err(FileError { action: "use the store's", path: place.to_path_buf(), source });
+                return Err(FileError {
+                    action: "use the store's",
+                    path: place.to_path_buf(),
+                    source,
+                });
             }
         }
         Ok(())
     }
 
-    /// The entries, sorted by path. Only what the program wrote is one: a plain file at XX/KEY.answer that is an answer with its
-    /// digest, or a damaged one that begins as the answer to KEY does. Links are not followed, and everything else is passed over.
+    /// The entries, sorted by path. Only what the program wrote is one: a plain file at
+    /// XX/KEY.answer that is an answer with its digest, or a damaged one that begins as the answer
+    /// to KEY does. Links are not followed, and everything else is passed over.
     ///
     /// # Errors
     ///
@@ -172,16 +189,26 @@ impl Store {
         }
         for folder in names(&self.folder, |kind| kind.is_dir())? {
             for file in names(&self.folder.join(&folder), |kind| kind.is_file())? {
-                let Some(key) = file.strip_suffix(ENDING).and_then(|name| name.strip_suffix('.')) else { continue };
+                let Some(key) = file.strip_suffix(ENDING).and_then(|name| name.strip_suffix('.'))
+                else {
+                    continue;
+                };
                 if key.get(..2) != Some(folder.as_str()) {
                     continue;
                 }
                 // A file that cannot be read is not removed.
-                let Ok(bytes) = files::read(&self.folder.join(&folder).join(&file)) else { continue };
+                let Ok(bytes) = files::read(&self.folder.join(&folder).join(&file)) else {
+                    continue;
+                };
                 let whole = read(&bytes).ok().map(|(header, _)| header);
                 if whole.is_some() || is_entry_of(key, &bytes) {
-                    let current = whole.is_some_and(|h| h.numerics == NUMERICS && h.key.as_str() == key);
-                    entries.push(Entry { path: format!("{folder}/{file}"), bytes: bytes.len() as u64, current });
+                    let current =
+                        whole.is_some_and(|h| h.numerics == NUMERICS && h.key.as_str() == key);
+                    entries.push(Entry {
+                        path: format!("{folder}/{file}"),
+                        bytes: bytes.len() as u64,
+                        current,
+                    });
                 }
             }
         }
@@ -217,10 +244,12 @@ fn names(folder: &Path, wanted: impl Fn(&FileType) -> bool) -> Result<Vec<String
     Ok(names)
 }
 
-/// Whether these bytes begin as an answer to `key` does, of any version of the numerics. The rest may be damaged.
+/// Whether these bytes begin as an answer to `key` does, of any version of the numerics. The rest
+/// may be damaged.
 fn is_entry_of(key: &str, bytes: &[u8]) -> bool {
     header_of(bytes).is_ok_and(|(header, _)| {
-        serde_json::from_slice::<Value>(header).is_ok_and(|header| header["key"].as_str() == Some(key))
+        serde_json::from_slice::<Value>(header)
+            .is_ok_and(|header| header["key"].as_str() == Some(key))
     })
 }
 
@@ -231,7 +260,8 @@ pub struct Entry {
     pub path: String,
     /// Length.
     pub bytes: u64,
-    /// Whether it is whole, its name's, and made by this program's numerics: others are never used again.
+    /// Whether it is whole, its name's, and made by this program's numerics: others are never used
+    /// again.
     pub current: bool,
 }
 
@@ -246,15 +276,20 @@ pub fn answer_in(bytes: &[u8]) -> Result<Answer, encode::Malformed> {
 
 /// The header and answer in an entry's bytes.
 fn read(bytes: &[u8]) -> Result<(Header, Answer), String> {
-    let (content, digest) = bytes.split_at_checked(bytes.len().saturating_sub(DIGEST)).ok_or("it is too short")?;
+    let (content, digest) =
+        bytes.split_at_checked(bytes.len().saturating_sub(DIGEST)).ok_or("it is too short")?;
     if Hash::of(content).as_str().as_bytes() != digest {
         return Err("its digest is not that of its content".into());
     }
     let (header, tables) = header_of(content)?;
     let header: Header = serde_json::from_slice(header).map_err(|e| e.to_string())?;
     let tables = encode::from_bits(tables).map_err(|e| e.to_string())?;
-    let answer =
-        Answer { tables, facts: header.facts.clone(), statistics: header.statistics.clone(), stop: header.stop };
+    let answer = Answer {
+        tables,
+        facts: header.facts.clone(),
+        statistics: header.statistics.clone(),
+        stop: header.stop,
+    };
     Ok((header, answer))
 }
 
@@ -330,17 +365,23 @@ mod tests {
         let foreign = super::super::question::key(&other);
         store.put(&foreign, &other, &other.compute(&Executor::quiet(), &()).unwrap()).unwrap();
         fs::copy(store.path(&foreign), &path).unwrap();
-        assert!(matches!(store.get(&key, &question), Kept::Damaged(why) if why.contains("another question")));
+        assert!(matches!(store.get(&key, &question), Kept::Damaged(why)
+                if why.contains("another question")));
 
         let entries = store.entries().unwrap();
         assert_eq!(entries.len(), 2);
-        assert_eq!(entries.iter().filter(|e| e.current).count(), 1, "the one under another's name is never used");
+        assert_eq!(
+            entries.iter().filter(|e| e.current).count(),
+            1,
+            "the one under another's name is never used"
+        );
         assert_eq!(store.prune(|_| false).unwrap(), 0);
         assert!(store.prune(|_| true).unwrap() > 0);
         assert_eq!(store.entries().unwrap(), []);
     }
 
-    /// What the store did not write stays, whatever it is called; links are followed neither when reading, writing nor removing.
+    /// What the store did not write stays, whatever it is called; links are followed neither when
+    /// reading, writing nor removing.
     #[cfg(unix)]
     #[test]
     fn what_is_not_the_stores_is_left_alone() {
@@ -352,8 +393,12 @@ mod tests {
         let key = key(&question);
         let foreign = Hash::of(b"foreign");
         let foreign_place = store.path(&foreign);
-        let notes =
-            [at("store/notes.answer"), at("store/a/b/notes.answer"), at("store/ab/notes.answer"), foreign_place];
+        let notes = [
+            at("store/notes.answer"),
+            at("store/a/b/notes.answer"),
+            at("store/ab/notes.answer"),
+            foreign_place,
+        ];
         for note in &notes {
             files::write(note, b"work").unwrap();
         }
@@ -375,7 +420,9 @@ mod tests {
         // An entry that is a link is not used, and what it leads to is not written over.
         fs::write(at("precious"), b"precious").unwrap();
         symlink(at("precious"), store.path(&key)).unwrap();
-        assert!(matches!(store.get(&key, &question), Kept::Damaged(why) if why.contains("it is a link")));
+        assert!(
+            matches!(store.get(&key, &question), Kept::Damaged(why) if why.contains("it is a link"))
+        );
         assert!(!store.has(&key) && store.put(&key, &question, &answer).is_err());
         assert_eq!(fs::read(at("precious")).unwrap(), b"precious");
     }
@@ -392,7 +439,11 @@ mod tests {
             fn json(&self) -> Value {
                 Square(self.0).json()
             }
-            fn compute(&self, executor: &Executor<'_>, monitor: &dyn Monitor) -> Result<Answer, JobError> {
+            fn compute(
+                &self,
+                executor: &Executor<'_>,
+                monitor: &dyn Monitor,
+            ) -> Result<Answer, JobError> {
                 Square(self.0).compute(executor, monitor)
             }
         }
@@ -400,7 +451,8 @@ mod tests {
         let store = Store::new(folder.path());
         let (question, answer) = (Square(3.0), Answer::of_tables(Vec::new()).with_fact("of", &3.0));
         let (ours, others) = (key(&question), key(&Square(4.0)));
-        let another = |kept: Kept| matches!(kept, Kept::Damaged(why) if why.contains("another question"));
+        let another =
+            |kept: Kept| matches!(kept, Kept::Damaged(why) if why.contains("another question"));
         store.put(&ours, &Cube(3.0), &answer).unwrap();
         assert!(another(store.get(&ours, &question)), "of another kind");
         store.put(&ours, &Square(4.0), &answer).unwrap();

@@ -1,7 +1,7 @@
 //! Tables: named columns with units, the form of all numerical results.
 //!
-//! A [`Table`] is stored by column, because that is how it is hashed and drawn; it is built row by row,
-//! because that is how computations yield.
+//! A [`Table`] is stored by column, because that is how it is hashed and drawn; it is built row by
+//! row, because that is how computations yield.
 
 use std::collections::HashMap;
 
@@ -79,7 +79,8 @@ impl Words {
             _ if self.vocabulary.len() <= SHORT => self.vocabulary.iter().position(|w| w == word),
             _ => {
                 if self.places.is_empty() {
-                    self.places = self.vocabulary.iter().enumerate().map(|(i, w)| (w.clone(), i)).collect();
+                    self.places =
+                        self.vocabulary.iter().enumerate().map(|(i, w)| (w.clone(), i)).collect();
                 }
                 self.places.get(word).copied()
             }
@@ -230,7 +231,8 @@ impl Table {
     ///
     /// # Panics
     ///
-    /// If the row is not of the columns' number and kinds: the program that fills the table is wrong.
+    /// If the row is not of the columns' number and kinds: the program that fills the table is
+    /// wrong.
     pub fn push(&mut self, row: impl IntoIterator<Item = Entry>) {
         let mut cells = row.into_iter();
         for column in &mut self.columns {
@@ -238,7 +240,9 @@ impl Table {
                 (Cells::Numbers(v), Some(Entry::Number(x))) => v.push(x),
                 (Cells::Integers(v), Some(Entry::Integer(x))) => v.push(x),
                 (Cells::Words(w), Some(Entry::Word(x))) => w.push(&x),
-                (_, other) => panic!("table {}, column {}: {other:?} does not fit", self.name, column.name),
+                (_, other) => {
+                    panic!("table {}, column {}: {other:?} does not fit", self.name, column.name)
+                }
             }
         }
         assert!(cells.next().is_none(), "table {}: a row with too many cells", self.name);
@@ -301,7 +305,8 @@ mod tests {
 
     #[test]
     fn rows_and_columns() {
-        let mut table = Table::new("t", [Column::numbers("x"), Column::words("mode"), Column::integers("n")]);
+        let mut table =
+            Table::new("t", [Column::numbers("x"), Column::words("mode"), Column::integers("n")]);
         for (x, mode, n) in [(0.5, "up", 1), (1.5, "down", 2), (2.5, "up", 3)] {
             table.push([x.into(), mode.into(), Entry::Integer(n)]);
         }
@@ -317,7 +322,9 @@ mod tests {
         let Cells::Words(words) = &table.columns[1].cells else { panic!() };
         assert_eq!(words.vocabulary, ["up", "down"]);
         // Words are the same if they are in the same rows, and first appear in the same order.
-        let same = |codes: [u32; 3], a: &str| Words::new(vec![a.into(), "down".into()], codes.to_vec()) == *words;
+        let same = |codes: [u32; 3], a: &str| {
+            Words::new(vec![a.into(), "down".into()], codes.to_vec()) == *words
+        };
         assert!(same([0, 1, 0], "up") && !same([0, 1, 1], "up") && !same([0, 1, 0], "left"));
     }
 

@@ -9,8 +9,8 @@ use serde::ser::{Serialize, Serializer};
 
 use super::{Arithmetic, DoubleDouble, MultiFloat};
 
-/// A finite number given in decimal. Plain arithmetic sees the nearest `f64`; extended precision can read the decimal number
-/// itself (0.1 is one tenth), to all digits that were given.
+/// A finite number given in decimal. Plain arithmetic sees the nearest `f64`; extended precision
+/// can read the decimal number itself (0.1 is one tenth), to all digits that were given.
 ///
 /// ```
 /// use twofold_num::Decimal;
@@ -35,7 +35,10 @@ pub enum DecimalError {
     #[error("{0} is outside the range of double precision, about 1e-307 to 1e308")]
     OutOfRange(String),
     /// Longer than [`Decimal::MAX_DIGITS`].
-    #[error("a number of more than {} characters; no arithmetic here carries so many digits", Decimal::MAX_DIGITS)]
+    #[error(
+        "a number of more than {} characters; no arithmetic here carries so many digits",
+        Decimal::MAX_DIGITS
+    )]
     TooLong,
 }
 
@@ -49,7 +52,8 @@ impl Decimal {
     }
 }
 
-/// The significant digits of a decimal number without sign, and the power of ten of the last one; `None` if `text` is no number.
+/// The significant digits of a decimal number without sign, and the power of ten of the last one;
+/// `None` if `text` is no number.
 fn significant(text: &str) -> Option<(String, i64)> {
     let (digits, mut exponent) = match text.split_once(['e', 'E']) {
         Some((digits, exponent)) => (digits, i64::from(exponent.parse::<i32>().ok()?)),
@@ -99,7 +103,9 @@ impl fmt::Display for Decimal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.digits {
             Some(digits) => f.write_str(digits),
-            None if self.value != 0.0 && !(1e-4..1e15).contains(&self.value.abs()) => write!(f, "{:e}", self.value),
+            None if self.value != 0.0 && !(1e-4..1e15).contains(&self.value.abs()) => {
+                write!(f, "{:e}", self.value)
+            }
             None => write!(f, "{}", self.value),
         }
     }
@@ -124,7 +130,11 @@ impl<'de> Deserialize<'de> for Decimal {
                 f.write_str("a finite number, or its digits as a string")
             }
             fn visit_f64<E: Error>(self, value: f64) -> Result<Decimal, E> {
-                if value.is_finite() { Ok(value.into()) } else { Err(E::custom("a parameter must be a finite number")) }
+                if value.is_finite() {
+                    Ok(value.into())
+                } else {
+                    Err(E::custom("a parameter must be a finite number"))
+                }
             }
             fn visit_i64<E: Error>(self, value: i64) -> Result<Decimal, E> {
                 value.to_string().parse().map_err(E::custom)
@@ -155,7 +165,8 @@ impl FromDecimal for f64 {
 impl FromDecimal for DoubleDouble {
     fn from_decimal(number: &Decimal) -> Self {
         match &number.digits {
-            Some(digits) => DoubleDouble::from_digits(digits).unwrap_or(DoubleDouble::from_decimal(number.value)),
+            Some(digits) => DoubleDouble::from_digits(digits)
+                .unwrap_or(DoubleDouble::from_decimal(number.value)),
             None => DoubleDouble::from_decimal(number.value),
         }
     }
@@ -191,7 +202,9 @@ mod tests {
 
     #[test]
     fn what_is_not_a_number_is_refused() {
-        for text in ["", "x", "1..2", "1e", "e5", "--1", "0x10", "nan", "inf", "1_000", " 1", "1e5.5", "."] {
+        for text in
+            ["", "x", "1..2", "1e", "e5", "--1", "0x10", "nan", "inf", "1_000", " 1", "1e5.5", "."]
+        {
             assert!(matches!(text.parse::<Decimal>(), Err(DecimalError::NotANumber(_))), "{text}");
         }
         for text in ["1e400", "1e-400", "-2e308"] {
@@ -203,7 +216,8 @@ mod tests {
 
     proptest! {
         #[test]
-        fn printed_digits_read_back(value in any::<f64>().prop_filter("normal", |v| v.is_normal())) {
+        fn printed_digits_read_back(value in any::<f64>().prop_filter("normal",
+            |v| v.is_normal())) {
             let number = Decimal::from(value);
             prop_assert_eq!(number.to_string().parse::<Decimal>().unwrap(), number);
         }
@@ -216,7 +230,10 @@ mod tests {
         }
         // 2^53 + 1 is no f64.
         let odd: Decimal = "9007199254740993".parse().unwrap();
-        assert_eq!((odd.value(), odd.to_string()), (9_007_199_254_740_992.0, "9007199254740993".into()));
+        assert_eq!(
+            (odd.value(), odd.to_string()),
+            (9_007_199_254_740_992.0, "9007199254740993".into())
+        );
         let least: Decimal = "2.2250738585072014e-308".parse().unwrap();
         assert_eq!(least.value(), f64::MIN_POSITIVE);
         assert!("1".repeat(Decimal::MAX_DIGITS).parse::<Decimal>().is_ok());
@@ -225,9 +242,14 @@ mod tests {
 
     #[test]
     fn numbers_are_written_as_people_write_them() {
-        for (value, text) in
-            [(0.0, "0"), (0.25, "0.25"), (1e-4, "0.0001"), (9e-5, "9e-5"), (1e15, "1e15"), (-1e20, "-1e20")]
-        {
+        for (value, text) in [
+            (0.0, "0"),
+            (0.25, "0.25"),
+            (1e-4, "0.0001"),
+            (9e-5, "9e-5"),
+            (1e15, "1e15"),
+            (-1e20, "-1e20"),
+        ] {
             assert_eq!(Decimal::from(value).to_string(), text);
         }
         let error = serde_json::from_str::<Decimal>("true").unwrap_err().to_string();

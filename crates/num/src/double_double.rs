@@ -1,12 +1,13 @@
 //! Double-double numbers: about 106 bits from pairs of `f64`.
 //!
-//! A value is an unevaluated sum `high + low` with |low| at most half an ulp of `high`. The building blocks are the
-//! error-free sum of Knuth (1969; TAOCP vol. 2, sec. 4.2.2) and the error-free product of Dekker (1971); the
-//! algorithms on top follow Hida, Li & Bailey (2001). Only IEEE 754 additions, multiplications and divisions are
-//! used, no fused multiply-add, so the bits are the same on every machine.
+//! A value is an unevaluated sum `high + low` with |low| at most half an ulp of `high`. The
+//! building blocks are the error-free sum of Knuth (1969; TAOCP vol. 2, sec. 4.2.2) and the
+//! error-free product of Dekker (1971); the algorithms on top follow Hida, Li & Bailey (2001). Only
+//! IEEE 754 additions, multiplications and divisions are used, no fused multiply-add, so the bits
+//! are the same on every machine.
 //!
-//! The range is that of `f64`, less a margin: Dekker's splitting overflows beyond about 1e300, and products below about
-//! 1e-290 lose their low parts.
+//! The range is that of `f64`, less a margin: Dekker's splitting overflows beyond about 1e300, and
+//! products below about 1e-290 lose their low parts.
 
 mod products;
 
@@ -78,7 +79,8 @@ impl DoubleDouble {
     /// pi.
     pub const PI: Self = Self { high: std::f64::consts::PI, low: 1.224_646_799_147_353_2e-16 };
     /// pi/2, and the part that does not fit (for argument reduction).
-    pub(super) const HALF_PI: Self = Self { high: std::f64::consts::FRAC_PI_2, low: 6.123_233_995_736_766e-17 };
+    pub(super) const HALF_PI: Self =
+        Self { high: std::f64::consts::FRAC_PI_2, low: 6.123_233_995_736_766e-17 };
     pub(super) const HALF_PI_REST: f64 = -1.497_384_904_859_169_8e-33;
     /// Doublings that undo the division by [`Self::REDUCTION`] in exp.
     const HALVINGS: u32 = 9;
@@ -91,7 +93,8 @@ impl DoubleDouble {
         Self { high, low }
     }
 
-    /// The shortest decimal number that reads as `value`: `from_decimal(0.1)` is one tenth, to 106 bits.
+    /// The shortest decimal number that reads as `value`: `from_decimal(0.1)` is one tenth, to 106
+    /// bits.
     pub fn from_decimal(value: f64) -> Self {
         if !value.is_finite() {
             return Self::from_f64(value);
@@ -100,8 +103,8 @@ impl DoubleDouble {
         Self::from_digits(&format!("{value:e}")).unwrap_or(Self::from_f64(value))
     }
 
-    /// The decimal number written as `text`: digits, point, exponent. `None` if it is not one. Digits beyond the 32nd or so are
-    /// rounded.
+    /// The decimal number written as `text`: digits, point, exponent. `None` if it is not one.
+    /// Digits beyond the 32nd or so are rounded.
     pub fn from_digits(text: &str) -> Option<Self> {
         let (digits, exponent) = match text.split_once(['e', 'E']) {
             Some((digits, exponent)) => (digits, exponent.parse::<i32>().ok()?),
@@ -204,12 +207,16 @@ impl DoubleDouble {
     /// self * 2^k; exact unless it over- or underflows.
     pub(super) fn times_power_of_two(self, k: i32) -> Self {
         // In two halves, because 2^k itself may leave the range although the product does not.
-        let (a, b) = (power_of_two((k / 2).clamp(-1022, 1023)), power_of_two((k - k / 2).clamp(-1022, 1023)));
+        let (a, b) = (
+            power_of_two((k / 2).clamp(-1022, 1023)),
+            power_of_two((k - k / 2).clamp(-1022, 1023)),
+        );
         Self { high: self.high * a * b, low: self.low * a * b }
     }
 
-    /// exp(self) - 1 for |self| < 0.36: Taylor series of self/512, then e^(2a) - 1 = 2 (e^a - 1) + (e^a - 1)^2 nine times
-    /// (Hida, Li & Bailey 2001). Without the 1, nothing is lost for small arguments.
+    /// exp(self) - 1 for |self| < 0.36: Taylor series of self/512, then e^(2a) - 1 = 2 (e^a - 1) +
+    /// (e^a - 1)^2 nine times (Hida, Li & Bailey 2001). Without the 1, nothing is lost for small
+    /// arguments.
     fn small_exp_m1(self) -> Self {
         let r = self.times_f64(1.0 / Self::REDUCTION);
         let (mut term, mut sum) = (r, r);
@@ -224,8 +231,8 @@ impl DoubleDouble {
         sum
     }
 
-    /// (sin, cos), by reduction modulo pi/2 and Taylor series. The reduction keeps about 160 bits of pi: good for
-    /// arguments up to about 1e15.
+    /// (sin, cos), by reduction modulo pi/2 and Taylor series. The reduction keeps about 160 bits
+    /// of pi: good for arguments up to about 1e15.
     fn sin_cos(self) -> (Self, Self) {
         if !self.high.is_finite() {
             let nan = Self::from_f64(f64::NAN);
@@ -391,7 +398,8 @@ impl Elementary for DoubleDouble {
             return Self::from_f64(super::elementary::ln(self.high));
         }
         if (self.high - 1.0).abs() < 0.1 {
-            // 2 atanh z, z = (x - 1)/(x + 1): keeps the relative precision where the logarithm is small. |z| < 0.053.
+            // 2 atanh z, z = (x - 1)/(x + 1): keeps the relative precision where the logarithm is
+            // small. |z| < 0.053.
             let z = (self - Self::one()) / (self + Self::one());
             let square = z * z;
             let (mut power, mut sum) = (z, z);
@@ -428,7 +436,8 @@ impl Elementary for DoubleDouble {
         if self.high.is_nan() {
             return self;
         }
-        // erf x = 2/sqrt(pi) exp(-x^2) sum of 2^n x^(2n+1)/(1 3 5 ... (2n+1)): no cancellation (Abramowitz & Stegun 7.1.6).
+        // erf x = 2/sqrt(pi) exp(-x^2) sum of 2^n x^(2n+1)/(1 3 5 ... (2n+1)): no cancellation
+        // (Abramowitz & Stegun 7.1.6).
         let square = self * self;
         let (mut term, mut sum) = (self, self);
         let mut n = 1.0;
@@ -530,8 +539,13 @@ mod tests {
 
     #[test]
     fn decimals() {
-        for (value, n, d) in [(0.1, 1.0, 10.0), (-1.2, -6.0, 5.0), (1e-5, 1.0, 1e5), (12345.678, 12345678.0, 1000.0)] {
-            assert!(gap(DoubleDouble::from_decimal(value), dd(n) / dd(d)) < 4.0 * DoubleDouble::EPSILON, "{value}");
+        for (value, n, d) in
+            [(0.1, 1.0, 10.0), (-1.2, -6.0, 5.0), (1e-5, 1.0, 1e5), (12345.678, 12345678.0, 1000.0)]
+        {
+            assert!(
+                gap(DoubleDouble::from_decimal(value), dd(n) / dd(d)) < 4.0 * DoubleDouble::EPSILON,
+                "{value}"
+            );
         }
         for exact in [0.0, 0.5, -3.0, 1e20] {
             assert_eq!(DoubleDouble::from_decimal(exact), dd(exact));
@@ -562,7 +576,8 @@ mod tests {
 
     /// A number with both parts in use.
     fn any() -> impl Strategy<Value = DoubleDouble> {
-        (-20.0..20.0_f64, -0.4..0.4_f64).prop_map(|(a, b)| DoubleDouble::new(a, a * b * f64::EPSILON))
+        (-20.0..20.0_f64, -0.4..0.4_f64)
+            .prop_map(|(a, b)| DoubleDouble::new(a, a * b * f64::EPSILON))
     }
 
     const U: f64 = DoubleDouble::EPSILON;
@@ -632,7 +647,8 @@ mod tests {
                 (dd(a).atan(), Elementary::atan(a)), (dd(a).erf(), Elementary::erf(a)),
                 (dd(a).abs().ln(), Elementary::ln(a.abs())),
             ] {
-                prop_assert!((extended.to_f64() - plain).abs() <= 4e-16 * plain.abs().max(1e-10), "{extended:?} {plain}");
+                prop_assert!((extended.to_f64() - plain).abs() <= 4e-16 * plain.abs().max(1e-10),
+                    "{extended:?} {plain}");
             }
         }
     }
@@ -640,7 +656,10 @@ mod tests {
     /// Where everything large cancels, the errors of the low parts are what is left.
     #[test]
     fn cancellation_leaves_every_bit() {
-        let (a, b) = (DoubleDouble::new(1.0, 2.0_f64.powi(-60)), DoubleDouble::new(-1.0, 2.0_f64.powi(-115)));
+        let (a, b) = (
+            DoubleDouble::new(1.0, 2.0_f64.powi(-60)),
+            DoubleDouble::new(-1.0, 2.0_f64.powi(-115)),
+        );
         let sum = a + b;
         assert_eq!((sum.high(), sum.low()), (2.0_f64.powi(-60), 2.0_f64.powi(-115)));
         let mut difference = a;
@@ -649,10 +668,13 @@ mod tests {
         assert_eq!((dd(1.0) / dd(3.0)).low(), 1.850_371_707_708_594e-17);
     }
 
-    /// pi, to 106 bits, is not pi: its sine is what is missing, 2.99e-33, and a half, a quarter and so on.
+    /// pi, to 106 bits, is not pi: its sine is what is missing, 2.99e-33, and a half, a quarter and
+    /// so on.
     #[test]
     fn multiples_of_pi_miss_by_what_was_rounded_away() {
-        let close = |a: DoubleDouble, b: f64| assert!((a.high() / b - 1.0).abs() < 1e-9, "{a:?} is not {b:e}");
+        let close = |a: DoubleDouble, b: f64| {
+            assert!((a.high() / b - 1.0).abs() < 1e-9, "{a:?} is not {b:e}")
+        };
         close(DoubleDouble::PI.sin(), -2.994_769_809_718_339_7e-33);
         close(DoubleDouble::HALF_PI.cos(), -1.497_384_904_859_169_8e-33);
         close((-DoubleDouble::PI).sin(), 2.994_769_809_718_339_7e-33);
@@ -663,10 +685,13 @@ mod tests {
         #[test]
         fn a_quotient_by_a_small_number(a in any(), n in 1_u32..2000) {
             // In twice the digits: a - n a/n, exactly.
-            let exact = |x: DoubleDouble| MultiFloat::<4>::from_f64(x.high) + MultiFloat::from_f64(x.low);
+            let exact = |x: DoubleDouble| MultiFloat::<4>::from_f64(x.high)
+                + MultiFloat::from_f64(x.low);
             let quotient = a.over(f64::from(n));
-            let error = (exact(a) - exact(quotient) * MultiFloat::from_f64(f64::from(n))).to_f64().abs();
-            prop_assert!(error <= 2.0 * DoubleDouble::EPSILON * a.high.abs(), "{a:?} / {n}: {error:e}");
+            let error = (exact(a) - exact(quotient)
+                * MultiFloat::from_f64(f64::from(n))).to_f64().abs();
+            prop_assert!(error <= 2.0 * DoubleDouble::EPSILON * a.high.abs(), "{a:?} / {n}: \
+                {error:e}");
             prop_assert_eq!(quotient, a / DoubleDouble::from_f64(f64::from(n)));
         }
     }
@@ -686,9 +711,13 @@ mod tests {
         assert_eq!(dd(f64::INFINITY).ln().to_f64(), f64::INFINITY);
         assert_eq!(dd(0.0).ln().to_f64(), f64::NEG_INFINITY);
         assert!(dd(-1.0).ln().to_f64().is_nan() && dd(f64::NAN).atan().to_f64().is_nan());
-        assert_eq!((dd(1e40).atan(), dd(-1e40).atan()), (DoubleDouble::HALF_PI, -DoubleDouble::HALF_PI));
+        assert_eq!(
+            (dd(1e40).atan(), dd(-1e40).atan()),
+            (DoubleDouble::HALF_PI, -DoubleDouble::HALF_PI)
+        );
         assert_eq!(dd(f64::NEG_INFINITY).atan(), -DoubleDouble::HALF_PI);
-        // Where the second term of a series is still within the digits: erf x = 2/sqrt(pi) (x - x^3/3).
+        // Where the second term of a series is still within the digits: erf x = 2/sqrt(pi) (x -
+        // x^3/3).
         let x = dd(1e-10);
         let want = (x - x * x * x / dd(3.0)) * dd(2.0) / DoubleDouble::PI.sqrt();
         assert!(gap(x.erf(), want) < 1e-30);

@@ -1,8 +1,8 @@
 //! Dual numbers: forward-mode differentiation.
 //!
 //! `Dual<S, N>` is a value with its N partial derivatives, `a + sum_i b_i e_i` with `e_i e_j = 0`
-//! (Griewank & Walther 2008, ch. 3). Nested duals give second derivatives; that is how second Lie derivatives
-//! at a fold come from the equations themselves.
+//! (Griewank & Walther 2008, ch. 3). Nested duals give second derivatives; that is how second Lie
+//! derivatives at a fold come from the equations themselves.
 
 use std::cmp::Ordering;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
@@ -203,7 +203,8 @@ mod tests {
             let h = 1e-6;
             let dx = (sample(x + h, y) - sample(x - h, y)) / (2.0 * h);
             let dy = (sample(x, y + h) - sample(x, y - h)) / (2.0 * h);
-            prop_assert!((d.partials[0] - dx).abs() < 1e-6 * (1.0 + dx.abs()), "{} {}", d.partials[0], dx);
+            prop_assert!((d.partials[0] - dx).abs() < 1e-6 * (1.0 + dx.abs()), "{} {}",
+                d.partials[0], dx);
             prop_assert!((d.partials[1] - dy).abs() < 1e-6 * (1.0 + dy.abs()));
         }
     }
@@ -211,7 +212,8 @@ mod tests {
     #[test]
     fn nesting_gives_second_derivatives() {
         // d^2/dx^2 tanh x = -2 tanh x (1 - tanh^2 x)
-        let x: Dual<Dual<f64, 1>, 1> = Dual { value: Dual::variable(0.3, 0), partials: [Dual::constant(1.0)] };
+        let x: Dual<Dual<f64, 1>, 1> =
+            Dual { value: Dual::variable(0.3, 0), partials: [Dual::constant(1.0)] };
         let t = elementary_tanh(0.3);
         assert!((x.tanh().partials[0].partials[0] + 2.0 * t * (1.0 - t * t)).abs() < 1e-15);
     }
@@ -234,7 +236,10 @@ mod tests {
         assert_eq!(((-b).value, (-b).partials), (-y, [-0.0, -1.0]));
         assert!(a > b && a == Dual::constant(x) && a != b);
         assert_eq!((a.sign().value, b.sign().value, b.sign().partials), (1.0, -1.0, [0.0; 2]));
-        assert_eq!((Dual::<f64, 1>::pi().value, Dual::<f64, 1>::pi().partials), (std::f64::consts::PI, [0.0]));
+        assert_eq!(
+            (Dual::<f64, 1>::pi().value, Dual::<f64, 1>::pi().partials),
+            (std::f64::consts::PI, [0.0])
+        );
     }
 
     /// Each function's slope is its derivative, written down.

@@ -13,8 +13,8 @@ pub struct Line {
     pub intercept: f64,
 }
 
-/// The line through the points (x, y); `None` with fewer than two different x. The error of the slope comes from the scatter
-/// about the line (zero for two points).
+/// The line through the points (x, y); `None` with fewer than two different x. The error of the
+/// slope comes from the scatter about the line (zero for two points).
 ///
 /// ```
 /// use twofold_num::fit::line;
@@ -38,7 +38,8 @@ pub fn line(points: &[(f64, f64)]) -> Option<Line> {
     }
     let slope = sxy / sxx;
     let intercept = my - slope * mx;
-    let residual: f64 = points.iter().map(|(x, y)| (y - intercept - slope * x) * (y - intercept - slope * x)).sum();
+    let residual: f64 =
+        points.iter().map(|(x, y)| (y - intercept - slope * x) * (y - intercept - slope * x)).sum();
     let slope_error = if points.len() > 2 { sqrt(residual / (n - 2.0) / sxx) } else { 0.0 };
     Some(Line { slope, slope_error, intercept })
 }
@@ -67,7 +68,11 @@ mod tests {
     #[test]
     fn exact_line() {
         let l = line(&[(0.0, 1.0), (1.0, 3.0), (4.0, 9.0)]).unwrap();
-        assert!((l.slope - 2.0).abs() < 1e-15 && (l.intercept - 1.0).abs() < 1e-15 && l.slope_error < 1e-15);
+        assert!(
+            (l.slope - 2.0).abs() < 1e-15
+                && (l.intercept - 1.0).abs() < 1e-15
+                && l.slope_error < 1e-15
+        );
         assert!(line(&[(1.0, 1.0), (1.0, 2.0)]).is_none());
     }
 
@@ -80,10 +85,14 @@ mod tests {
     #[test]
     fn a_line_through_scatter() {
         let l = line(&[(0.0, 0.0), (1.0, 2.0), (2.0, 1.0)]).unwrap();
-        // Residuals -1/2, 1, -1/2 about y = 1/2 + x/2; one degree of freedom, sum of squares of x about its mean 2.
+        // Residuals -1/2, 1, -1/2 about y = 1/2 + x/2; one degree of freedom, sum of squares of x
+        // about its mean 2.
         assert!((l.slope - 0.5).abs() < 1e-15 && (l.intercept - 0.5).abs() < 1e-15, "{l:?}");
         assert!((l.slope_error - 0.75_f64.sqrt()).abs() < 1e-15, "{l:?}");
-        assert_eq!(line(&[(1.0, 5.0), (3.0, 9.0)]).unwrap(), Line { slope: 2.0, slope_error: 0.0, intercept: 3.0 });
+        assert_eq!(
+            line(&[(1.0, 5.0), (3.0, 9.0)]).unwrap(),
+            Line { slope: 2.0, slope_error: 0.0, intercept: 3.0 }
+        );
         assert!(line(&[(0.0, f64::INFINITY), (1.0, 0.0)]).is_none() && line(&[]).is_none());
         assert!(line(&[(f64::INFINITY, 0.0), (1.0, 0.0)]).is_none());
     }

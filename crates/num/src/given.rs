@@ -9,7 +9,8 @@ use super::scalar::{Arithmetic, Elementary};
 #[derive(Clone, Copy, Debug)]
 pub struct Given<T = f64> {
     value: T,
-    /// That tanh, of no meaning in a constant, which has not been told. All that have been told have been told the same.
+    /// That tanh, of no meaning in a constant, which has not been told. All that have been told
+    /// have been told the same.
     tanh: T,
     // No option: a number in a register would be moved through memory for it.
     told: bool,
@@ -47,7 +48,8 @@ macro_rules! as_number {
             #[inline(always)]
             fn $function(self, other: Self) -> Self {
                 let tanh = if self.told { self.tanh } else { other.tanh };
-                Self { value: self.value $operator other.value, tanh, told: self.told || other.told }
+                Self { value: self.value $operator other.value, tanh,
+                    told: self.told || other.told }
             }
         }
     )*};

@@ -1,16 +1,19 @@
 //! Intervals: arithmetic whose results are theorems.
 //!
-//! An [`Interval`] is a closed set of real numbers between two `f64`. The result of every operation contains every value
-//! that the operation takes on its arguments (Moore 1966; Neumaier 1990; IEEE 1788-2015). Rounding outward needs no
-//! directed rounding modes: the error of a rounded sum, product, quotient or root is itself known exactly, from Knuth's
-//! TwoSum and Dekker's product, so that a bound moves to the neighbouring number if, and only if, the rounded result is on
-//! the wrong side of the exact one (Rump, Ogita & Oishi 2005; Kulisch 2013, ch. 7). Bounds are therefore the best
-//! possible ones wherever Dekker's product is exact (results between 2^-900 and 2^1000), and one neighbour wider beyond.
+//! An [`Interval`] is a closed set of real numbers between two `f64`. The result of every operation
+//! contains every value that the operation takes on its arguments (Moore 1966; Neumaier 1990; IEEE
+//! 1788-2015). Rounding outward needs no directed rounding modes: the error of a rounded sum,
+//! product, quotient or root is itself known exactly, from Knuth's TwoSum and Dekker's product, so
+//! that a bound moves to the neighbouring number if, and only if, the rounded result is on the
+//! wrong side of the exact one (Rump, Ogita & Oishi 2005; Kulisch 2013, ch. 7). Bounds are
+//! therefore the best possible ones wherever Dekker's product is exact (results between 2^-900 and
+//! 2^1000), and one neighbour wider beyond.
 //!
-//! **Nothing is silent.** There is no empty interval and no NaN. Where an operation is not defined on all of its arguments
-//! (division by an interval that holds 0, the root of one that holds negative numbers, the sign of one that holds both
-//! signs) the result is [`Interval::ENTIRE`]: "nothing is known". Everything computed from it is `ENTIRE` too, even a
-//! product with zero or a tanh, so that no inclusion can be verified by accident. Intersections say when they are empty.
+//! **Nothing is silent.** There is no empty interval and no NaN. Where an operation is not defined
+//! on all of its arguments (division by an interval that holds 0, the root of one that holds
+//! negative numbers, the sign of one that holds both signs) the result is [`Interval::ENTIRE`]:
+//! "nothing is known". Everything computed from it is `ENTIRE` too, even a product with zero or a
+//! tanh, so that no inclusion can be verified by accident. Intersections say when they are empty.
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
@@ -39,7 +42,9 @@ pub struct Interval {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Error {
     /// The bounds are not bounds.
-    #[error("no interval lies between {lower} and {upper}: give two numbers, the smaller one first")]
+    #[error(
+        "no interval lies between {lower} and {upper}: give two numbers, the smaller one first"
+    )]
     Bounds {
         /// The lower bound given.
         lower: f64,
@@ -47,7 +52,10 @@ pub enum Error {
         upper: f64,
     },
     /// The intervals have no number in common.
-    #[error("{0:?} and {1:?} have no number in common: one of them cannot be an enclosure of the same quantity")]
+    #[error(
+        "{0:?} and {1:?} have no number in common: one of them cannot be an enclosure of the same \
+            quantity"
+    )]
     Disjoint(Interval, Interval),
 }
 
@@ -59,8 +67,8 @@ const LARGE: f64 = f64::from_bits((1023 + 1000) << 52);
 /// The largest `f64` not above a + b.
 #[inline]
 fn add_down(a: f64, b: f64) -> f64 {
-    // TwoSum overflows inside only if the sum does or a summand is next to overflow; the error is NaN then
-    // (Boldo, Graillat & Muller 2017).
+    // TwoSum overflows inside only if the sum does or a summand is next to overflow; the error is
+    // NaN then (Boldo, Graillat & Muller 2017).
     let (s, e) = two_sum(a, b);
     if e >= 0.0 {
         s
@@ -100,7 +108,8 @@ fn below(p: f64, positive: bool) -> f64 {
     }
 }
 
-/// A lower bound of a b, with 0 times infinity being 0 (the infinite end of an interval is no member of it).
+/// A lower bound of a b, with 0 times infinity being 0 (the infinite end of an interval is no
+/// member of it).
 #[inline]
 fn mul_down(a: f64, b: f64) -> f64 {
     if a == 0.0 || b == 0.0 {
@@ -133,7 +142,8 @@ fn div_down(a: f64, b: f64) -> f64 {
     let q = a / b;
     if exact_range(q) && exact_range(a) && exact_range(b) {
         let (p, e) = two_product(q, b);
-        // p is next to a, so that a - p is exact (Sterbenz); the sign of the rounded difference is that of a - q b.
+        // p is next to a, so that a - p is exact (Sterbenz); the sign of the rounded difference is
+        // that of a - q b.
         let rest = (a - p) - e;
         if rest == 0.0 || (rest > 0.0) == (b > 0.0) && !rest.is_nan() {
             return q;
@@ -154,7 +164,10 @@ fn sqrt_bounds(x: f64) -> (f64, f64) {
     if exact_range(x) {
         let (p, e) = two_product(r, r);
         let rest = (x - p) - e;
-        return (if rest < 0.0 { r.next_down() } else { r }, if rest > 0.0 { r.next_up() } else { r });
+        return (
+            if rest < 0.0 { r.next_down() } else { r },
+            if rest > 0.0 { r.next_up() } else { r },
+        );
     }
     if x == 0.0 {
         return (0.0, 0.0);
@@ -218,7 +231,8 @@ impl Interval {
         if self.upper == f64::INFINITY {
             return self.lower;
         }
-        // Halves first: the sum might overflow. Subnormal bounds may lose a bit, which the clamp makes good.
+        // Halves first: the sum might overflow. Subnormal bounds may lose a bit, which the clamp
+        // makes good.
         (0.5 * self.lower + 0.5 * self.upper).clamp(self.lower, self.upper)
     }
 
@@ -252,7 +266,8 @@ impl Interval {
         other.lower <= self.lower && self.upper <= other.upper
     }
 
-    /// Whether `self` lies in the interior of `other`. (Nothing contains `ENTIRE` in its interior, not even itself.)
+    /// Whether `self` lies in the interior of `other`. (Nothing contains `ENTIRE` in its interior,
+    /// not even itself.)
     #[inline]
     pub fn interior(self, other: Self) -> bool {
         other.lower < self.lower && self.upper < other.upper
@@ -325,14 +340,16 @@ impl Interval {
         if self.magnitude() > 1e9 || self.width() >= 6.5 {
             return Self::UNIT;
         }
-        // In quarter waves: maxima at 1 + 4 k, minima at 3 + 4 k. Floors differ if an extremum may lie between the ends.
+        // In quarter waves: maxima at 1 + 4 k, minima at 3 + 4 k. Floors differ if an extremum may
+        // lie between the ends.
         let quarter = Ball::HALF_PI.interval();
         let place = |x: f64| Self::from_f64(x) / quarter + Self::from_f64(quarters);
         let (from, to) = (place(self.lower).lower, place(self.upper).upper);
         let holds = |at: f64| ((to - at) * 0.25).floor() != ((from - at) * 0.25).floor();
         let value = |x: f64| Ball::from_f64(x).sine(quarters as i64).interval();
         let ends = value(self.lower).hull(value(self.upper));
-        // A floor is reached exactly at an extremum: the neighbouring case is included by rounding outward first.
+        // A floor is reached exactly at an extremum: the neighbouring case is included by rounding
+        // outward first.
         Self {
             lower: if holds(3.0) { -1.0 } else { ends.lower.max(-1.0) },
             upper: if holds(1.0) { 1.0 } else { ends.upper.min(1.0) },
@@ -420,7 +437,8 @@ impl Div for Interval {
         if b.upper < 0.0 {
             return -a / -b;
         }
-        // The numerator's end, and the end of the positive denominator that makes the quotient extreme.
+        // The numerator's end, and the end of the positive denominator that makes the quotient
+        // extreme.
         let lower = div_down(a.lower, if a.lower >= 0.0 { b.upper } else { b.lower });
         let upper = div_up(a.upper, if a.upper <= 0.0 { b.upper } else { b.lower });
         Self { lower, upper }
@@ -457,7 +475,9 @@ impl Elementary for Interval {
     fn tanh(self) -> Self {
         self.increasing(|x| match x.is_infinite() {
             true => Self::from_f64(x.signum()),
-            false => Ball::from_f64(x).tanh().interval().intersection(Self::UNIT).unwrap_or(Self::UNIT),
+            false => {
+                Ball::from_f64(x).tanh().interval().intersection(Self::UNIT).unwrap_or(Self::UNIT)
+            }
         })
     }
     fn sech_squared(self) -> Option<Self> {
@@ -479,7 +499,10 @@ impl Elementary for Interval {
                 Self::zero()
             } else if e.is_entire() {
                 // Beyond the range of the extended numbers.
-                Self { lower: if x > 0.0 { 1e300 } else { 0.0 }, upper: if x > 0.0 { f64::INFINITY } else { 1e-250 } }
+                Self {
+                    lower: if x > 0.0 { 1e300 } else { 0.0 },
+                    upper: if x > 0.0 { f64::INFINITY } else { 1e-250 },
+                }
             } else {
                 Self { lower: e.lower.max(0.0), upper: e.upper }
             }
@@ -516,14 +539,16 @@ impl Elementary for Interval {
     fn erf(self) -> Self {
         self.increasing(|x| match x.is_infinite() {
             true => Self::from_f64(x.signum()),
-            false => Ball::from_f64(x).erf().interval().intersection(Self::UNIT).unwrap_or(Self::UNIT),
+            false => {
+                Ball::from_f64(x).erf().interval().intersection(Self::UNIT).unwrap_or(Self::UNIT)
+            }
         })
     }
     fn pi() -> Self {
         Ball::pi().interval()
     }
-    /// `ENTIRE` if the interval holds numbers of both signs: the sign is not smooth there, and an enclosure by [-1, 1] would
-    /// let a series through that does not exist.
+    /// `ENTIRE` if the interval holds numbers of both signs: the sign is not smooth there, and an
+    /// enclosure by [-1, 1] would let a series through that does not exist.
     fn sign(self) -> Self {
         if self.lower >= 0.0 {
             Self::one()
@@ -552,7 +577,8 @@ impl FromDecimal for Interval {
     }
 }
 
-/// Where the shortest decimal number that reads as an `f64` lies. It is never farther away than half the spacing to the next.
+/// Where the shortest decimal number that reads as an `f64` lies. It is never farther away than
+/// half the spacing to the next.
 enum Side {
     Exact,
     Above,
@@ -581,7 +607,8 @@ fn side(value: f64) -> Side {
     let (p, e) = two_product(value.abs(), power);
     let high = digits as f64;
     let low = (i128::from(digits) - high as i128) as f64;
-    // p and high are neighbours (or equal): their difference is exact, and the rest is small beside its spacing.
+    // p and high are neighbours (or equal): their difference is exact, and the rest is small beside
+    // its spacing.
     let (d, rest) = two_sum(high - p, low);
     let difference = d + (rest - e);
     match difference.partial_cmp(&0.0) {
@@ -618,8 +645,9 @@ impl<S: Arithmetic + FromDecimal, const N: usize> FromDecimal for Dual<S, N> {
 
 /// A number that stands for a set of reals: what validated integration computes with.
 ///
-/// Two precisions: [`Interval`], and [`Ball`] with about 32 digits. Wide sets (remainders, errors, derivatives) are always
-/// held as [`Interval`]s; only the points that they surround need the precision.
+/// Two precisions: [`Interval`], and [`Ball`] with about 32 digits. Wide sets (remainders, errors,
+/// derivatives) are always held as [`Interval`]s; only the points that they surround need the
+/// precision.
 pub trait Enclosure: Elementary + FromDecimal {
     /// The set of all numbers in an interval.
     fn from_interval(interval: Interval) -> Self;
@@ -732,7 +760,10 @@ mod tests {
         assert!(i(0.1, 1.5).sin().upper() < 1.0 && i(2.0, 4.0).sin().lower() > -1.0);
         assert_eq!(i(0.0, 7.0).sin(), Interval::UNIT);
         // Far out nothing is said, however thin the argument; nearer it is.
-        assert_eq!((Interval::from_f64(2e9).sin(), Interval::from_f64(-2e9).cos()), (Interval::UNIT, Interval::UNIT));
+        assert_eq!(
+            (Interval::from_f64(2e9).sin(), Interval::from_f64(-2e9).cos()),
+            (Interval::UNIT, Interval::UNIT)
+        );
         assert!(Interval::from_f64(9e8).sin().width() < 1e-6);
         assert!(Interval::from_f64(PI).sin().contains(1.2246467991473532e-16));
         assert!(Interval::from_f64(PI).sin().width() < 1e-30);
@@ -743,7 +774,10 @@ mod tests {
         // 1 - tanh(30)^2 is 3.5e-26: out of reach of 1 - t^2 in f64.
         let s = Interval::from_f64(30.0).sech_squared().unwrap();
         assert!(s.lower() > 0.0 && s.width() < 1e-15 * s.upper(), "{s:?}");
-        assert!(s.contains(3.5026074410400614e-26) || (s.midpoint() / 3.5026e-26 - 1.0).abs() < 1e-4, "{s:?}");
+        assert!(
+            s.contains(3.5026074410400614e-26) || (s.midpoint() / 3.5026e-26 - 1.0).abs() < 1e-4,
+            "{s:?}"
+        );
         assert_eq!(i(-1.0, 2.0).sech_squared().unwrap().upper(), 1.0);
         assert!(i(-1e300, 1e300).sech_squared().unwrap().lower() >= 0.0);
     }
@@ -751,9 +785,15 @@ mod tests {
     #[test]
     fn places_sizes_and_sides() {
         let (up, down) = (i(1.0, f64::INFINITY), i(f64::NEG_INFINITY, 2.0));
-        assert_eq!((i(1.0, 3.0).midpoint(), i(-1.0, 4.0).midpoint(), i(-3.0, -1.0).midpoint()), (2.0, 1.5, -2.0));
+        assert_eq!(
+            (i(1.0, 3.0).midpoint(), i(-1.0, 4.0).midpoint(), i(-3.0, -1.0).midpoint()),
+            (2.0, 1.5, -2.0)
+        );
         assert_eq!((up.midpoint(), down.midpoint(), Interval::ENTIRE.midpoint()), (1.0, 2.0, 0.0));
-        assert_eq!((i(1.0, 3.0).width(), i(-3.0, -1.5).width(), up.width()), (2.0, 1.5, f64::INFINITY));
+        assert_eq!(
+            (i(1.0, 3.0).width(), i(-3.0, -1.5).width(), up.width()),
+            (2.0, 1.5, f64::INFINITY)
+        );
         assert_eq!((i(-3.0, -1.0).magnitude(), i(-3.0, -1.0).mignitude()), (3.0, 1.0));
         assert_eq!((i(-1.0, 2.0).magnitude(), i(-1.0, 2.0).mignitude()), (2.0, 0.0));
         assert!(i(1.0, 3.0).is_bounded() && !up.is_bounded() && !down.is_bounded());
@@ -774,7 +814,11 @@ mod tests {
             (i(2.0, 4.0), false, false),
             (i(0.0, 2.0), false, false),
         ] {
-            assert_eq!((i(1.0, 3.0).subset(other), i(1.0, 3.0).interior(other)), (subset, interior), "{other:?}");
+            assert_eq!(
+                (i(1.0, 3.0).subset(other), i(1.0, 3.0).interior(other)),
+                (subset, interior),
+                "{other:?}"
+            );
         }
         assert_eq!(format!("{:?}", i(-0.5, 1.0)), "[-0.5, 1.0]");
         let (c, rest) = i(1.0, 4.0).split();
@@ -784,12 +828,21 @@ mod tests {
     /// Sums, products and quotients of whole numbers: exactly the extremes over the ends.
     #[test]
     fn every_case_of_signs() {
-        let ends: Vec<Interval> = (-3..=3).flat_map(|a| (a..=3).map(move |b| i(f64::from(a), f64::from(b)))).collect();
+        let ends: Vec<Interval> =
+            (-3..=3).flat_map(|a| (a..=3).map(move |b| i(f64::from(a), f64::from(b)))).collect();
         for a in &ends {
             for b in &ends {
                 let all = |f: fn(f64, f64) -> f64| {
-                    let v = [f(a.lower, b.lower), f(a.lower, b.upper), f(a.upper, b.lower), f(a.upper, b.upper)];
-                    i(v.into_iter().fold(f64::INFINITY, f64::min), v.into_iter().fold(f64::NEG_INFINITY, f64::max))
+                    let v = [
+                        f(a.lower, b.lower),
+                        f(a.lower, b.upper),
+                        f(a.upper, b.lower),
+                        f(a.upper, b.upper),
+                    ];
+                    i(
+                        v.into_iter().fold(f64::INFINITY, f64::min),
+                        v.into_iter().fold(f64::NEG_INFINITY, f64::max),
+                    )
                 };
                 assert_eq!(*a * *b, all(|x, y| x * y), "{a:?} times {b:?}");
                 assert_eq!(*a - *b, all(|x, y| x - y), "{a:?} minus {b:?}");
@@ -803,9 +856,16 @@ mod tests {
                     assert!(quotient.is_entire());
                 } else {
                     let near = all(|x, y| x / y);
-                    let tight = |bound: f64, rounded: f64, out: f64| bound == rounded || bound == out;
-                    assert!(tight(quotient.lower, near.lower, near.lower.next_down()), "{a:?} by {b:?}: {quotient:?}");
-                    assert!(tight(quotient.upper, near.upper, near.upper.next_up()), "{a:?} by {b:?}: {quotient:?}");
+                    let tight =
+                        |bound: f64, rounded: f64, out: f64| bound == rounded || bound == out;
+                    assert!(
+                        tight(quotient.lower, near.lower, near.lower.next_down()),
+                        "{a:?} by {b:?}: {quotient:?}"
+                    );
+                    assert!(
+                        tight(quotient.upper, near.upper, near.upper.next_up()),
+                        "{a:?} by {b:?}: {quotient:?}"
+                    );
                     let back = quotient * *b;
                     assert!(a.subset(back), "{a:?} by {b:?}, and back: {back:?}");
                 }
@@ -825,29 +885,47 @@ mod tests {
     #[test]
     fn rounded_bounds_enclose_and_are_neighbours() {
         let point = Interval::from_f64;
-        for (a, b) in
-            [(0.1, 0.2), (0.1, 0.7), (1.0, 1e-20), (1.0, -1e-20), (-0.1, -0.2), (-0.1, 0.7), (3.3, -1e10), (1e10, 0.3)]
-        {
+        for (a, b) in [
+            (0.1, 0.2),
+            (0.1, 0.7),
+            (1.0, 1e-20),
+            (1.0, -1e-20),
+            (-0.1, -0.2),
+            (-0.1, 0.7),
+            (3.3, -1e10),
+            (1e10, 0.3),
+        ] {
             let sum = point(a) + point(b);
             let exact = DoubleDouble::from_f64(a) + DoubleDouble::from_f64(b);
             assert!(
-                DoubleDouble::from_f64(sum.lower) <= exact && exact <= DoubleDouble::from_f64(sum.upper),
+                DoubleDouble::from_f64(sum.lower) <= exact
+                    && exact <= DoubleDouble::from_f64(sum.upper),
                 "{a} {b}"
             );
             assert_eq!(sum.lower.next_up(), sum.upper, "{a} + {b}");
             let product = point(a) * point(b);
             let exact = DoubleDouble::from_f64(a) * DoubleDouble::from_f64(b);
-            assert!(DoubleDouble::from_f64(product.lower) <= exact && exact <= DoubleDouble::from_f64(product.upper));
-            assert!(product.lower == product.upper || product.lower.next_up() == product.upper, "{a} * {b}");
+            assert!(
+                DoubleDouble::from_f64(product.lower) <= exact
+                    && exact <= DoubleDouble::from_f64(product.upper)
+            );
+            assert!(
+                product.lower == product.upper || product.lower.next_up() == product.upper,
+                "{a} * {b}"
+            );
         }
         for x in [2.0, 3.0, 0.1, 7.7, 1e10, 0.7] {
             let root = point(x).sqrt();
             let square = |r: f64| DoubleDouble::from_f64(r) * DoubleDouble::from_f64(r);
             assert!(
-                square(root.lower) <= DoubleDouble::from_f64(x) && DoubleDouble::from_f64(x) <= square(root.upper),
+                square(root.lower) <= DoubleDouble::from_f64(x)
+                    && DoubleDouble::from_f64(x) <= square(root.upper),
                 "{x}"
             );
-            assert!(root.lower == root.upper || root.lower.next_up() == root.upper, "root of {x}: {root:?}");
+            assert!(
+                root.lower == root.upper || root.lower.next_up() == root.upper,
+                "root of {x}: {root:?}"
+            );
         }
     }
 
@@ -868,7 +946,8 @@ mod tests {
         for x in [1e-70, 1e-20, 1e-3, 0.1, 0.3, 0.9, 2.5, 10.0, 36.0, 310.0] {
             for x in [x, -x] {
                 for (n, (f, extended)) in functions.iter().enumerate() {
-                    let (got, exact) = (f(Interval::from_f64(x)), extended(DoubleDouble::from_f64(x)));
+                    let (got, exact) =
+                        (f(Interval::from_f64(x)), extended(DoubleDouble::from_f64(x)));
                     let wide = |v: f64, by: f64| v + by * 1e-29 * v.abs();
                     let inside = got.lower <= wide(exact.high(), 1.0).next_up()
                         && got.upper >= wide(exact.high(), -1.0).next_down();
@@ -881,14 +960,25 @@ mod tests {
             }
         }
         let (most, least) = (i(-f64::MAX, f64::INFINITY), i(f64::NEG_INFINITY, 0.0));
-        assert_eq!((most.tanh(), most.erf(), least.exp().lower), (Interval::UNIT, Interval::UNIT, 0.0));
+        assert_eq!(
+            (most.tanh(), most.erf(), least.exp().lower),
+            (Interval::UNIT, Interval::UNIT, 0.0)
+        );
         assert_eq!(most.atan().upper, std::f64::consts::FRAC_PI_2.next_up());
         let log = i(1.0, f64::INFINITY).ln();
         assert!(log.lower <= 0.0 && log.lower > -1e-29 && log.upper == f64::INFINITY, "{log:?}");
         assert_eq!(i(1.0, f64::INFINITY).sqrt(), i(1.0, f64::INFINITY));
-        let slope = Dual::<Interval, 1>::variable(Interval::from_f64(0.5), 0).sech_squared().unwrap();
+        let slope =
+            Dual::<Interval, 1>::variable(Interval::from_f64(0.5), 0).sech_squared().unwrap();
         let (t, want) = (0.46211715726000973, -0.726_862);
-        assert!(slope.value.contains(1.0 - t * t) || (slope.value.midpoint() - (1.0 - t * t)).abs() < 1e-15);
-        assert!((slope.partials[0].midpoint() - want).abs() < 1e-5, "-2 t (1 - t^2): {:?}", slope.partials[0]);
+        assert!(
+            slope.value.contains(1.0 - t * t)
+                || (slope.value.midpoint() - (1.0 - t * t)).abs() < 1e-15
+        );
+        assert!(
+            (slope.partials[0].midpoint() - want).abs() < 1e-5,
+            "-2 t (1 - t^2): {:?}",
+            slope.partials[0]
+        );
     }
 }

@@ -1,14 +1,15 @@
 //! Balls: double-double midpoints with rigorous radii, about 32 digits.
 //!
-//! A [`Ball`] is the set of all real numbers within `radius` of a [`DoubleDouble`] midpoint (midpoint-radius arithmetic:
-//! Rump 1999; Johansson 2017). Each operation on midpoints has a proven bound on its rounding error, which goes into the
-//! radius together with the radii of the arguments; radii are computed in `f64` and rounded up.
+//! A [`Ball`] is the set of all real numbers within `radius` of a [`DoubleDouble`] midpoint
+//! (midpoint-radius arithmetic: Rump 1999; Johansson 2017). Each operation on midpoints has a
+//! proven bound on its rounding error, which goes into the radius together with the radii of the
+//! arguments; radii are computed in `f64` and rounded up.
 //!
-//! With u = 2^-53: the accurate sum errs by at most 3 u^2 + 13 u^3 of the result and the product by at most 7 u^2
-//! (Joldes, Muller & Popescu 2017, AccurateDWPlusDW and DWTimesDW1; 5 u^2 by Muller & Rideau 2022), as long as nothing overflows;
-//! what underflow can add is below 2^-1022. Quotients and roots are bounded by their own residuals, and the elementary
-//! functions are computed in ball arithmetic, so that their bounds follow from those two and a bound on the truncated
-//! series.
+//! With u = 2^-53: the accurate sum errs by at most 3 u^2 + 13 u^3 of the result and the product by
+//! at most 7 u^2 (Joldes, Muller & Popescu 2017, AccurateDWPlusDW and DWTimesDW1; 5 u^2 by Muller &
+//! Rideau 2022), as long as nothing overflows; what underflow can add is below 2^-1022. Quotients
+//! and roots are bounded by their own residuals, and the elementary functions are computed in ball
+//! arithmetic, so that their bounds follow from those two and a bound on the truncated series.
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
@@ -35,7 +36,8 @@ const PRODUCT_ERROR: f64 = two_to(-103);
 /// An upper bound of a sum of at most 16 products of non-negative numbers that was computed as `x`.
 #[inline]
 fn up(x: f64) -> f64 {
-    // Each operation loses at most 2^-53 relatively, and at most the least positive number when it underflows.
+    // Each operation loses at most 2^-53 relatively, and at most the least positive number when it
+    // underflows.
     (x * (1.0 + two_to(-47))).next_up()
 }
 
@@ -47,7 +49,8 @@ impl Ball {
     /// ln 2. The double-double differs from it by 5.708e-34.
     const LN_2: Self = Self { midpoint: DoubleDouble::LN_2, radius: 5.8e-34 };
 
-    /// The numbers within `radius` of `midpoint`; everything, unless both are finite and `radius >= 0`.
+    /// The numbers within `radius` of `midpoint`; everything, unless both are finite and `radius >=
+    /// 0`.
     #[inline]
     pub fn new(midpoint: DoubleDouble, radius: f64) -> Self {
         if (0.0..f64::INFINITY).contains(&radius) && midpoint.high().is_finite() {
@@ -138,7 +141,8 @@ impl Ball {
         let k = (x / DoubleDouble::LN_2.high()).round();
         // |r| <= ln(2)/2 + rounding < 0.36
         let r = self - Self::LN_2 * Self::from_f64(k);
-        // The reduced argument's radius is carried by the arithmetic itself only if the kernel sees it as a ball.
+        // The reduced argument's radius is carried by the arithmetic itself only if the kernel sees
+        // it as a ball.
         let e = r.thin().small_exp_m1() + Self::one();
         // |exp(r + d) - exp(r)| <= exp(r) (|d| + d^2) for |d| <= 1, and exp(r) < 1.5
         e.widened(1.6 * (r.radius + r.radius * r.radius)).times_power_of_two(k as i32)
@@ -173,7 +177,8 @@ impl Ball {
         e.widened(up(e.size() + e.radius) * (d + d * d))
     }
 
-    /// 1 - tanh^2, with a small relative error also where it is tiny: 4 e/(1 + e)^2 with e = exp(-2 |x|).
+    /// 1 - tanh^2, with a small relative error also where it is tiny: 4 e/(1 + e)^2 with e = exp(-2
+    /// |x|).
     pub(super) fn sech_squared_ball(self) -> Self {
         if self.is_entire() {
             return Self::ENTIRE;
@@ -188,8 +193,13 @@ impl Ball {
         let e = (-(w + w)).thin_exp();
         let f = e + Self::one();
         let slope = e / (f * f) * Self::from_f64(4.0);
-        // Its logarithm's slope is at most 2 in modulus: within d, it changes by at most exp(2 d) - 1 <= 2 d exp(2) of itself for d <= 1.
-        let relative = if self.radius <= 1.0 { 14.8 * self.radius } else { return Self::new(DoubleDouble::ZERO, 1.0) };
+        // Its logarithm's slope is at most 2 in modulus: within d, it changes by at most exp(2 d) -
+        // 1 <= 2 d exp(2) of itself for d <= 1.
+        let relative = if self.radius <= 1.0 {
+            14.8 * self.radius
+        } else {
+            return Self::new(DoubleDouble::ZERO, 1.0);
+        };
         slope.widened(up(slope.size() + slope.radius) * relative)
     }
 
@@ -384,17 +394,20 @@ impl Elementary for Ball {
         let spread = self.radius * 1.13;
         if size > 12.0 {
             // 1 - erf x < exp(-x^2)/x
-            return Self::new(DoubleDouble::from_f64(1.0_f64.copysign(x.midpoint.high())), 1e-62).widened(spread);
+            return Self::new(DoubleDouble::from_f64(1.0_f64.copysign(x.midpoint.high())), 1e-62)
+                .widened(spread);
         }
         if size < 1e-50 {
             // |erf x - 2 x/sqrt(pi)| < |x|^3; the terms of a series would soon be below all numbers, and never small beside x.
             let line = x * Self::from_f64(2.0) / Self::pi().sqrt();
             return line.widened(up(size * 1e-100)).widened(spread);
         }
-        // 2/sqrt(pi) exp(-x^2) sum of 2^n x^(2n+1)/(1 3 5 ... (2n+1)), all terms of one sign (Abramowitz & Stegun 7.1.6).
+        // 2/sqrt(pi) exp(-x^2) sum of 2^n x^(2n+1)/(1 3 5 ... (2n+1)), all terms of one sign
+        // (Abramowitz & Stegun 7.1.6).
         let square = x * x;
         let (mut term, mut sum, mut n) = (x, x, 0.0);
-        // Until the terms are at most half of the one before, and negligible; the rest is then at most the last one.
+        // Until the terms are at most half of the one before, and negligible; the rest is then at
+        // most the last one.
         while 2.0 * size * size > 0.49 * (2.0 * n + 3.0) || term.size() > sum.size() * 1e-33 {
             n += 1.0;
             term = term * square * Self::from_f64(2.0) / Self::from_f64(2.0 * n + 1.0);
@@ -508,19 +521,47 @@ mod tests {
 
     fn functions() -> [Function; 9] {
         let all = f64::NEG_INFINITY;
-        let f = |name, ball, fine, spread, rounding, from| Function { name, ball, fine, spread, rounding, from };
+        let f = |name, ball, fine, spread, rounding, from| Function {
+            name,
+            ball,
+            fine,
+            spread,
+            rounding,
+            from,
+        };
         // Beyond the first quadrant, pi's own error, whatever the value is.
         let reduced = |x: f64, y: f64| (0.73 + 0.11 * x) / if x > 1.0 { y } else { 1.0 };
         [
             f("exp", Ball::exp, Fine::exp, |_, r, y| y * (r + r * r), |x, _| 0.9 + 0.25 * x, all),
-            f("tanh", Ball::tanh, Fine::tanh, |x, r, _| r / cosh((x.abs() - r).max(0.0)).powi(2), |_, _| 3.7, all),
-            f("sech^2", Ball::sech_squared_ball, sech_squared, |_, r, y| 14.8 * r * y, |x, _| 2.1 + 0.48 * x, all),
+            f(
+                "tanh",
+                Ball::tanh,
+                Fine::tanh,
+                |x, r, _| r / cosh((x.abs() - r).max(0.0)).powi(2),
+                |_, _| 3.7,
+                all,
+            ),
+            f(
+                "sech^2",
+                Ball::sech_squared_ball,
+                sech_squared,
+                |_, r, y| 14.8 * r * y,
+                |x, _| 2.1 + 0.48 * x,
+                all,
+            ),
             f("sin", Ball::sin, Fine::sin, |_, r, _| r, reduced, all),
             f("cos", Ball::cos, Fine::cos, |_, r, _| r, reduced, all),
             f("ln", Ball::ln, Fine::ln, |x, r, _| r / (x - r), |_, y| (1.2 + 0.75 * y) / y, 0.01),
             f("sqrt", Ball::sqrt, Fine::sqrt, |x, r, _| r / x.sqrt(), |_, _| 0.125, 0.01),
             f("atan", Ball::atan, Fine::atan, |_, r, _| r, |_, _| 1.6, all),
-            f("erf", Ball::erf, Fine::erf, |_, r, _| 1.13 * r, |x, _| 1.15 + 1.3 * x + 0.62 * x * x, all),
+            f(
+                "erf",
+                Ball::erf,
+                Fine::erf,
+                |_, r, _| 1.13 * r,
+                |x, _| 1.15 + 1.3 * x + 0.62 * x * x,
+                all,
+            ),
         ]
     }
 
@@ -534,12 +575,20 @@ mod tests {
 
     #[test]
     fn a_ball_of_an_interval_covers_it_and_hardly_more() {
-        for (low, high) in [(2.9, 3.1), (-3.1, -2.9), (-0.5, 4.0), (1e-9, 2e-9), (7.0, 7.0), (0.0, 0.0)] {
+        for (low, high) in
+            [(2.9, 3.1), (-3.1, -2.9), (-0.5, 4.0), (1e-9, 2e-9), (7.0, 7.0), (0.0, 0.0)]
+        {
             let interval = Interval::new(low, high).unwrap();
             let ball = Ball::from_interval(interval).interval();
-            assert!(ball.lower() <= low && high <= ball.upper(), "{ball:?} leaves out some of {interval:?}");
+            assert!(
+                ball.lower() <= low && high <= ball.upper(),
+                "{ball:?} leaves out some of {interval:?}"
+            );
             let spare = 1e-15 * high.abs().max(low.abs());
-            assert!(ball.lower() >= low - spare && ball.upper() <= high + spare, "{ball:?} is wider than {interval:?}");
+            assert!(
+                ball.lower() >= low - spare && ball.upper() <= high + spare,
+                "{ball:?} is wider than {interval:?}"
+            );
         }
     }
 
@@ -558,15 +607,20 @@ mod tests {
                     let y = fine(center).to_f64().abs();
                     for part in [-1.0, -0.4, 0.0, 0.7, 1.0] {
                         let value = fine(center + Fine::from_f64(radius) * Fine::from_f64(part));
-                        let away =
-                            value - Fine::from_f64(found.midpoint().high()) - Fine::from_f64(found.midpoint().low());
+                        let away = value
+                            - Fine::from_f64(found.midpoint().high())
+                            - Fine::from_f64(found.midpoint().low());
                         assert!(
                             away.abs() <= Fine::from_f64(found.radius()),
                             "{name} of {x} ± {radius}, {part}: {found:?}"
                         );
                     }
-                    let most = spread(x, radius, y) * (1.0 + 1e-9) + rounding(x.abs(), y) * 1e-30 * y;
-                    assert!(found.radius() <= most, "{name} of {x} ± {radius}: {found:?}, wanted {most:e}");
+                    let most =
+                        spread(x, radius, y) * (1.0 + 1e-9) + rounding(x.abs(), y) * 1e-30 * y;
+                    assert!(
+                        found.radius() <= most,
+                        "{name} of {x} ± {radius}: {found:?}, wanted {most:e}"
+                    );
                 }
             }
         }
@@ -577,7 +631,16 @@ mod tests {
         let point = |x: f64| Ball::from_f64(x);
         let thick = |x: f64, radius: f64| Ball::new(DoubleDouble::from_f64(x), radius);
         assert!(Ball::ENTIRE.is_entire() && !thick(1.0, 1e300).is_entire());
-        for f in [Ball::tanh, Ball::exp, Ball::ln, Ball::atan, Ball::erf, Ball::sqrt, Ball::sin, Ball::cos] {
+        for f in [
+            Ball::tanh,
+            Ball::exp,
+            Ball::ln,
+            Ball::atan,
+            Ball::erf,
+            Ball::sqrt,
+            Ball::sin,
+            Ball::cos,
+        ] {
             assert!(f(Ball::ENTIRE).is_entire());
         }
         for entire in [
@@ -595,7 +658,11 @@ mod tests {
             assert!(entire.is_entire(), "{entire:?}");
         }
         // Far out, all that is known is within 1.
-        for known in [point(1e13).sin(), thick(0.5, 1.5).sech_squared_ball(), thick(301.0, 2.0).sech_squared_ball()] {
+        for known in [
+            point(1e13).sin(),
+            thick(0.5, 1.5).sech_squared_ball(),
+            thick(301.0, 2.0).sech_squared_ball(),
+        ] {
             assert_eq!((known.midpoint().high(), known.radius()), (0.0, 1.0));
         }
         for x in [-301.0, 301.0] {
@@ -605,12 +672,16 @@ mod tests {
             assert!(slope.midpoint().high() == 0.0 && slope.radius() == 1e-259, "{slope:?}");
         }
         let erf = point(-12.5).erf();
-        assert!(erf.midpoint().high() == -1.0 && (1e-62..1.1e-62).contains(&erf.radius()), "{erf:?}");
+        assert!(
+            erf.midpoint().high() == -1.0 && (1e-62..1.1e-62).contains(&erf.radius()),
+            "{erf:?}"
+        );
         assert_eq!(thick(3.0, 0.5).times_power_of_two(-1).midpoint().high(), 1.5);
         assert_eq!(thick(-3.0, 0.5).sign(), point(-1.0));
     }
 
-    /// Its series never came to an end about zero: no term is small beside a sum that is below all numbers.
+    /// Its series never came to an end about zero: no term is small beside a sum that is below all
+    /// numbers.
     #[test]
     fn erf_is_a_line_about_zero() {
         let thick = |x: f64, radius: f64| Ball::new(DoubleDouble::from_f64(x), radius);
@@ -624,13 +695,19 @@ mod tests {
         }
         for radius in [5e-324, 1e-300, 1e-20, 0.5] {
             let erf = thick(0.0, radius).erf();
-            assert!(erf.midpoint().high() == 0.0 && (1.12 * radius..=1.14 * radius + 1e-300).contains(&erf.radius()));
+            assert!(
+                erf.midpoint().high() == 0.0
+                    && (1.12 * radius..=1.14 * radius + 1e-300).contains(&erf.radius())
+            );
         }
     }
 
     #[test]
     fn a_ball_is_subtracted_in_place() {
-        let (a, b) = (Ball::new(DoubleDouble::from_f64(1.5), 0.25), Ball::new(DoubleDouble::from_f64(0.5), 0.125));
+        let (a, b) = (
+            Ball::new(DoubleDouble::from_f64(1.5), 0.25),
+            Ball::new(DoubleDouble::from_f64(0.5), 0.125),
+        );
         let mut difference = a;
         difference -= b;
         assert_eq!(difference, a - b);

@@ -1,15 +1,18 @@
-//! Truncated power series in one variable: the coefficients of a function of sigma up to a fixed order.
+//! Truncated power series in one variable: the coefficients of a function of sigma up to a fixed
+//! order.
 //!
-//! A `Jet` is a [`Scalar`], so an equation written once also gives the Taylor coefficients of its value along a curve
-//! (Griewank & Walther 2008, ch. 13; the recurrences are those of Knuth, TAOCP 2, sec. 4.7). That is how the invariant
-//! curve of the sliding flow through a two-fold comes from the equations themselves.
+//! A `Jet` is a [`Scalar`], so an equation written once also gives the Taylor coefficients of its
+//! value along a curve (Griewank & Walther 2008, ch. 13; the recurrences are those of Knuth, TAOCP
+//! 2, sec. 4.7). That is how the invariant curve of the sliding flow through a two-fold comes from
+//! the equations themselves.
 
 use std::cmp::Ordering;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 use super::{Arithmetic, Elementary, Scalar};
 
-/// The series c_0 + c_1 sigma + ... + c_(K-1) sigma^(K-1), with everything from sigma^K on dropped. `K` is at least 1.
+/// The series c_0 + c_1 sigma + ... + c_(K-1) sigma^(K-1), with everything from sigma^K on dropped.
+/// `K` is at least 1.
 ///
 /// ```
 /// use twofold_num::Elementary;
@@ -40,7 +43,8 @@ impl<const K: usize> Jet<K> {
         })
     }
 
-    /// f(self) from a recurrence: `next(k, f)` gives k f_k from the coefficients before it, `first` is f_0.
+    /// f(self) from a recurrence: `next(k, f)` gives k f_k from the coefficients before it, `first`
+    /// is f_0.
     fn recur(first: f64, mut next: impl FnMut(usize, &[f64; K]) -> f64) -> Self {
         let mut f = [0.0; K];
         f[0] = first;
@@ -151,7 +155,9 @@ impl<const K: usize> Elementary for Jet<K> {
         })
     }
     fn exp(self) -> Self {
-        Self::recur(Elementary::exp(self.c[0]), |k, e| (1..=k).map(|j| j as f64 * self.c[j] * e[k - j]).sum())
+        Self::recur(Elementary::exp(self.c[0]), |k, e| {
+            (1..=k).map(|j| j as f64 * self.c[j] * e[k - j]).sum()
+        })
     }
     fn sin(self) -> Self {
         sin_cos(&self).0
@@ -170,7 +176,9 @@ impl<const K: usize> Elementary for Jet<K> {
     fn erf(self) -> Self {
         // e' = 2/sqrt(pi) exp(-a^2) a'
         let slope = (-(self * self)).exp().scale(2.0 / Elementary::sqrt(std::f64::consts::PI));
-        Self::recur(Elementary::erf(self.c[0]), |k, _| (1..=k).map(|j| j as f64 * self.c[j] * slope.c[k - j]).sum())
+        Self::recur(Elementary::erf(self.c[0]), |k, _| {
+            (1..=k).map(|j| j as f64 * self.c[j] * slope.c[k - j]).sum()
+        })
     }
     fn pi() -> Self {
         Self::constant(std::f64::consts::PI)
@@ -211,7 +219,8 @@ mod tests {
     #[test]
     fn series_sum_to_the_function() {
         let f = |x: f64| -> f64 {
-            Elementary::tanh(x) * Elementary::exp(-x) + Elementary::sin(x) / (2.0 + Elementary::cos(x))
+            Elementary::tanh(x) * Elementary::exp(-x)
+                + Elementary::sin(x) / (2.0 + Elementary::cos(x))
                 - Elementary::sqrt(1.5 + x)
                 + Elementary::ln(1.5 + x) * Elementary::atan(x) * Elementary::erf(x)
         };
@@ -225,7 +234,8 @@ mod tests {
         }
     }
 
-    /// Each function along a curved line, where every coefficient of the argument counts; summed, it is the function there.
+    /// Each function along a curved line, where every coefficient of the argument counts; summed,
+    /// it is the function there.
     #[test]
     fn every_function_along_a_curve() {
         type Function = (fn(Jet<16>) -> Jet<16>, fn(f64) -> f64);
@@ -247,7 +257,11 @@ mod tests {
             let series = f(x);
             for s in [-0.08, 0.05, 0.1] {
                 let want = plain(1.3 + 0.5 * s - 0.75 * s * s + 0.25 * s * s * s);
-                assert!((value(&series, s) - want).abs() < 1e-13, "function {n} at {s}: {} {want}", value(&series, s));
+                assert!(
+                    (value(&series, s) - want).abs() < 1e-13,
+                    "function {n} at {s}: {} {want}",
+                    value(&series, s)
+                );
             }
         }
     }
@@ -258,7 +272,10 @@ mod tests {
         (a.c[1], b.c[1]) = (1.0, 5.0);
         assert!(a == b && a < Jet::zero() && a.partial_cmp(&b) == Some(Ordering::Equal));
         assert_eq!((a.sign().c, Jet::<3>::one().sign().c), ([-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]));
-        assert_eq!(((a - b).c, (a + b).c, (-a).c), ([0.0, -4.0, 0.0], [-4.0, 6.0, 0.0], [2.0, -1.0, 0.0]));
+        assert_eq!(
+            ((a - b).c, (a + b).c, (-a).c),
+            ([0.0, -4.0, 0.0], [-4.0, 6.0, 0.0], [2.0, -1.0, 0.0])
+        );
         assert_eq!((a.to_f64(), Jet::<2>::pi().c), (-2.0, [std::f64::consts::PI, 0.0]));
     }
 

@@ -1,7 +1,8 @@
 //! Several numbers side by side, for many independent runs at once.
 //!
-//! Portable: an array and loops over it, which the compiler turns into whatever vector instructions the machine has. Every operation
-//! rounds each lane as it rounds a number by itself, so a lane's result does not depend on the width or on its neighbours.
+//! Portable: an array and loops over it, which the compiler turns into whatever vector instructions
+//! the machine has. Every operation rounds each lane as it rounds a number by itself, so a lane's
+//! result does not depend on the width or on its neighbours.
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 

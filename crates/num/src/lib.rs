@@ -1,11 +1,13 @@
 //! Arithmetic that results depend on.
 //!
-//! The only crate that names a math library. Everything that ends in a published number goes through
-//! [`elementary`] (functions with the same bits on every machine), [`Elementary`] (what an equation may do with a
-//! number, so that one definition serves plain evaluation, differentiation, power series and extended precision), and
-//! [`random`] (a named generator and our own map from bits to numbers).
+//! The only crate that names a math library. Everything that ends in a published number goes
+//! through [`elementary`] (functions with the same bits on every machine), [`Elementary`] (what an
+//! equation may do with a number, so that one definition serves plain evaluation, differentiation,
+//! power series and extended precision), and [`random`] (a named generator and our own map from
+//! bits to numbers).
 #![forbid(unsafe_code)]
-#![cfg_attr(test, allow(clippy::disallowed_methods))] // tests compare with tolerances, not with hashes
+// tests compare with tolerances, not with hashes
+#![cfg_attr(test, allow(clippy::disallowed_methods))]
 
 pub mod decimal;
 pub mod double_double;

@@ -8,8 +8,8 @@ use nalgebra::{SMatrix, SVector};
 
 use super::elementary::sqrt;
 
-/// The solution of a x = b by elimination with row pivoting; `None` when no pivot is above `smallest` in size (0: exactly
-/// singular matrices only) or one is not a number.
+/// The solution of a x = b by elimination with row pivoting; `None` when no pivot is above
+/// `smallest` in size (0: exactly singular matrices only) or one is not a number.
 pub fn solve<const N: usize>(
     mut a: SMatrix<f64, N, N>,
     mut b: SVector<f64, N>,
@@ -67,9 +67,10 @@ pub fn solve_any(a: &[f64], b: &[f64], smallest: f64) -> Option<Vec<f64>> {
 /// Iterations of the QR algorithm for one eigenvalue; some three are usual.
 const MOST_ITERATIONS: usize = 60;
 
-/// The eigenvalues (real part, imaginary part) of a real matrix of `n` rows, given row by row: elimination to Hessenberg form and
-/// the shifted QR algorithm (Martin, Peters & Wilkinson 1970; EISPACK's `elmhes` and `hqr`). `None` if an entry is not finite, or an
-/// eigenvalue does not settle.
+/// The eigenvalues (real part, imaginary part) of a real matrix of `n` rows, given row by row:
+/// elimination to Hessenberg form and the shifted QR algorithm (Martin, Peters & Wilkinson 1970;
+/// EISPACK's `elmhes` and `hqr`). `None` if an entry is not finite, or an eigenvalue does not
+/// settle.
 ///
 /// ```
 /// use twofold_num::linear::eigenvalues;
@@ -143,7 +144,10 @@ pub fn eigenvalues(matrix: &[f64], n: usize) -> Option<Vec<[f64; 2]>> {
 fn hessenberg(a: &mut [Vec<f64>]) {
     let n = a.len();
     for m in 1..n.saturating_sub(1) {
-        let Some(pivot) = (m..n).max_by(|i, j| a[*i][m - 1].abs().total_cmp(&a[*j][m - 1].abs())) else { return };
+        let Some(pivot) = (m..n).max_by(|i, j| a[*i][m - 1].abs().total_cmp(&a[*j][m - 1].abs()))
+        else {
+            return;
+        };
         let x = a[pivot][m - 1];
         if pivot != m {
             a.swap(pivot, m);
@@ -288,11 +292,16 @@ mod tests {
         }
         let want = [[-4.0, 0.0], [0.0, -1.0], [0.0, 1.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0]];
         for (found, want) in sorted(&companion, n).iter().zip(want) {
-            assert!((found[0] - want[0]).abs() < 1e-10 && (found[1] - want[1]).abs() < 1e-10, "{found:?} {want:?}");
+            assert!(
+                (found[0] - want[0]).abs() < 1e-10 && (found[1] - want[1]).abs() < 1e-10,
+                "{found:?} {want:?}"
+            );
         }
-        // A cyclic permutation: the seventh roots of one, all of one modulus; plain shifts would cycle.
+        // A cyclic permutation: the seventh roots of one, all of one modulus; plain shifts would
+        // cycle.
         let n = 7;
-        let cycle: Vec<f64> = (0..n * n).map(|k| if (k / n + 1) % n == k % n { 1.0 } else { 0.0 }).collect();
+        let cycle: Vec<f64> =
+            (0..n * n).map(|k| if (k / n + 1) % n == k % n { 1.0 } else { 0.0 }).collect();
         for [re, im] in sorted(&cycle, n) {
             assert!((re * re + im * im - 1.0).abs() < 1e-12);
         }
@@ -312,7 +321,9 @@ mod tests {
     fn digits(seed: u64) -> impl Iterator<Item = f64> {
         let mut state = seed;
         std::iter::repeat_with(move || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             ((state >> 33) % 7) as f64 - 3.0
         })
     }
@@ -324,7 +335,11 @@ mod tests {
         for seed in 0..200 {
             let numbers: Vec<f64> = digits(seed).take(30).collect();
             let (a, b) = numbers.split_at(25);
-            let fixed = solve(SMatrix::<f64, 5, 5>::from_row_slice(a), SVector::<f64, 5>::from_column_slice(b), 1e-9);
+            let fixed = solve(
+                SMatrix::<f64, 5, 5>::from_row_slice(a),
+                SVector::<f64, 5>::from_column_slice(b),
+                1e-9,
+            );
             let any = solve_any(a, b, 1e-9);
             let bits = |x: &[f64]| x.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
             assert_eq!(fixed.as_ref().map(|x| bits(x.as_slice())), any.as_ref().map(|x| bits(x)));
@@ -337,7 +352,10 @@ mod tests {
         }
         assert!(solved > 150);
         assert!(solve_any(&[f64::NAN, 1.0, 1.0, f64::NAN], &[1.0, 1.0], 0.0).is_none());
-        assert!(solve_any(&[1e-200, 0.0, 0.0, 1.0], &[1e200, 1.0], 0.0).is_none(), "the solution is infinite");
+        assert!(
+            solve_any(&[1e-200, 0.0, 0.0, 1.0], &[1e200, 1.0], 0.0).is_none(),
+            "the solution is infinite"
+        );
     }
 
     /// Full matrices, similar to ones whose eigenvalues are seen.
@@ -367,10 +385,12 @@ mod tests {
             }
             for (i, (re, im)) in pairs.iter().enumerate() {
                 let k = reals.len() + 2 * i;
-                (a[k * n + k], a[(k + 1) * n + k + 1], a[k * n + k + 1], a[(k + 1) * n + k]) = (*re, *re, *im, -im);
+                (a[k * n + k], a[(k + 1) * n + k + 1], a[k * n + k + 1], a[(k + 1) * n + k]) =
+                    (*re, *re, *im, -im);
                 want.extend([[*re, -im], [*re, *im]]);
             }
-            // Row i plus c times row j, column j minus c times column i: the eigenvalues stay, and all numbers are exact.
+            // Row i plus c times row j, column j minus c times column i: the eigenvalues stay, and
+            // all numbers are exact.
             let mut c = digits(seed as u64).filter(|c| c.abs() == 1.0);
             for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))).filter(|(i, j)| i != j) {
                 let c = c.next().unwrap();
@@ -381,29 +401,41 @@ mod tests {
             for e in [&mut found, &mut want] {
                 e.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
             }
-            // Pairs have the same real part to the last bit, so sorting by it and then by the other is safe.
+            // Pairs have the same real part to the last bit, so sorting by it and then by the other
+            // is safe.
             let size = a.iter().fold(1.0_f64, |m, v| m.max(v.abs()));
             for (f, w) in found.iter().zip(&want) {
                 let error = (f[0] - w[0]).abs().max((f[1] - w[1]).abs());
-                assert!(error < 1e-11 * size * size, "case {seed}, entries up to {size}: {found:?}, not {want:?}");
+                assert!(
+                    error < 1e-11 * size * size,
+                    "case {seed}, entries up to {size}: {found:?}, not {want:?}"
+                );
             }
         }
     }
 
-    /// A cycle and twice the identity: every double step changes nothing, until the exceptional shift comes, which has something to shift by.
+    /// A cycle and twice the identity: every double step changes nothing, until the exceptional
+    /// shift comes, which has something to shift by.
     #[test]
     fn what_goes_round_in_circles_is_shaken() {
         for n in 3..9 {
             for shift in [2.0, -0.5] {
-                let entry = |i: usize, j: usize| f64::from((i + 1) % n == j) + if i == j { shift } else { 0.0 };
+                let entry = |i: usize, j: usize| {
+                    f64::from((i + 1) % n == j) + if i == j { shift } else { 0.0 }
+                };
                 let matrix: Vec<f64> = (0..n * n).map(|at| entry(at / n, at % n)).collect();
                 let found = eigenvalues(&matrix, n).unwrap();
                 assert_eq!(found.len(), n);
                 for k in 0..n {
                     let turn = std::f64::consts::TAU * k as f64 / n as f64;
                     let root = [shift + turn.cos(), turn.sin()];
-                    let near = |e: &&[f64; 2]| (e[0] - root[0]).abs() + (e[1] - root[1]).abs() < 1e-13;
-                    assert_eq!(found.iter().filter(near).count(), 1, "{n} {shift} {root:?} {found:?}");
+                    let near =
+                        |e: &&[f64; 2]| (e[0] - root[0]).abs() + (e[1] - root[1]).abs() < 1e-13;
+                    assert_eq!(
+                        found.iter().filter(near).count(),
+                        1,
+                        "{n} {shift} {root:?} {found:?}"
+                    );
                 }
             }
         }
@@ -412,7 +444,8 @@ mod tests {
     #[test]
     fn roots_of_one() {
         for n in [3, 4, 5, 7, 8] {
-            let cycle: Vec<f64> = (0..n * n).map(|k| if (k / n + 1) % n == k % n { 1.0 } else { 0.0 }).collect();
+            let cycle: Vec<f64> =
+                (0..n * n).map(|k| if (k / n + 1) % n == k % n { 1.0 } else { 0.0 }).collect();
             let found = eigenvalues(&cycle, n).unwrap();
             for k in 0..n {
                 let angle = std::f64::consts::TAU * k as f64 / n as f64;

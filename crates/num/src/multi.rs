@@ -1,13 +1,16 @@
 //! Floating-point numbers of 192 bits and more, where 32 digits are not enough.
 //!
-//! A number is sign, exponent and `L` limbs of 64 bits, most significant bit set: +- 0.mmm 2^e. Sums and products are those of paper and pencil (Knuth, TAOCP
-//! vol. 2, 4.3.1) with one guard limb, quotients and roots are Newton's, each within one or two units in the last place; elementary functions are
-//! series after reduction (Brent & Zimmermann 2010, ch. 4), within some tens of units. Everything is whole-number arithmetic, so the bits are the same
-//! on every machine. There is no infinity: what leaves the exponent's range of 2^40 is not a number, and stays so.
+//! A number is sign, exponent and `L` limbs of 64 bits, most significant bit set: +- 0.mmm 2^e.
+//! Sums and products are those of paper and pencil (Knuth, TAOCP vol. 2, 4.3.1) with one guard
+//! limb, quotients and roots are Newton's, each within one or two units in the last place;
+//! elementary functions are series after reduction (Brent & Zimmermann 2010, ch. 4), within some
+//! tens of units. Everything is whole-number arithmetic, so the bits are the same on every machine.
+//! There is no infinity: what leaves the exponent's range of 2^40 is not a number, and stays so.
 //!
-//! Why not a library: the series of the equation need a number that is copied like an `f64`; the pure Rust crates for such precisions allocate for every number. A product
-//! and a sum took 22, 27, 57 and 109 ns here (192, 256, 384, 512 bits), 331 to 403 ns with astro-float 0.9, 0.9 to 1.3 us with dashu-float 0.4 and 18.5 ns in double-double (one
-//! run, x86-64, 2026-11-21).
+//! Why not a library: the series of the equation need a number that is copied like an `f64`; the
+//! pure Rust crates for such precisions allocate for every number. A product and a sum took 22, 27,
+//! 57 and 109 ns here (192, 256, 384, 512 bits), 331 to 403 ns with astro-float 0.9, 0.9 to 1.3 us
+//! with dashu-float 0.4 and 18.5 ns in double-double (one run, x86-64, 2026-11-21).
 
 use std::cmp::Ordering;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
@@ -79,7 +82,8 @@ impl<const L: usize> MultiFloat<L> {
     /// tanh is 1 to all digits beyond this argument: 2 exp(-2 w) < EPSILON/4.
     pub const TANH_SATURATION: f64 = 22.2 * L as f64 + 1.5;
 
-    const ZERO: Self = Self { kind: NumberClass::Zero, negative: false, exponent: 0, limbs: [0; L] };
+    const ZERO: Self =
+        Self { kind: NumberClass::Zero, negative: false, exponent: 0, limbs: [0; L] };
     const NAN: Self = Self { kind: NumberClass::NotANumber, ..Self::ZERO };
 
     /// From a significand whose top bit is set, and a guard limb to be rounded away.
@@ -140,7 +144,8 @@ impl<const L: usize> MultiFloat<L> {
         Self { negative: false, ..self }
     }
 
-    /// The decimal number written as `text`: digits, point, exponent. `None` if it is not one. Digits beyond the type's are rounded.
+    /// The decimal number written as `text`: digits, point, exponent. `None` if it is not one.
+    /// Digits beyond the type's are rounded.
     pub fn from_digits(text: &str) -> Option<Self> {
         let (digits, exponent) = match text.split_once(['e', 'E']) {
             Some((digits, exponent)) => (digits, exponent.parse::<i64>().ok()?),
@@ -161,7 +166,8 @@ impl<const L: usize> MultiFloat<L> {
             }
         }
         // The power of ten by squaring.
-        let (mut power, mut base, mut n) = (Self::whole(1), Self::whole(10), exponent.unsigned_abs());
+        let (mut power, mut base, mut n) =
+            (Self::whole(1), Self::whole(10), exponent.unsigned_abs());
         while n > 0 {
             if n % 2 == 1 {
                 power = power * base;
@@ -175,7 +181,9 @@ impl<const L: usize> MultiFloat<L> {
 
     /// Ordering of the magnitudes of two finite numbers.
     fn compare_magnitudes(&self, other: &Self) -> Ordering {
-        self.exponent.cmp(&other.exponent).then_with(|| self.limbs.iter().rev().cmp(other.limbs.iter().rev()))
+        self.exponent
+            .cmp(&other.exponent)
+            .then_with(|| self.limbs.iter().rev().cmp(other.limbs.iter().rev()))
     }
 
     /// |a| + |b| or |a| - |b| for finite |a| >= |b|, with the sign of a.
@@ -246,7 +254,8 @@ impl<const L: usize> MultiFloat<L> {
         Self { negative: self.negative, ..r }.times_power_of_two(1 - self.exponent)
     }
 
-    /// exp(self) - 1 for |self| < 0.36: series of self/2^12, then e^(2a) - 1 = (e^a - 1) (e^a + 1) twelve times.
+    /// exp(self) - 1 for |self| < 0.36: series of self/2^12, then e^(2a) - 1 = (e^a - 1) (e^a + 1)
+    /// twelve times.
     fn small_exp_m1(self) -> Self {
         const HALVINGS: i64 = 12;
         let r = self.times_power_of_two(-HALVINGS);
@@ -265,7 +274,8 @@ impl<const L: usize> MultiFloat<L> {
 
     /// Whether adding this to `sum` would change it.
     fn is_felt_by(&self, sum: &Self) -> bool {
-        self.kind == NumberClass::Finite && self.exponent >= sum.exponent - i64::from(Self::BITS) - 1
+        self.kind == NumberClass::Finite
+            && self.exponent >= sum.exponent - i64::from(Self::BITS) - 1
     }
 
     /// (sin, cos) by reduction modulo pi/2 and series.
@@ -418,7 +428,9 @@ impl<const L: usize> Div for MultiFloat<L> {
     /// The product with the reciprocal, corrected once.
     fn div(self, other: Self) -> Self {
         match (self.kind, other.kind) {
-            (NumberClass::NotANumber, _) | (_, NumberClass::NotANumber | NumberClass::Zero) => return Self::NAN,
+            (NumberClass::NotANumber, _) | (_, NumberClass::NotANumber | NumberClass::Zero) => {
+                return Self::NAN;
+            }
             (NumberClass::Zero, _) => return Self::ZERO,
             _ => {}
         }
@@ -447,14 +459,16 @@ impl<const L: usize> Arithmetic for MultiFloat<L> {
         }
         let bits = value.to_bits();
         let (biased, fraction) = ((bits >> 52 & 0x7ff) as i64, bits & ((1 << 52) - 1));
-        let (mantissa, exponent) = if biased == 0 { (fraction, -1074) } else { (fraction | 1 << 52, biased - 1075) };
+        let (mantissa, exponent) =
+            if biased == 0 { (fraction, -1074) } else { (fraction | 1 << 52, biased - 1075) };
         let magnitude = Self::whole(mantissa).times_power_of_two(exponent);
         if value < 0.0 { -magnitude } else { magnitude }
     }
 }
 
 impl<const L: usize> Scalar for MultiFloat<L> {
-    /// Rounded to nearest; beyond the range of `f64` to an infinity or, below its normal numbers, to zero.
+    /// Rounded to nearest; beyond the range of `f64` to an infinity or, below its normal numbers,
+    /// to zero.
     fn to_f64(self) -> f64 {
         let sign = if self.negative { -1.0 } else { 1.0 };
         match self.kind {
@@ -516,7 +530,8 @@ impl<const L: usize> Elementary for MultiFloat<L> {
         if self.kind != NumberClass::Finite || self.negative {
             return Self::NAN;
         }
-        // 2 atanh z, z = (m - 1)/(m + 1), of the significand between 1/sqrt 2 and sqrt 2: nothing is lost near 1.
+        // 2 atanh z, z = (m - 1)/(m + 1), of the significand between 1/sqrt 2 and sqrt 2: nothing
+        // is lost near 1.
         let mut m = Self { exponent: 0, ..self };
         let mut exponent = self.exponent;
         if m < Self::from_f64(std::f64::consts::FRAC_1_SQRT_2) {
@@ -549,7 +564,8 @@ impl<const L: usize> Elementary for MultiFloat<L> {
         if self.exponent < -i64::from(Self::BITS) {
             return self;
         }
-        // tan(atan x - y) = (x cos y - sin y)/(cos y + x sin y): adding that to y triples the right digits.
+        // tan(atan x - y) = (x cos y - sin y)/(cos y + x sin y): adding that to y triples the right
+        // digits.
         let mut y = Self::from_f64(elementary::atan(self.to_f64()));
         let mut right = 45;
         while right < Self::BITS + 8 {
@@ -569,7 +585,8 @@ impl<const L: usize> Elementary for MultiFloat<L> {
         if self.magnitude().to_f64() > saturation {
             return if self.negative { -Self::whole(1) } else { Self::whole(1) };
         }
-        // 2/sqrt(pi) exp(-x^2) sum of 2^n x^(2n+1)/(1 3 5 ... (2n+1)): no cancellation (Abramowitz & Stegun 7.1.6).
+        // 2/sqrt(pi) exp(-x^2) sum of 2^n x^(2n+1)/(1 3 5 ... (2n+1)): no cancellation (Abramowitz
+        // & Stegun 7.1.6).
         let square = self * self;
         let (mut term, mut sum, mut n) = (self, self, 1);
         while term.is_felt_by(&sum) {
@@ -692,7 +709,11 @@ mod tests {
             let want = MultiFloat::<L>::from_digits(digits).unwrap();
             let off = ((got - want) / want).to_f64().abs();
             // 160 digits are given.
-            assert!(off < units * MultiFloat::<L>::EPSILON + 1e-158, "{what} at {} bits: {off:e}", 64 * L);
+            assert!(
+                off < units * MultiFloat::<L>::EPSILON + 1e-158,
+                "{what} at {} bits: {off:e}",
+                64 * L
+            );
         }
     }
 
@@ -749,7 +770,11 @@ mod tests {
         assert_eq!((M::from_f64(1e3).tanh(), M::from_f64(-1e3).erf()), (M::whole(1), -M::whole(1)));
         let (half_pi, far) = (M::pi().times_power_of_two(-1), M::whole(1).times_power_of_two(400));
         assert_eq!((far.atan(), (-far).atan()), (half_pi, -half_pi));
-        assert!(M::from_digits("1.5.2").is_none() && M::from_digits("-").is_none() && M::from_digits("").is_none());
+        assert!(
+            M::from_digits("1.5.2").is_none()
+                && M::from_digits("-").is_none()
+                && M::from_digits("").is_none()
+        );
     }
 
     #[test]
@@ -765,7 +790,9 @@ mod tests {
     fn number() -> impl Strategy<Value = M> {
         // Sums of parts of very different size fill all limbs.
         (-1e3..1e3_f64, -1.0..1.0_f64, -1.0..1.0_f64, -40..40_i64).prop_map(|(a, b, c, k)| {
-            let x = M::from_f64(a) + M::from_f64(b).times_power_of_two(-60) + M::from_f64(c).times_power_of_two(-140);
+            let x = M::from_f64(a)
+                + M::from_f64(b).times_power_of_two(-60)
+                + M::from_f64(c).times_power_of_two(-140);
             x.times_power_of_two(k)
         })
     }
@@ -785,7 +812,8 @@ mod tests {
 
         #[test]
         fn field_identities(a in number(), b in number(), c in number()) {
-            let largest = |x: M, y: M| if x.magnitude() > y.magnitude() { x.magnitude() } else { y.magnitude() };
+            let largest = |x: M, y: M| if x.magnitude() > y.magnitude() { x.magnitude() } else {
+                y.magnitude() };
             prop_assume!(b != M::ZERO && a != M::ZERO);
             prop_assert_eq!(a + b, b + a);
             prop_assert_eq!(a * b, b * a);
@@ -803,12 +831,16 @@ mod tests {
         fn agrees_with_double_double(x in -8.0..8.0_f64, y in 0.01..8.0_f64) {
             let (m, d) = (M::from_f64, DoubleDouble::from_f64);
             for (a, b) in [
-                (m(x).exp(), d(x).exp()), (m(x).sin(), d(x).sin()), (m(x).cos(), d(x).cos()), (m(x).tanh(), d(x).tanh()),
-                (m(x).atan(), d(x).atan()), (m(x).erf(), d(x).erf()), (m(y).ln(), d(y).ln()), (m(y).sqrt(), d(y).sqrt()),
-                (m(x) / m(y), d(x) / d(y)), (m(x) * m(y) + m(x), d(x) * d(y) + d(x)), (m(x) - m(y), d(x) - d(y)),
+                (m(x).exp(), d(x).exp()), (m(x).sin(), d(x).sin()), (m(x).cos(), d(x).cos()),
+                    (m(x).tanh(), d(x).tanh()),
+                (m(x).atan(), d(x).atan()), (m(x).erf(), d(x).erf()), (m(y).ln(), d(y).ln()),
+                    (m(y).sqrt(), d(y).sqrt()),
+                (m(x) / m(y), d(x) / d(y)), (m(x) * m(y) + m(x), d(x) * d(y) + d(x)), (m(x) - m(y),
+                    d(x) - d(y)),
             ] {
                 let b = M::from_f64(b.high()) + M::from_f64(b.low());
-                prop_assert!((a - b).to_f64().abs() <= 2e-30 * (1.0 + a.to_f64().abs()), "{:?} {:?}", a, b);
+                prop_assert!((a - b).to_f64().abs() <= 2e-30 * (1.0 + a.to_f64().abs()),
+                    "{:?} {:?}", a, b);
             }
         }
 
@@ -819,7 +851,8 @@ mod tests {
                 let (long, short) = (f(Long::from_f64(x)), g(M::from_f64(x)));
                 let mut limbs = [0; 4];
                 limbs.copy_from_slice(&long.limbs[4..]);
-                units(M { kind: long.kind, negative: long.negative, exponent: long.exponent, limbs }, short, short)
+                units(M { kind: long.kind, negative: long.negative, exponent: long.exponent,
+                    limbs }, short, short)
             };
             prop_assert!(text(Long::ln, M::ln, x) < 64.0);
             prop_assert!(text(Long::exp, M::exp, y) < 64.0);
@@ -829,7 +862,8 @@ mod tests {
         }
     }
 
-    /// Whole numbers of 64 bits in one limb: sums are rounded as integers are, half away from zero, differences are exact.
+    /// Whole numbers of 64 bits in one limb: sums are rounded as integers are, half away from zero,
+    /// differences are exact.
     #[test]
     fn one_limb_is_rounded_like_an_integer() {
         let integer = |x: MultiFloat<1>| {
@@ -845,8 +879,19 @@ mod tests {
                 size
             }
         };
-        let numbers =
-            [1, 2, 3, 5, 1 << 40, 1 << 63, (1 << 63) + 1, u64::MAX, u64::MAX - 1, u64::MAX / 3, 0x0123_4567_89ab_cdef];
+        let numbers = [
+            1,
+            2,
+            3,
+            5,
+            1 << 40,
+            1 << 63,
+            (1 << 63) + 1,
+            u64::MAX,
+            u64::MAX - 1,
+            u64::MAX / 3,
+            0x0123_4567_89ab_cdef,
+        ];
         for a in numbers {
             for b in numbers {
                 let [x, y] = [a, b].map(MultiFloat::<1>::whole);
@@ -877,12 +922,19 @@ mod tests {
             assert!((long.sin().to_f64() - Elementary::sin(x)).abs() < 4e-16, "sin {x}");
             assert!((long.cos().to_f64() - Elementary::cos(x)).abs() < 4e-16, "cos {x}");
             if x != 0.0 {
-                assert!((long.log2() - Elementary::ln(x.abs()) * std::f64::consts::LOG2_E).abs() < 4e-15, "log2 {x}");
+                assert!(
+                    (long.log2() - Elementary::ln(x.abs()) * std::f64::consts::LOG2_E).abs()
+                        < 4e-15,
+                    "log2 {x}"
+                );
             }
         }
         let large = MultiFloat::<2>::whole(1).times_power_of_two(5000);
         assert_eq!((large.log2(), MultiFloat::<2>::ZERO.log2()), (5000.0, f64::NEG_INFINITY));
-        assert!(MultiFloat::<2>::NAN.log2().is_nan() && MultiFloat::<2>::from_f64(1e16).sin().to_f64().is_nan());
+        assert!(
+            MultiFloat::<2>::NAN.log2().is_nan()
+                && MultiFloat::<2>::from_f64(1e16).sin().to_f64().is_nan()
+        );
     }
 
     #[test]
@@ -891,9 +943,18 @@ mod tests {
         let (one, zero, nan) = (X::whole(1), X::ZERO, X::NAN);
         let not = |x: X| x.to_f64().is_nan();
         for x in [one, zero, nan, -one] {
-            assert!(not(x + nan) && not(nan - x) && not(x * nan) && not(nan * x) && not(x / nan) && not(nan / x));
+            assert!(
+                not(x + nan)
+                    && not(nan - x)
+                    && not(x * nan)
+                    && not(nan * x)
+                    && not(x / nan)
+                    && not(nan / x)
+            );
             assert!(not(x / zero));
-            assert!(not(x) || (x + zero == x && zero + x == x && (x * zero).kind == NumberClass::Zero));
+            assert!(
+                not(x) || (x + zero == x && zero + x == x && (x * zero).kind == NumberClass::Zero)
+            );
         }
         assert_eq!((zero / one).to_f64(), 0.0);
         let mut difference = one;
@@ -901,8 +962,14 @@ mod tests {
         assert_eq!(difference.to_f64(), -2.0);
         // The ends of f64.
         let power = |k: i64| one.times_power_of_two(k);
-        assert_eq!((power(1024).to_f64(), (-power(1024)).to_f64()), (f64::INFINITY, f64::NEG_INFINITY));
-        assert_eq!((power(1023).to_f64(), (-power(-1022)).to_f64()), (2.0_f64.powi(1023), -f64::MIN_POSITIVE));
+        assert_eq!(
+            (power(1024).to_f64(), (-power(1024)).to_f64()),
+            (f64::INFINITY, f64::NEG_INFINITY)
+        );
+        assert_eq!(
+            (power(1023).to_f64(), (-power(-1022)).to_f64()),
+            (2.0_f64.powi(1023), -f64::MIN_POSITIVE)
+        );
         assert_eq!(power(-1023).to_f64(), 0.0);
         assert_eq!(X::from_f64(-5e-324).times_power_of_two(1074), -one);
         // Signs, and where functions end.

@@ -1,9 +1,10 @@
 //! Polynomial equations, and the Taylor series of their solutions at a small cost.
 //!
-//! A smoothed switch, tanh u, is a constant outside its layer. What is left of many equations is then a polynomial, and a [`Flow`] is
-//! that polynomial as it is cheapest: sums of states and of products of such sums, equal ones only once, terms that cancel gone. So
-//! it is another rounding of the equation than its tape, for methods whose bits are their own. The series come by the Cauchy
-//! product alone (Moore 1966, ch. 11).
+//! A smoothed switch, tanh u, is a constant outside its layer. What is left of many equations is
+//! then a polynomial, and a [`Flow`] is that polynomial as it is cheapest: sums of states and of
+//! products of such sums, equal ones only once, terms that cancel gone. So it is another rounding
+//! of the equation than its tape, for methods whose bits are their own. The series come by the
+//! Cauchy product alone (Moore 1966, ch. 11).
 
 mod radial;
 
@@ -97,7 +98,9 @@ impl Reduced {
                 (Operation::Add(a, b), _) => values[a].plus(1.0, &values[b]),
                 (Operation::Sub(a, b), _) => values[a].plus(-1.0, &values[b]),
                 (Operation::Neg(a), _) => values[a].scaled(-1.0),
-                (Operation::Mul(a, b), _) => reduced.product(tape.variables(), &values[a], &values[b]),
+                (Operation::Mul(a, b), _) => {
+                    reduced.product(tape.variables(), &values[a], &values[b])
+                }
                 (Operation::Div(a, b), _) => match values[b].number() {
                     Some(divisor) => values[a].scaled(1.0 / divisor),
                     None => return refused("/"),
@@ -117,7 +120,9 @@ impl Reduced {
                 (Operation::Atan(_), _) => return refused("atan"),
                 (Operation::Erf(_), _) => return refused("erf"),
                 (Operation::Sign(_), _) => return refused("sign"),
-                (Operation::Constant(_) | Operation::Parameter(_) | Operation::Pi, None) => Affine::default(),
+                (Operation::Constant(_) | Operation::Parameter(_) | Operation::Pi, None) => {
+                    Affine::default()
+                }
             };
             values.push(value);
         }
@@ -139,7 +144,9 @@ impl Reduced {
             None => (factor.clone(), 1.0),
         };
         let ((a, f), (b, g)) = (bare(a), bare(b));
-        let same = |known: &(Affine, Affine)| *known == (a.clone(), b.clone()) || *known == (b.clone(), a.clone());
+        let same = |known: &(Affine, Affine)| {
+            *known == (a.clone(), b.clone()) || *known == (b.clone(), a.clone())
+        };
         let index = self.products.iter().position(same).unwrap_or_else(|| {
             self.products.push((a.clone(), b.clone()));
             self.products.len() - 1
@@ -226,7 +233,8 @@ impl Flow {
     pub fn new(tape: &Tape, tanh: f64) -> Result<Self, NotPolynomial> {
         let reduced = Reduced::new(tape, tanh)?;
         let dimension = tape.variables();
-        // Factors that are no single quantity are series of their own, and so are products that are wanted more than once.
+        // Factors that are no single quantity are series of their own, and so are products that are
+        // wanted more than once.
         let mut factors: Vec<&Affine> = Vec::new();
         for factor in reduced.products.iter().flat_map(|(a, b)| [a, b]) {
             if factor.single().is_none() && !factors.contains(&factor) {
@@ -242,19 +250,25 @@ impl Flow {
                 wanted[quantity] += 2;
             }
         }
-        let mut writer = Writer { reduced: &reduced, wanted, places: Vec::new(), sums: Vec::new(), dimension };
+        let mut writer =
+            Writer { reduced: &reduced, wanted, places: Vec::new(), sums: Vec::new(), dimension };
         let derivatives = reduced.derivatives.iter().map(|sum| writer.sum(sum)).collect();
         let argument = reduced.argument.as_ref().map(|sum| writer.sum(sum));
-        let linear = reduced.argument.as_ref().filter(|sum| sum.terms.iter().all(|(q, _)| *q < dimension)).map(|sum| {
-            let mut gradient = vec![0.0; dimension];
-            sum.terms.iter().for_each(|&(state, factor)| gradient[state] = factor);
-            (gradient, sum.constant)
-        });
+        let linear = reduced
+            .argument
+            .as_ref()
+            .filter(|sum| sum.terms.iter().all(|(q, _)| *q < dimension))
+            .map(|sum| {
+                let mut gradient = vec![0.0; dimension];
+                sum.terms.iter().for_each(|&(state, factor)| gradient[state] = factor);
+                (gradient, sum.constant)
+            });
         let sums = writer.sums;
         if dimension + sums.len() > MANY {
             return Err(NotPolynomial::Size);
         }
-        // What is wanted of the series of an argument that is no sum of states are its own products too.
+        // What is wanted of the series of an argument that is no sum of states are its own products
+        // too.
         let radial = Radial::new(&reduced).filter(|_| argument.is_none() || linear.is_some());
         Ok(Self { dimension, sums, derivatives, argument, linear, radial })
     }
@@ -296,7 +310,8 @@ impl Flow {
                 now[(self.dimension + i) % MANY] = sum.coefficient(k, &now, forward, backward);
             }
             for (i, sum) in self.derivatives.iter().enumerate() {
-                next[i % MANY] = sum.coefficient(k, &now, forward, backward) * RECIPROCALS[k % LONG];
+                next[i % MANY] =
+                    sum.coefficient(k, &now, forward, backward) * RECIPROCALS[k % LONG];
             }
             for s in 0..(self.dimension + self.sums.len()).min(MANY) {
                 forward[s][k % LONG] = now[s];
@@ -310,8 +325,8 @@ impl Flow {
         }
     }
 
-    /// Coefficient `k` of the tanh's argument, from the series that [`Flow::expand`] has made; `k` below its degree, or equal if
-    /// the argument is a sum of states.
+    /// Coefficient `k` of the tanh's argument, from the series that [`Flow::expand`] has made; `k`
+    /// below its degree, or equal if the argument is a sum of states.
     #[inline]
     pub fn argument(&self, k: usize, series: &Series) -> f64 {
         let Some(sum) = &self.argument else { return 0.0 };
@@ -328,7 +343,8 @@ impl Flow {
 }
 
 impl Sum {
-    /// The coefficient of degree `k`, those of all factors being known in rows below that degree, and at it in `now`.
+    /// The coefficient of degree `k`, those of all factors being known in rows below that degree,
+    /// and at it in `now`.
     #[inline(always)]
     fn coefficient(
         &self,
@@ -337,7 +353,8 @@ impl Sum {
         forward: &[[f64; 2 * LONG]; MANY],
         backward: &[[f64; 2 * LONG]; MANY],
     ) -> f64 {
-        // The remainders change nothing, since there are fewer than MANY series, and spare the checks.
+        // The remainders change nothing, since there are fewer than MANY series, and spare the
+        // checks.
         let mut value = if k == 0 { self.constant } else { 0.0 };
         for (s, factor) in &self.terms {
             value += now[s % MANY] * factor;
@@ -347,7 +364,8 @@ impl Sum {
             let product = if k == 0 {
                 now[a] * now[b]
             } else {
-                middle(&forward[a], &backward[b], k) + (forward[a][0] * now[b] + now[a] * forward[b][0])
+                middle(&forward[a], &backward[b], k)
+                    + (forward[a][0] * now[b] + now[a] * forward[b][0])
             };
             value += product * factor;
         }
@@ -412,7 +430,8 @@ impl Writer<'_> {
     }
 }
 
-/// [`Flow::expand`], in the machine's own instructions: each lane rounds by itself and sums have one order, so that they change no bit.
+/// [`Flow::expand`], in the machine's own instructions: each lane rounds by itself and sums have
+/// one order, so that they change no bit.
 struct Expansion<'a> {
     flow: &'a Flow,
     x: &'a [f64],
@@ -491,7 +510,10 @@ mod tests {
                     for i in 0..3 {
                         for (k, want) in solution.component(i).iter().enumerate() {
                             let got = found.component(i)[k];
-                            assert!((got - want).abs() <= 1e-13 * (1.0 + want.abs()), "{degree} {i} {k}: {got} {want}");
+                            assert!(
+                                (got - want).abs() <= 1e-13 * (1.0 + want.abs()),
+                                "{degree} {i} {k}: {got} {want}"
+                            );
                         }
                     }
                 }
@@ -512,7 +534,8 @@ mod tests {
         });
         let flow = Flow::new(&tape, -1.0).unwrap();
         assert!(flow.has_layer() && flow.linear_argument().is_none());
-        let (mut found, mut solution) = (Series::default(), Solution::new(11, &tape, Constants::Binary));
+        let (mut found, mut solution) =
+            (Series::default(), Solution::new(11, &tape, Constants::Binary));
         // So far inside the other half of the layer that tanh is -1.
         let x = [-9.0, 8.0];
         flow.expand(&x, 11, &mut found);
@@ -542,30 +565,51 @@ mod tests {
             Expansion { flow: &flow, x: &x, degree, series: &mut plain }.with_simd(pulp::Scalar);
             flow.expand(&x, degree, &mut here);
             for i in 0..3 {
-                let bits = |series: &Series| series.component(i).iter().map(|c| c.to_bits()).collect::<Vec<_>>();
+                let bits = |series: &Series| {
+                    series.component(i).iter().map(|c| c.to_bits()).collect::<Vec<_>>()
+                };
                 assert_eq!(bits(&plain), bits(&here), "{degree}");
             }
             let bits = |expand: &dyn Fn(radial::Task<'_>)| {
                 let mut series = Series::default();
                 expand(radial::Task { of: &radial, x, degree, series: &mut series });
-                (0..3).flat_map(|i| series.component(i).to_vec()).map(f64::to_bits).collect::<Vec<_>>()
+                (0..3)
+                    .flat_map(|i| series.component(i).to_vec())
+                    .map(f64::to_bits)
+                    .collect::<Vec<_>>()
             };
             let want = bits(&|task| radial::In::<_, 16>(task).with_simd(pulp::Scalar));
             if degree <= 17 {
-                assert_eq!(bits(&|task| radial::In::<_, 8>(task).with_simd(pulp::Scalar)), want, "{degree}");
+                assert_eq!(
+                    bits(&|task| radial::In::<_, 8>(task).with_simd(pulp::Scalar)),
+                    want,
+                    "{degree}"
+                );
             }
-            assert_eq!(bits(&|task| radial.expand(task.x, task.degree, task.series)), want, "{degree}");
+            assert_eq!(
+                bits(&|task| radial.expand(task.x, task.degree, task.series)),
+                want,
+                "{degree}"
+            );
             #[cfg(target_arch = "x86_64")]
             {
                 match pulp::x86::V3::try_new() {
                     Some(set) => {
-                        assert_eq!(bits(&|task| Simd::vectorize(set, radial::In::<_, 4>(task))), want, "{degree}");
+                        assert_eq!(
+                            bits(&|task| Simd::vectorize(set, radial::In::<_, 4>(task))),
+                            want,
+                            "{degree}"
+                        );
                     }
                     None => println!("not run: AVX2"),
                 }
                 match pulp::x86::V4::try_new() {
                     Some(set) => {
-                        assert_eq!(bits(&|task| Simd::vectorize(set, radial::In::<_, 2>(task))), want, "{degree}");
+                        assert_eq!(
+                            bits(&|task| Simd::vectorize(set, radial::In::<_, 2>(task))),
+                            want,
+                            "{degree}"
+                        );
                     }
                     None => println!("not run: AVX-512"),
                 }
@@ -587,13 +631,15 @@ mod tests {
         assert!(form(&linear, &|x| (c(1.0) - x[1]) * r2(x)).is_some());
         assert!(form(&|x| x[1] * x[2], &|x| (c(1.0) - x[1]) * r2(x)).is_none());
         let other = |y: &dyn Fn(&[Recorded]) -> Recorded| assert_eq!(form(&linear, y), None);
-        // A square is missing, is doubled, the factor is of another state, there is a term beside the product, or nothing at all.
+        // A square is missing, is doubled, the factor is of another state, there is a term beside
+        // the product, or nothing at all.
         other(&|x| x[0].squared() + x[1].squared());
         other(&|x| r2(x) + x[0].squared());
         other(&|x| (c(1.0) - x[2]) * r2(x));
         other(&|x| x[1] + (c(1.0) - x[1]) * r2(x));
         other(&|_| c(1.0));
-        // A square counts more than the others, a product is no square, one stands for the third, a number is added to the three.
+        // A square counts more than the others, a product is no square, one stands for the third, a
+        // number is added to the three.
         other(&|x| x[0].squared() + x[1].squared().scale(2.0) + x[2].squared());
         other(&|x| x[0].squared() + x[1].squared() + x[2].squared().scale(2.0));
         other(&|x| x[0] * x[1] + x[1].squared() + x[2].squared());
@@ -603,7 +649,8 @@ mod tests {
 
     /// The series by `flow` and those of its tape.
     fn agree(tape: &Tape, flow: &Flow, x: &[f64]) {
-        let (mut found, mut solution) = (Series::default(), Solution::new(12, tape, Constants::Binary));
+        let (mut found, mut solution) =
+            (Series::default(), Solution::new(12, tape, Constants::Binary));
         flow.expand(x, 12, &mut found);
         solution.expand(x);
         for i in 0..x.len() {
@@ -620,7 +667,11 @@ mod tests {
         let tape = Tape::record(3, |x| {
             let r2 = x[0].squared() + x[1].squared() + x[2].squared();
             let first = c(0.7) + x[0].scale(0.3) - x[1].scale(1.1) + x[2].scale(0.2);
-            vec![first, c(-0.4) + (c(0.5) - x[1].scale(0.6)) * r2, c(0.9) + (x[2].scale(0.8) - c(0.2)) * r2]
+            vec![
+                first,
+                c(-0.4) + (c(0.5) - x[1].scale(0.6)) * r2,
+                c(0.9) + (x[2].scale(0.8) - c(0.2)) * r2,
+            ]
         });
         let flow = Flow::new(&tape, 1.0).unwrap();
         assert!(flow.radial.is_some() && !flow.has_layer());
@@ -647,7 +698,9 @@ mod tests {
 
     #[test]
     fn what_is_wanted_twice_is_a_series_of_its_own_and_nothing_else() {
-        let sums = |f: &dyn Fn(&[Recorded]) -> Vec<Recorded>| Flow::new(&Tape::record(2, f), 1.0).unwrap().sums.len();
+        let sums = |f: &dyn Fn(&[Recorded]) -> Vec<Recorded>| {
+            Flow::new(&Tape::record(2, f), 1.0).unwrap().sums.len()
+        };
         let one = Recorded::one;
         assert_eq!(sums(&|x| vec![x[0] * x[1], x[0]]), 0);
         assert_eq!(sums(&|x| vec![x[0] * x[1], x[0] * x[1] + x[0]]), 1);
@@ -671,7 +724,8 @@ mod tests {
 
     #[test]
     fn what_is_no_polynomial_is_refused() {
-        let refused = |f: fn(&[Recorded]) -> Recorded| Flow::new(&Tape::record(1, |x| vec![f(x)]), 1.0).err();
+        let refused =
+            |f: fn(&[Recorded]) -> Recorded| Flow::new(&Tape::record(1, |x| vec![f(x)]), 1.0).err();
         assert_eq!(refused(|x| x[0] * x[0] / Recorded::from_f64(3.0)), None);
         assert_eq!(refused(|x| x[0] * x[0] / x[0]), Some(NotPolynomial::Operation("/")));
         assert_eq!(refused(|x| x[0].exp()), Some(NotPolynomial::Operation("exp")));

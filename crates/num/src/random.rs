@@ -1,8 +1,9 @@
 //! Random numbers that are the same on every machine and in every release.
 //!
-//! The generator is ChaCha8, named in the spec; its output stream is fixed by its definition, unlike `rand`'s
-//! `StdRng`, which is documented as free to change. The maps from bits to numbers are our own, because library
-//! distributions may change between releases or reach the platform's math functions.
+//! The generator is ChaCha8, named in the spec; its output stream is fixed by its definition,
+//! unlike `rand`'s `StdRng`, which is documented as free to change. The maps from bits to numbers
+//! are our own, because library distributions may change between releases or reach the platform's
+//! math functions.
 
 use rand::Rng;
 use rand::SeedableRng;
@@ -49,15 +50,16 @@ impl RandomStream {
         low + (high - low) * self.uniform()
     }
 
-    /// Standard normal, by the trigonometric method of Box & Muller (1958); the second value of a pair is dropped so
-    /// that the count of words per number is fixed.
+    /// Standard normal, by the trigonometric method of Box & Muller (1958); the second value of a
+    /// pair is dropped so that the count of words per number is fixed.
     pub fn normal(&mut self) -> f64 {
         let u = 1.0 - self.uniform();
         let v = self.uniform();
         sqrt(-2.0 * ln(u)) * cos(std::f64::consts::TAU * v)
     }
 
-    /// A unit vector with uniform direction on the sphere in three dimensions (Archimedes: the height is uniform).
+    /// A unit vector with uniform direction on the sphere in three dimensions (Archimedes: the
+    /// height is uniform).
     pub fn direction(&mut self) -> [f64; 3] {
         let height = self.uniform_in(-1.0, 1.0);
         let angle = std::f64::consts::TAU * self.uniform();
@@ -70,13 +72,16 @@ impl RandomStream {
 mod tests {
     use super::*;
 
-    const STREAM_0: [u64; 3] = [0x0eda_eda7_02cc_bb80, 0x1fb6_f0df_1efd_38ac, 0x22b8_2cd4_e4f6_87bf];
-    const STREAM_1: [u64; 3] = [0x428c_389f_ec6a_f3bc, 0x46a5_217c_8306_523d, 0x1250_c060_17f8_ad79];
+    const STREAM_0: [u64; 3] =
+        [0x0eda_eda7_02cc_bb80, 0x1fb6_f0df_1efd_38ac, 0x22b8_2cd4_e4f6_87bf];
+    const STREAM_1: [u64; 3] =
+        [0x428c_389f_ec6a_f3bc, 0x46a5_217c_8306_523d, 0x1250_c060_17f8_ad79];
 
     #[test]
     fn stream_is_frozen() {
-        // ChaCha8 with the key 2013, 0, 0, ... in little-endian order, computed outside this project from its definition
-        // (Bernstein 2008): the first words of 64 bits of streams 0 and 1, without their lowest 11 bits.
+        // ChaCha8 with the key 2013, 0, 0, ... in little-endian order, computed outside this
+        // project from its definition (Bernstein 2008): the first words of 64 bits of streams 0 and
+        // 1, without their lowest 11 bits.
         for (stream, words) in [(0, STREAM_0), (1, STREAM_1)] {
             let mut r = RandomStream::new(2013, stream);
             for word in words {
@@ -117,6 +122,9 @@ mod tests {
             m2 += x * x / n as f64;
             m4 += x * x * x * x / n as f64;
         }
-        assert!(m1.abs() < 0.025 && (m2 - 1.0).abs() < 0.04 && (m4 - 3.0).abs() < 0.25, "{m1} {m2} {m4}");
+        assert!(
+            m1.abs() < 0.025 && (m2 - 1.0).abs() < 0.04 && (m4 - 3.0).abs() < 0.25,
+            "{m1} {m2} {m4}"
+        );
     }
 }

@@ -1,9 +1,12 @@
-//! Several numbers side by side in the registers of an instruction set that is chosen at run time (crate `pulp`).
+//! Several numbers side by side in the registers of an instruction set that is chosen at run time
+//! (crate `pulp`).
 //!
-//! [`Lanes`](super::Lanes) leaves it to the compiler to find vector instructions; here every operation is one. Each rounds every lane as it
-//! rounds a number by itself, and none is fused with another, so the instruction set decides how fast a result comes and not what it is.
+//! [`Lanes`](super::Lanes) leaves it to the compiler to find vector instructions; here every
+//! operation is one. Each rounds every lane as it rounds a number by itself, and none is fused with
+//! another, so the instruction set decides how fast a result comes and not what it is.
 
-// Loops by number over registers and components: iterators and closures may stay calls, compiled for the wrong instruction set.
+// Loops by number over registers and components: iterators and closures may stay calls, compiled
+// for the wrong instruction set.
 #![allow(clippy::needless_range_loop)]
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
@@ -26,7 +29,8 @@ pub struct Registers<S: Simd, const K: usize> {
     parts: [S::f64s; K],
 }
 
-/// Registers in memory, from the beginning of a cache line on: where one lies across two lines, it is read and written in two parts.
+/// Registers in memory, from the beginning of a cache line on: where one lies across two lines, it
+/// is read and written in two parts.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 pub struct Aligned<T>(pub T);
@@ -238,7 +242,9 @@ impl<S: Simd, const K: usize> Pointwise for Registers<S, K> {
             other,
             |_, mut a, b| {
                 let b = cast_slice::<_, f64>(std::slice::from_ref(&b));
-                for (a, b) in cast_slice_mut::<_, f64>(std::slice::from_mut(&mut a)).iter_mut().zip(b) {
+                for (a, b) in
+                    cast_slice_mut::<_, f64>(std::slice::from_mut(&mut a)).iter_mut().zip(b)
+                {
                     *a = f(*a, *b);
                 }
                 a
@@ -259,7 +265,8 @@ macro_rules! lanewise {
         }
     )*};
 }
-lanewise!(Add, add, add_f64s, +; Sub, sub, sub_f64s, -; Mul, mul, mul_f64s, *; Div, div, div_f64s, /);
+lanewise!(Add, add, add_f64s, +; Sub, sub, sub_f64s, -; Mul, mul, mul_f64s, *; Div, div, div_f64s,
+    /);
 
 impl<S: Simd, const K: usize> Neg for Registers<S, K> {
     type Output = Self;
@@ -293,19 +300,30 @@ impl<S: Simd, const K: usize> Arithmetic for Registers<S, K> {
 impl<S: Simd, const K: usize> Elementary for Registers<S, K> {
     #[inline(always)]
     fn tanh(self) -> Self {
-        let Some(set) = self.set else { return Self { constant: Elementary::tanh(self.constant), ..self } };
+        let Some(set) = self.set else {
+            return Self { constant: Elementary::tanh(self.constant), ..self };
+        };
         // A number by itself is sooner looked up.
         if S::F64_LANES == 1 {
             return self.map(Elementary::tanh);
         }
-        // The kernel gives +-1 there as well; this only saves its work where every lane is outside its layer.
+        // The kernel gives +-1 there as well; this only saves its work where every lane is outside
+        // its layer.
         let inside = self.size().less(Self::splat(set, TANH_IS_ONE), set);
         let nan = self.map(|v| if v.is_nan() { 0.0 } else { 1.0 }).less(Self::splat(set, 0.5), set);
-        if inside.or(nan).any() { kernels::tanh(self) } else { self.map(|lane| 1.0_f64.copysign(lane)) }
+        if inside.or(nan).any() {
+            kernels::tanh(self)
+        } else {
+            self.map(|lane| 1.0_f64.copysign(lane))
+        }
     }
     #[inline(always)]
     fn exp(self) -> Self {
-        if self.set.is_none() { Self { constant: Elementary::exp(self.constant), ..self } } else { kernels::exp(self) }
+        if self.set.is_none() {
+            Self { constant: Elementary::exp(self.constant), ..self }
+        } else {
+            kernels::exp(self)
+        }
     }
     #[inline(always)]
     fn sin(self) -> Self {

@@ -7,7 +7,8 @@ use super::elementary;
 
 /// Sums, products and quotients: what a polynomial or rational equation needs.
 ///
-/// Equality is that of values (of all lanes, of both ends of an interval); an equation never asks for it.
+/// Equality is that of values (of all lanes, of both ends of an interval); an equation never asks
+/// for it.
 pub trait Arithmetic:
     Copy
     + Debug
@@ -23,8 +24,10 @@ pub trait Arithmetic:
     + Sync
     + 'static
 {
-    /// Whether zeros are exact to the bit, as long as all numbers are finite: a - a is positive zero, a - 0 is a, sums of products begin with positive zero, and products with
-    /// zero change nothing in them, nor zeros in a sum of others that is no negative zero. Work with numbers that are known to be zero may then be left out.
+    /// Whether zeros are exact to the bit, as long as all numbers are finite: a - a is positive
+    /// zero, a - 0 is a, sums of products begin with positive zero, and products with zero change
+    /// nothing in them, nor zeros in a sum of others that is no negative zero. Work with numbers
+    /// that are known to be zero may then be left out.
     const EXACT_ZEROS: bool = false;
 
     /// The exact value of an `f64`.
@@ -55,7 +58,8 @@ pub trait Arithmetic:
     fn squared(self) -> Self {
         self * self
     }
-    /// The sum of a_i b_(n-1-i) over the n terms, as products of series need it; the slices are of one length.
+    /// The sum of a_i b_(n-1-i) over the n terms, as products of series need it; the slices are of
+    /// one length.
     #[inline]
     fn sum_of_products(a: &[Self], b: &[Self]) -> Self {
         let mut sum = Self::zero();
@@ -76,8 +80,8 @@ pub trait Arithmetic:
 pub trait Elementary: Arithmetic {
     /// Hyperbolic tangent.
     fn tanh(self) -> Self;
-    /// 1 - tanh^2, by number types that know it better than from the tanh: where tanh is within rounding of 1, its slope would
-    /// lose all digits, and an enclosure its meaning.
+    /// 1 - tanh^2, by number types that know it better than from the tanh: where tanh is within
+    /// rounding of 1, its slope would lose all digits, and an enclosure its meaning.
     #[inline]
     fn sech_squared(self) -> Option<Self> {
         None
@@ -105,8 +109,8 @@ pub trait Elementary: Arithmetic {
     fn abs(self) -> Self {
         self * self.sign()
     }
-    /// An integer power by multiplication, in an order that is part of the contract because it decides bits:
-    /// x^0 = 1, x^1 = x, x^(2m) = x^m x^m, x^(2m+1) = x^(2m) x, x^-n = 1/x^n.
+    /// An integer power by multiplication, in an order that is part of the contract because it
+    /// decides bits: x^0 = 1, x^1 = x, x^(2m) = x^m x^m, x^(2m+1) = x^(2m) x, x^-n = 1/x^n.
     fn power(self, exponent: i32) -> Self {
         let n = exponent.unsigned_abs();
         let result = match n {
@@ -122,8 +126,8 @@ pub trait Elementary: Arithmetic {
     }
 }
 
-/// An [`Elementary`] number with an order and a nearest `f64`: what step control and event location need.
-/// Comparisons look at the value only, never at derivatives.
+/// An [`Elementary`] number with an order and a nearest `f64`: what step control and event location
+/// need. Comparisons look at the value only, never at derivatives.
 pub trait Scalar: Elementary + PartialOrd {
     /// The nearest `f64`.
     fn to_f64(self) -> f64;
@@ -155,8 +159,9 @@ impl Elementary for f64 {
     fn cos(self) -> Self {
         elementary::cos(self)
     }
-    /// Out of line: where an equation takes a root in one branch only, as a transition function does, the compiler would else compute it (and what is
-    /// divided by it) at every evaluation and throw it away, which was a quarter of a multistep run's time.
+    /// Out of line: where an equation takes a root in one branch only, as a transition function
+    /// does, the compiler would else compute it (and what is divided by it) at every evaluation and
+    /// throw it away, which was a quarter of a multistep run's time.
     #[inline(never)]
     fn sqrt(self) -> Self {
         elementary::sqrt(self)
@@ -198,7 +203,9 @@ mod tests {
     fn powers_multiply_in_the_documented_order() {
         let x = 1.1_f64;
         let (x2, x3) = (x * x, x * x * x);
-        for (n, want) in [(0, 1.0), (1, x), (2, x2), (3, x3), (4, x2 * x2), (5, x2 * x2 * x), (7, x3 * x3 * x)] {
+        for (n, want) in
+            [(0, 1.0), (1, x), (2, x2), (3, x3), (4, x2 * x2), (5, x2 * x2 * x), (7, x3 * x3 * x)]
+        {
             assert_eq!(Elementary::power(x, n).to_bits(), want.to_bits(), "{n}");
             assert_eq!(Elementary::power(x, -n).to_bits(), (1.0 / want).to_bits(), "-{n}");
         }

@@ -1,12 +1,13 @@
 //! Taylor coefficients of solutions, from the equation itself.
 //!
-//! A [`Solution`] yields, for the equation on a [`Tape`] and any [`Elementary`] number, the coefficients of the solution's power
-//! series one degree after another, each operation by its own recurrence (Moore 1966, ch. 11; Griewank & Walther 2008, table
-//! 13.2; Jorba & Zou 2005, sec. 2). Degree K costs O(K^2) per nonlinear operation. A truncated series that is itself a number
-//! would have to be evaluated anew at every degree, O(K^3)/3; that is why there is none.
+//! A [`Solution`] yields, for the equation on a [`Tape`] and any [`Elementary`] number, the
+//! coefficients of the solution's power series one degree after another, each operation by its own
+//! recurrence (Moore 1966, ch. 11; Griewank & Walther 2008, table 13.2; Jorba & Zou 2005, sec. 2).
+//! Degree K costs O(K^2) per nonlinear operation. A truncated series that is itself a number would
+//! have to be evaluated anew at every degree, O(K^3)/3; that is why there is none.
 //!
-//! The tape also knows the arguments of every tanh and erf. That is how an integrator learns where an equation has a layer, without
-//! being told (see [`Solution::layer_arguments`]).
+//! The tape also knows the arguments of every tanh and erf. That is how an integrator learns where
+//! an equation has a layer, without being told (see [`Solution::layer_arguments`]).
 
 mod compiled;
 #[cfg(test)]
@@ -65,7 +66,8 @@ enum Recurrence<S> {
     Cos(Series, Weights),
     /// 1 + a^2, for the arc tangent.
     OnePlusSquare(Series),
-    /// u = atan a: u' = a'/w, the series w = 1 + a^2 being the one before. Its own weights are the next series.
+    /// u = atan a: u' = a'/w, the series w = 1 + a^2 being the one before. Its own weights are the
+    /// next series.
     Atan(Series),
     /// u = erf a: u' = a' g, the series g = 2/sqrt(pi) exp(-a^2) being the one before.
     Erf(Series, Weights),
@@ -75,7 +77,11 @@ impl<S: Elementary> Recurrence<S> {
     /// The number in it; zero if there is none.
     fn number(&self) -> S {
         match *self {
-            Self::Constant(c) | Self::Shift(_, c) | Self::Minus(_, c) | Self::Scale(_, c) | Self::Over(_, c) => c,
+            Self::Constant(c)
+            | Self::Shift(_, c)
+            | Self::Minus(_, c)
+            | Self::Scale(_, c)
+            | Self::Over(_, c) => c,
             _ => S::zero(),
         }
     }
@@ -84,11 +90,12 @@ impl<S: Elementary> Recurrence<S> {
 /// What an equation's constants and parameters, given in decimal, stand for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Constants {
-    /// The nearest `f64`, and terms without variables are computed in `f64`: the same equation that `f64` methods solve.
+    /// The nearest `f64`, and terms without variables are computed in `f64`: the same equation that
+    /// `f64` methods solve.
     #[default]
     Binary,
-    /// Themselves: 0.1 is one tenth. In extended precision, that is another equation: near a two-fold, the 1e-17 between the
-    /// two has grown to 1e-12 a hundred units of time later.
+    /// Themselves: 0.1 is one tenth. In extended precision, that is another equation: near a
+    /// two-fold, the 1e-17 between the two has grown to 1e-12 a hundred units of time later.
     Decimal,
 }
 
@@ -112,14 +119,16 @@ pub enum MarkKind {
     Exp,
     /// A power of at least [`HIGH_POWER`]: nothing where its base is small.
     Power(u32),
-    /// A transition function (of [`Solution::layer_arguments`]) whose argument is no linear function of the state.
+    /// A transition function (of [`Solution::layer_arguments`]) whose argument is no linear
+    /// function of the state.
     Curved,
 }
 
 /// A power whose series shows little of it from afar, as its first terms vanish.
 pub const HIGH_POWER: u32 = 16;
 
-/// An operation on the tape that a Taylor method must watch: its kind and place, and the series of its argument (divisor).
+/// An operation on the tape that a Taylor method must watch: its kind and place, and the series of
+/// its argument (divisor).
 #[derive(Clone, Copy, Debug)]
 struct Mark {
     kind: MarkKind,
@@ -134,7 +143,8 @@ pub struct Solution<S> {
     dimension: usize,
     /// The series, `degree + 1` coefficients each; if there are rows, only those that are read.
     coefficients: Vec<S>,
-    /// The same by degrees, if they are `f64`s and not too many: so cheap are these that where they lie matters.
+    /// The same by degrees, if they are `f64`s and not too many: so cheap are these that where they
+    /// lie matters.
     rows: Vec<[f64; ROW]>,
     recurrences: Vec<Recurrence<S>>,
     /// The series of the components' derivatives.
@@ -176,7 +186,9 @@ impl<S: Elementary + FromDecimal> Solution<S> {
     pub fn set_tape(&mut self, tape: &Tape, constants: Constants) {
         assert_eq!(tape.variables(), tape.outputs().len(), "an equation x' = f(x)");
         let fixed: Vec<Option<S>> = match constants {
-            Constants::Binary => tape.fixed(Decimal::value).into_iter().map(|v| v.map(S::from_f64)).collect(),
+            Constants::Binary => {
+                tape.fixed(Decimal::value).into_iter().map(|v| v.map(S::from_f64)).collect()
+            }
             Constants::Decimal => tape.fixed(S::from_decimal),
         };
         let mut compiler = Compiler {
@@ -214,17 +226,25 @@ impl<S: Elementary + FromDecimal> Solution<S> {
                     }
                     Operation::Sign(a) => Some((MarkKind::Sign, a)),
                     Operation::Sqrt(a) | Operation::Ln(a) => Some((MarkKind::Singular, a)),
-                    Operation::Div(_, b) if compiler.fixed[b].is_none() => Some((MarkKind::Singular, b)),
+                    Operation::Div(_, b) if compiler.fixed[b].is_none() => {
+                        Some((MarkKind::Singular, b))
+                    }
                     Operation::Exp(a) => Some((MarkKind::Exp, a)),
-                    Operation::Tanh(a) | Operation::Erf(a) if !linear[a] => Some((MarkKind::Curved, a)),
+                    Operation::Tanh(a) | Operation::Erf(a) if !linear[a] => {
+                        Some((MarkKind::Curved, a))
+                    }
                     _ => None,
                 };
                 if let Some((kind, argument)) = mark {
                     self.marks.push(Mark { kind, node, argument: compiler.of(argument) });
                 }
                 match operation {
-                    Operation::Tanh(a) => self.layer_arguments.push((LayerKind::Tanh, compiler.of(*a))),
-                    Operation::Erf(a) => self.layer_arguments.push((LayerKind::Erf, compiler.of(*a))),
+                    Operation::Tanh(a) => {
+                        self.layer_arguments.push((LayerKind::Tanh, compiler.of(*a)))
+                    }
+                    Operation::Erf(a) => {
+                        self.layer_arguments.push((LayerKind::Erf, compiler.of(*a)))
+                    }
                     _ => {}
                 }
             }
@@ -257,13 +277,16 @@ impl<S: Elementary + FromDecimal> Solution<S> {
         self.series(i)
     }
 
-    /// The series of the arguments of every tanh and every erf in the equation, up to degree `degree - 1`.
+    /// The series of the arguments of every tanh and every erf in the equation, up to degree
+    /// `degree - 1`.
     pub fn layer_arguments(&self) -> impl Iterator<Item = (LayerKind, &[S])> {
-        self.layer_arguments.iter().map(|(kind, series)| (*kind, &self.series(*series)[..self.degree]))
+        self.layer_arguments
+            .iter()
+            .map(|(kind, series)| (*kind, &self.series(*series)[..self.degree]))
     }
 
-    /// The operations that are not analytic everywhere or that hide: kind and place on the tape, and the series of the argument (of a quotient the
-    /// divisor's) up to degree `degree - 1`.
+    /// The operations that are not analytic everywhere or that hide: kind and place on the tape,
+    /// and the series of the argument (of a quotient the divisor's) up to degree `degree - 1`.
     pub fn marks(&self) -> impl Iterator<Item = (MarkKind, Node, &[S])> {
         self.marks.iter().map(|m| (m.kind, m.node, &self.series(m.argument)[..self.degree]))
     }
@@ -280,7 +303,9 @@ impl<S: Elementary + FromDecimal> Solution<S> {
         }
         // A test of the type, not of a constant of it, so that the code for each degree is compiled
         // for this type alone.
-        if let Some(solution) = (self as &mut dyn Any).downcast_mut::<Solution<f64>>().filter(|s| !s.rows.is_empty()) {
+        if let Some(solution) =
+            (self as &mut dyn Any).downcast_mut::<Solution<f64>>().filter(|s| !s.rows.is_empty())
+        {
             solution.expand_rows();
         } else {
             self.expand_columns();
@@ -336,7 +361,9 @@ impl Solution<f64> {
         }
         let width = self.degree + 1;
         let mut rows = std::mem::take(&mut self.rows);
-        for (start, series) in rows[0].iter_mut().zip(self.coefficients.chunks(width)).take(self.dimension) {
+        for (start, series) in
+            rows[0].iter_mut().zip(self.coefficients.chunks(width)).take(self.dimension)
+        {
             *start = series[0];
         }
         let saturated = match &self.opening {
@@ -348,7 +375,8 @@ impl Solution<f64> {
             advance_rows(&self.plans[plan], &mut rows, k);
         }
         let layers = self.layer_arguments.iter().map(|(_, series)| *series);
-        for series in (0..self.dimension).chain(layers).chain(self.marks.iter().map(|m| m.argument)) {
+        for series in (0..self.dimension).chain(layers).chain(self.marks.iter().map(|m| m.argument))
+        {
             let column = &mut self.coefficients[series * width..(series + 1) * width];
             for (coefficient, row) in column.iter_mut().zip(rows.iter()) {
                 *coefficient = row[series % ROW];
@@ -358,7 +386,8 @@ impl Solution<f64> {
     }
 }
 
-/// From a tape's operations to recurrences: terms without variables become numbers, and some functions get companions.
+/// From a tape's operations to recurrences: terms without variables become numbers, and some
+/// functions get companions.
 struct Compiler<S> {
     dimension: usize,
     recurrences: Vec<Recurrence<S>>,
@@ -445,8 +474,13 @@ impl<S: Elementary> Compiler<S> {
                 self.push(Recurrence::Scale(bell, S::from_f64(2.0) / S::pi().sqrt()));
                 Recurrence::Erf(a, weights)
             }
-            Operation::Variable(_) | Operation::Constant(_) | Operation::Parameter(_) | Operation::Pi => {
-                unreachable!("variables have series from the start, terms without variables are numbers")
+            Operation::Variable(_)
+            | Operation::Constant(_)
+            | Operation::Parameter(_)
+            | Operation::Pi => {
+                unreachable!(
+                    "variables have series from the start, terms without variables are numbers"
+                )
             }
         };
         self.push(recurrence)
@@ -502,7 +536,10 @@ mod tests {
     fn first_is(solution: &Solution<DoubleDouble>, want: impl Fn(usize) -> f64) {
         for (j, c) in solution.component(0).iter().enumerate() {
             let w = want(j);
-            assert!((c.to_f64() - w).abs() <= 4e-16 * w.abs().max(1e-3), "coefficient {j}: {c:?}, expected {w}");
+            assert!(
+                (c.to_f64() - w).abs() <= 4e-16 * w.abs().max(1e-3),
+                "coefficient {j}: {c:?}, expected {w}"
+            );
         }
     }
 
@@ -516,9 +553,12 @@ mod tests {
     fn linear() {
         first_is(&expand(25, [1.0], |x| vec![x[0]]), |j| 1.0 / factorial(j));
         // x' = 1 - 2x/4 - x/2 = 1 - x from 0: 1 - exp(-t)
-        let s =
-            expand(20, [0.0], |x| vec![Recorded::one() - x[0].scale(2.0) / Recorded::from_f64(4.0) - x[0].scale(0.5)]);
-        first_is(&s, |j| if j == 0 { 0.0 } else { -(if j % 2 == 0 { 1.0 } else { -1.0 }) / factorial(j) });
+        let s = expand(20, [0.0], |x| {
+            vec![Recorded::one() - x[0].scale(2.0) / Recorded::from_f64(4.0) - x[0].scale(0.5)]
+        });
+        first_is(&s, |j| {
+            if j == 0 { 0.0 } else { -(if j % 2 == 0 { 1.0 } else { -1.0 }) / factorial(j) }
+        });
     }
 
     #[test]
@@ -535,7 +575,9 @@ mod tests {
         // x' = 1/(2x): sqrt(1 + t); and x' = sqrt(x): (1 + t/2)^2
         let binomial = |j: usize| (0..j).fold(1.0, |b, i| b * (0.5 - i as f64) / (i + 1) as f64);
         first_is(&expand(20, [1.0], |x| vec![Recorded::one() / x[0].scale(2.0)]), binomial);
-        first_is(&expand(20, [1.0], |x| vec![x[0].sqrt()]), |j| [1.0, 1.0, 0.25].get(j).copied().unwrap_or(0.0));
+        first_is(&expand(20, [1.0], |x| vec![x[0].sqrt()]), |j| {
+            [1.0, 1.0, 0.25].get(j).copied().unwrap_or(0.0)
+        });
     }
 
     #[test]
@@ -561,7 +603,19 @@ mod tests {
     #[test]
     fn hyperbolic_tangent() {
         // x' = tanh(y), y' = 1: ln cosh t = t^2/2 - t^4/12 + t^6/45 - 17 t^8/2520 + 31 t^10/14175
-        let want = [0.0, 0.0, 0.5, 0.0, -1.0 / 12.0, 0.0, 1.0 / 45.0, 0.0, -17.0 / 2520.0, 0.0, 31.0 / 14175.0];
+        let want = [
+            0.0,
+            0.0,
+            0.5,
+            0.0,
+            -1.0 / 12.0,
+            0.0,
+            1.0 / 45.0,
+            0.0,
+            -17.0 / 2520.0,
+            0.0,
+            31.0 / 14175.0,
+        ];
         let s = expand(10, [0.0, 0.0], |x| vec![x[1].tanh(), Recorded::one()]);
         first_is(&s, |j| want[j]);
         assert_eq!(s.layer_arguments().count(), 1);
@@ -594,7 +648,8 @@ mod tests {
     #[test]
     fn logarithm_arc_tangent_error_function() {
         let sign = |j: usize| if j.is_multiple_of(2) { 1.0 } else { -1.0 };
-        // x' = ln y, y' = 1 from y = 1: y ln y - y + 1; coefficients of t^j for j > 1: (-1)^j/(j (j - 1))
+        // x' = ln y, y' = 1 from y = 1: y ln y - y + 1; coefficients of t^j for j > 1: (-1)^j/(j (j
+        // - 1))
         first_is(&expand(20, [0.0, 1.0], |x| vec![x[1].ln(), Recorded::one()]), |j| match j {
             0 | 1 => 0.0,
             _ => sign(j) / (j * (j - 1)) as f64,
@@ -609,7 +664,8 @@ mod tests {
         first_is(&expand(20, [0.0, 0.0], |x| vec![x[1].erf(), Recorded::one()]), |j| match j {
             0 => 0.0,
             j if j % 2 == 0 => {
-                std::f64::consts::FRAC_2_SQRT_PI * sign(j / 2 - 1) / (factorial(j / 2 - 1) * (j * (j - 1)) as f64)
+                std::f64::consts::FRAC_2_SQRT_PI * sign(j / 2 - 1)
+                    / (factorial(j / 2 - 1) * (j * (j - 1)) as f64)
             }
             _ => 0.0,
         });
@@ -649,14 +705,18 @@ mod tests {
             vec![
                 x[1].ln() * x[0].atan() + x[2] / (x[0] + c(2.0)),
                 (x[0] * x[1]).sin() + x[2].cos() - x[1].sin() / c(3.0),
-                x[0].erf() - (x[1] + x[2]).tanh() + x[2].squared().scale(0.25) - x[0].squared() * x[0],
-                (-x[3]).exp() * (x[0] + c(1.5)).sqrt() - c(0.5) / x[1] + c(2.0) - x[3].abs() + (x[2] * x[3]).cos(),
+                x[0].erf() - (x[1] + x[2]).tanh() + x[2].squared().scale(0.25)
+                    - x[0].squared() * x[0],
+                (-x[3]).exp() * (x[0] + c(1.5)).sqrt() - c(0.5) / x[1] + c(2.0) - x[3].abs()
+                    + (x[2] * x[3]).cos(),
             ]
         }
         for start in [[0.4, 1.3, -0.2, 0.7], [-0.7, 2.1, 0.9, 1.1], [0.0, 0.8, 0.0, 0.6]] {
             let s = expand(24, start, f);
             let at = |c: &[DoubleDouble], t: f64| {
-                c.iter().rev().fold(DoubleDouble::zero(), |sum, c| sum * DoubleDouble::from_f64(t) + *c)
+                c.iter()
+                    .rev()
+                    .fold(DoubleDouble::zero(), |sum, c| sum * DoubleDouble::from_f64(t) + *c)
             };
             let t = 1.0 / 256.0;
             let x: Vec<_> = (0..4).map(|i| at(s.component(i), t)).collect();
@@ -671,14 +731,17 @@ mod tests {
                 let gap = (at(&slopes, t) - want).to_f64().abs();
                 assert!(gap < 1e-27, "{start:?}, {i}: {gap:e}");
             }
-            // The arguments of the layers, as far as they are known: those of the error function and of tanh.
+            // The arguments of the layers, as far as they are known: those of the error function
+            // and of tanh.
             let layers: Vec<_> = s.layer_arguments().collect();
             assert_eq!(layers.len(), 2);
             for ((kind, layer), (wanted, of)) in
                 layers.iter().zip([(LayerKind::Erf, &x[..1]), (LayerKind::Tanh, &x[1..3])])
             {
                 assert_eq!((*kind, layer.len()), (wanted, 24));
-                let gap = (at(layer, t) - of.iter().fold(DoubleDouble::zero(), |sum, x| sum + *x)).to_f64().abs();
+                let gap = (at(layer, t) - of.iter().fold(DoubleDouble::zero(), |sum, x| sum + *x))
+                    .to_f64()
+                    .abs();
                 assert!(gap < 1e-27, "{start:?}: {gap:e}");
             }
         }

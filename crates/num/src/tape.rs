@@ -1,17 +1,20 @@
 //! Equations as data: a function recorded as a list of operations.
 //!
-//! A [`Tape`] holds a function of any number of variables as a list of operations with shared subterms. Constants and named
-//! parameters are operations of their own, so that extended precision can read them as the decimal numbers that they were given
-//! as. A tape is written by running an equation on [`Recorded`] numbers ([`Tape::record`]); it is read in three ways:
+//! A [`Tape`] holds a function of any number of variables as a list of operations with shared
+//! subterms. Constants and named parameters are operations of their own, so that extended precision
+//! can read them as the decimal numbers that they were given as. A tape is written by running an
+//! equation on [`Recorded`] numbers ([`Tape::record`]); it is read in three ways:
 //!
 //! - [`Program`] evaluates it over any [`Elementary`] number, made to be called millions of times;
-//! - [`Solution`](super::series::Solution) makes the Taylor series of the differential equation that it is the right-hand side of;
-//! - [`Replay`] writes it again inside another recording. That is how a transform makes a new equation from an old one, and how
-//!   derivatives are taken symbolically.
+//! - [`Solution`](super::series::Solution) makes the Taylor series of the differential equation
+//!   that it is the right-hand side of;
+//! - [`Replay`] writes it again inside another recording. That is how a transform makes a new
+//!   equation from an old one, and how derivatives are taken symbolically.
 //!
-//! **What decides bits.** Every operation of the equation is one operation of the number type, in the order and association in which it was
-//! written; nothing is reassociated, fused or cancelled. Only two things are done once instead of each time: equal subterms,
-//! and terms without variables, which in plain arithmetic are computed in `f64` (an equation in Rust does the same with its own
+//! **What decides bits.** Every operation of the equation is one operation of the number type, in
+//! the order and association in which it was written; nothing is reassociated, fused or cancelled.
+//! Only two things are done once instead of each time: equal subterms, and terms without variables,
+//! which in plain arithmetic are computed in `f64` (an equation in Rust does the same with its own
 //! `f64` parameters).
 //!
 //! ```
@@ -21,7 +24,8 @@
 //!     let r2 = v[0].squared() + v[1].squared();
 //!     vec![r2 * v[0], -r2]
 //! });
-//! assert_eq!(tape.operations().len(), 7); // two variables, two squares, a sum used twice, a product, a sign
+//! // Two variables, two squares, a sum used twice, a product, a sign.
+//! assert_eq!(tape.operations().len(), 7);
 //! let mut out = [0.0; 2];
 //! Program::new(&tape).evaluate(&[1.0, 2.0], &mut out);
 //! assert_eq!(out, [5.0, -5.0]);
@@ -91,9 +95,8 @@ impl Operation {
         let (a, b) = match self {
             Variable(_) | Constant(_) | Parameter(_) | Pi => (None, None),
             Add(a, b) | Sub(a, b) | Mul(a, b) | Div(a, b) => (Some(a), Some(b)),
-            Neg(a) | Tanh(a) | Exp(a) | Ln(a) | Sin(a) | Cos(a) | Sqrt(a) | Atan(a) | Erf(a) | Sign(a) => {
-                (Some(a), None)
-            }
+            Neg(a) | Tanh(a) | Exp(a) | Ln(a) | Sin(a) | Cos(a) | Sqrt(a) | Atan(a) | Erf(a)
+            | Sign(a) => (Some(a), None),
         };
         a.into_iter().chain(b)
     }
@@ -135,7 +138,11 @@ impl Tape {
     /// Records the operations that `function` applies to `variables` symbolic numbers.
     pub fn record(variables: usize, function: impl FnOnce(&[Recorded]) -> Vec<Recorded>) -> Self {
         let recorder = Recorder {
-            tape: Tape { variables, operations: (0..variables).map(Operation::Variable).collect(), ..Tape::default() },
+            tape: Tape {
+                variables,
+                operations: (0..variables).map(Operation::Variable).collect(),
+                ..Tape::default()
+            },
             index: HashMap::new(),
         };
         // A recording inside a recording gets a sheet of its own, and the outer one its sheet back.
@@ -241,20 +248,27 @@ impl Tape {
         values
     }
 
-    /// The values of the operations that depend on no variable, `None` for the others. `number` reads constants and parameters.
+    /// The values of the operations that depend on no variable, `None` for the others. `number`
+    /// reads constants and parameters.
     pub(super) fn fixed<S: Elementary>(&self, number: impl Fn(&Decimal) -> S) -> Vec<Option<S>> {
         let mut values: Vec<Option<S>> = Vec::with_capacity(self.operations.len());
         for operation in &self.operations {
             let fixed = !matches!(operation, Operation::Variable(_))
                 && operation.arguments().all(|argument| values[argument].is_some());
-            let value = fixed.then(|| self.apply(*operation, &number, |node| values[node].unwrap_or(S::zero())));
+            let value = fixed
+                .then(|| self.apply(*operation, &number, |node| values[node].unwrap_or(S::zero())));
             values.push(value);
         }
         values
     }
 
     /// One operation. Variables are looked up like any other argument.
-    fn apply<S: Elementary>(&self, operation: Operation, number: impl Fn(&Decimal) -> S, at: impl Fn(Node) -> S) -> S {
+    fn apply<S: Elementary>(
+        &self,
+        operation: Operation,
+        number: impl Fn(&Decimal) -> S,
+        at: impl Fn(Node) -> S,
+    ) -> S {
         match operation {
             Operation::Variable(i) => at(i),
             Operation::Constant(i) => number(&self.constants[i]),
@@ -277,8 +291,8 @@ impl Tape {
         }
     }
 
-    /// The function's values at `x`, with constants and parameters read as decimal numbers in `S`, and every term computed in `S`.
-    /// For occasional use; [`Program`] is for loops.
+    /// The function's values at `x`, with constants and parameters read as decimal numbers in `S`,
+    /// and every term computed in `S`. For occasional use; [`Program`] is for loops.
     ///
     /// # Panics
     /// If `x` has not as many numbers as the function has variables.
@@ -314,8 +328,8 @@ impl Recorder {
 }
 
 thread_local! {
-    /// The recording under way on this thread. `Elementary` is `Copy + 'static`, so that a recorded number cannot carry a
-    /// reference to its recording.
+    /// The recording under way on this thread. `Elementary` is `Copy + 'static`, so that a recorded
+    /// number cannot carry a reference to its recording.
     static RECORDER: RefCell<Recorder> = RefCell::new(Recorder::default());
 }
 
@@ -348,10 +362,13 @@ impl Recorded {
     pub fn parameter(name: &str, value: &Decimal) -> Self {
         RECORDER.with_borrow_mut(|recorder| {
             let parameters = &mut recorder.tape.parameters;
-            let i = parameters.iter().position(|p| p.name == name && p.value == *value).unwrap_or_else(|| {
-                parameters.push(Parameter { name: name.into(), value: value.clone() });
-                parameters.len() - 1
-            });
+            let i = parameters
+                .iter()
+                .position(|p| p.name == name && p.value == *value)
+                .unwrap_or_else(|| {
+                    parameters.push(Parameter { name: name.into(), value: value.clone() });
+                    parameters.len() - 1
+                });
             Self { node: recorder.push(Operation::Parameter(i)) }
         })
     }
@@ -512,8 +529,9 @@ impl<'a> Replay<'a> {
         }
     }
 
-    /// The derivatives of the function's values in the direction `dx` at the same point, symbolically, with the operations of
-    /// [`Dual`](super::Dual) in their order; `None` is a derivative that is zero everywhere.
+    /// The derivatives of the function's values in the direction `dx` at the same point,
+    /// symbolically, with the operations of [`Dual`](super::Dual) in their order; `None` is a
+    /// derivative that is zero everywhere.
     ///
     /// # Panics
     /// If `dx` has not as many numbers as the function has variables.
@@ -535,13 +553,22 @@ impl<'a> Replay<'a> {
     }
 
     /// The derivative of one operation, whose value is `value`.
-    fn slope(&self, operation: Operation, value: Recorded, slopes: &[Option<Recorded>]) -> Option<Recorded> {
+    fn slope(
+        &self,
+        operation: Operation,
+        value: Recorded,
+        slopes: &[Option<Recorded>],
+    ) -> Option<Recorded> {
         let at = |node: Node| self.known(node);
         let one = Recorded::one;
         let two_over_root_pi = || Recorded::from_f64(2.0) / Recorded::pi().sqrt();
-        let chain = |a: Node, factor: &dyn Fn(Recorded) -> Recorded| slopes[a].map(|p| p * factor(at(a)));
+        let chain =
+            |a: Node, factor: &dyn Fn(Recorded) -> Recorded| slopes[a].map(|p| p * factor(at(a)));
         match operation {
-            Operation::Variable(_) | Operation::Constant(_) | Operation::Parameter(_) | Operation::Pi => None,
+            Operation::Variable(_)
+            | Operation::Constant(_)
+            | Operation::Parameter(_)
+            | Operation::Pi => None,
             Operation::Add(a, b) => match (slopes[a], slopes[b]) {
                 (Some(p), Some(q)) => Some(p + q),
                 (p, q) => p.or(q),
@@ -585,7 +612,8 @@ mod tests {
         let c = S::from_f64(0.1);
         let r = x.squared() + y.squared();
         let shared = (c - y.scale(1e-3)) * r + S::one();
-        let mut a = (x / S::from_f64(0.3)).tanh() * shared - (y.exp() / (r + S::one()).sqrt()) + S::one() / (r + c);
+        let mut a = (x / S::from_f64(0.3)).tanh() * shared - (y.exp() / (r + S::one()).sqrt())
+            + S::one() / (r + c);
         a += c * x;
         a -= y;
         let b = -(x * y).sin() + y.cos() * (r + c).ln() - x.atan() + (x - y).erf() + y.abs();
@@ -606,7 +634,8 @@ mod tests {
         #[test]
         fn a_program_gives_the_bits_of_the_equation(x in -3.0..3.0_f64, y in -3.0..3.0_f64) {
             let p = Program::new(&tape());
-            prop_assert_eq!(program(&p, x, y).map(f64::to_bits), everything(x, y).map(f64::to_bits));
+            prop_assert_eq!(program(&p, x, y).map(f64::to_bits), everything(x,
+                y).map(f64::to_bits));
             let (u, v) = (DoubleDouble::new(x, x * 1e-17), DoubleDouble::new(y, y * 1e-17));
             prop_assert_eq!(program(&p, u, v), everything(u, v));
             let (u, v) = (Dual::<f64, 2>::variable(x, 0), Dual::variable(y, 1));
@@ -634,7 +663,8 @@ mod tests {
 
         #[test]
         fn decimal_reading_is_close_to_binary(x in -3.0..3.0_f64, y in -3.0..3.0_f64) {
-            for (d, b) in tape().evaluate_decimal(&[DoubleDouble::from_f64(x), DoubleDouble::from_f64(y)]).iter().zip(everything(x, y)) {
+            for (d, b) in tape().evaluate_decimal(&[DoubleDouble::from_f64(x),
+                DoubleDouble::from_f64(y)]).iter().zip(everything(x, y)) {
                 prop_assert!((d.to_f64() - b).abs() < 1e-11 * (1.0 + b.abs()), "{:?} {}", d, b);
             }
         }
@@ -662,7 +692,8 @@ mod tests {
     #[test]
     fn terms_without_variables_are_computed_once() {
         let t = Tape::record(1, |x| {
-            let (m, g) = (Recorded::parameter("m", &2.0.into()), Recorded::parameter("gamma", &0.5.into()));
+            let (m, g) =
+                (Recorded::parameter("m", &2.0.into()), Recorded::parameter("gamma", &0.5.into()));
             vec![x[0] * (Recorded::from_f64(2.0) * m) + g.sin() / m]
         });
         // x times a number, plus a number: two operations, one instruction.
@@ -705,7 +736,8 @@ mod tests {
         assert_eq!(t.parameters()[0].name, "p");
     }
 
-    /// The order in which an instruction takes its number and its register, for every operation and both sides.
+    /// The order in which an instruction takes its number and its register, for every operation and
+    /// both sides.
     #[test]
     fn a_number_may_stand_on_either_side() {
         fn all<S: Elementary>(x: S) -> Vec<S> {
@@ -745,7 +777,10 @@ mod tests {
             sum -= number("0") * number("-0");
             vec![
                 sum,
-                parameter("a", 1.0) * parameter("a", 2.0) * parameter("b", 1.0) * parameter("a", 1.0),
+                parameter("a", 1.0)
+                    * parameter("a", 2.0)
+                    * parameter("b", 1.0)
+                    * parameter("a", 1.0),
                 sum.tanh() + v[0].tanh(),
             ]
         });
@@ -754,7 +789,8 @@ mod tests {
             constants.iter().map(|c| c.to_bits()).collect::<Vec<_>>(),
             [0.1, 0.2, 0.0, -0.0_f64].map(f64::to_bits)
         );
-        let parameters: Vec<_> = t.parameters().iter().map(|p| (p.name.as_str(), p.value.value())).collect();
+        let parameters: Vec<_> =
+            t.parameters().iter().map(|p| (p.name.as_str(), p.value.value())).collect();
         assert_eq!(parameters, [("a", 1.0), ("a", 2.0), ("b", 1.0)]);
         assert_eq!((t.tanh_count(), t.variables()), (2, 1));
         let mut out = [0.0; 3];
@@ -769,7 +805,8 @@ mod tests {
         let one = program(&|v| vec![v[0] * number(0.3) + v[1], number(2.0)]);
         assert!(one.is_like(&program(&|v| vec![v[0] * number(0.4) + v[1], number(3.0)])));
         for other in [
-            // Another operation, another variable, a value where there was a number, the values the other way round.
+            // Another operation, another variable, a value where there was a number, the values the
+            // other way round.
             program(&|v| vec![v[0] * number(0.3) - v[1], number(2.0)]),
             program(&|v| vec![v[1] * number(0.3) + v[0], number(2.0)]),
             program(&|v| vec![v[0] * number(0.3) + v[1], v[0]]),
@@ -778,6 +815,9 @@ mod tests {
         ] {
             assert!(!one.is_like(&other) && !other.is_like(&one), "{other:?}");
         }
-        assert!(!one.is_like(&Program::new(&Tape::record(3, |v| vec![v[0] * number(0.3) + v[1], number(2.0)]))));
+        assert!(!one.is_like(&Program::new(&Tape::record(3, |v| vec![
+            v[0] * number(0.3) + v[1],
+            number(2.0)
+        ]))));
     }
 }

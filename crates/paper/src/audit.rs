@@ -16,7 +16,8 @@ pub const PANELS: [CensusPanel; 7] = {
     [a, b, c, d, e, f, CensusPanel { name: "9(i)", said: Said::Chaos, column: None }]
 };
 
-/// Sweeps of the three figures, in their order: of fig. 7's intervals, of fig. 8's sigmas, and of fig. 9's first panel.
+/// Sweeps of the three figures, in their order: of fig. 7's intervals, of fig. 8's sigmas, and of
+/// fig. 9's first panel.
 pub type Sweeps = [Vec<Table>; 3];
 
 /// All runs of every panel, for [`cells`].
@@ -35,14 +36,16 @@ pub struct Cell {
     pub hits: [u64; 7],
     /// Runs that go to the far state, all panels together.
     pub far: u64,
-    /// Decimal logarithm of the probability that one new run of each panel comes out as the paper says: the product over panels of
-    /// (hits + 1/2)/(runs + 1), the predictive probability under Jeffreys' prior.
+    /// Decimal logarithm of the probability that one new run of each panel comes out as the paper
+    /// says: the product over panels of (hits + 1/2)/(runs + 1), the predictive probability under
+    /// Jeffreys' prior.
     pub log_likelihood: f64,
 }
 
 impl Cell {
     fn of(alpha: f64, beta: f64, found: [(u64, u64, u64); 7]) -> Self {
-        let log_likelihood = found.iter().map(|(n, k, _)| log10((*k as f64 + 0.5) / (*n as f64 + 1.0))).sum();
+        let log_likelihood =
+            found.iter().map(|(n, k, _)| log10((*k as f64 + 0.5) / (*n as f64 + 1.0))).sum();
         Self {
             alpha,
             beta,
@@ -53,7 +56,8 @@ impl Cell {
         }
     }
 
-    /// A draw of the decimal logarithm of the seven outcomes' probability, each panel's share having the posterior that Jeffreys' prior gives.
+    /// A draw of the decimal logarithm of the seven outcomes' probability, each panel's share
+    /// having the posterior that Jeffreys' prior gives.
     fn draw(&self, random: &mut RandomStream) -> f64 {
         let share = |(n, k): (&u64, &u64)| {
             let weights = [*k as f64 + 0.5, (*n - *k) as f64 + 0.5];
@@ -71,7 +75,9 @@ impl Cell {
 /// Runs of a table at a pair of parameters. What a table does not vary has the paper's value in it.
 fn runs_at(table: &Table, [alpha, beta]: [f64; 2], panel: &CensusPanel) -> Vec<CensusRun> {
     let mut chosen = Vec::new();
-    for (name, wanted, printed) in [("params.alpha", alpha, PRINTED[0]), ("params.beta", beta, PRINTED[1])] {
+    for (name, wanted, printed) in
+        [("params.alpha", alpha, PRINTED[0]), ("params.beta", beta, PRINTED[1])]
+    {
         if table.column(name).is_some() {
             chosen.push((name, Entry::Number(wanted)));
         } else if wanted != printed {
@@ -81,15 +87,18 @@ fn runs_at(table: &Table, [alpha, beta]: [f64; 2], panel: &CensusPanel) -> Vec<C
     panel.runs(table, chosen)
 }
 
-/// The cells of sweeps over `params.alpha` and `params.beta`, or over one of them at the paper's value of the other, in order; those in which
-/// every panel has a run. Of each panel at most so many of the first runs count as `most` says, in the panels' order.
+/// The cells of sweeps over `params.alpha` and `params.beta`, or over one of them at the paper's
+/// value of the other, in order; those in which every panel has a run. Of each panel at most so
+/// many of the first runs count as `most` says, in the panels' order.
 pub fn cells(sweeps: &Sweeps, most: [usize; 7], rules: &Rules) -> Vec<Cell> {
     let mut pairs: Vec<[f64; 2]> = Vec::new();
     for table in sweeps.iter().flatten() {
         let values = |name: &str, printed: f64| -> Vec<f64> {
             table.column(name).map_or(vec![printed; table.len()], |_| table.numbers(name).to_vec())
         };
-        for (alpha, beta) in values("params.alpha", PRINTED[0]).into_iter().zip(values("params.beta", PRINTED[1])) {
+        for (alpha, beta) in
+            values("params.alpha", PRINTED[0]).into_iter().zip(values("params.beta", PRINTED[1]))
+        {
             if !pairs.contains(&[alpha, beta]) {
                 pairs.push([alpha, beta]);
             }
@@ -119,8 +128,9 @@ pub struct Candidate {
     pub bayes_factor: f64,
     /// Central interval of that ratio under the panels' posteriors.
     pub factor_interval: [f64; 2],
-    /// Probability if the printed numbers are right with probability `PRIORS[0]` before (`PRIORS[1]`), and the other candidates share the rest
-    /// evenly: from the predictive likelihoods, with the central interval under the panels' posteriors.
+    /// Probability if the printed numbers are right with probability `PRIORS[0]` before
+    /// (`PRIORS[1]`), and the other candidates share the rest evenly: from the predictive
+    /// likelihoods, with the central interval under the panels' posteriors.
     pub posterior: [Probability; 2],
 }
 
@@ -133,7 +143,8 @@ pub const PRIORS: [f64; 2] = [0.5, 0.99];
 /// The paper's alpha and beta.
 const PRINTED: [f64; 2] = [1e-3, 1e-5];
 
-/// The candidates among the cells: the printed pair, and those in which one exponent has another digit. `None` without the printed pair.
+/// The candidates among the cells: the printed pair, and those in which one exponent has another
+/// digit. `None` without the printed pair.
 pub fn candidates(cells: &[Cell], rules: &Rules) -> Option<Vec<Candidate>> {
     let is_power = |v: f64| {
         let e = log10(v);
@@ -145,7 +156,8 @@ pub fn candidates(cells: &[Cell], rules: &Rules) -> Option<Vec<Candidate>> {
         let changed = [c.alpha != PRINTED[0], c.beta != PRINTED[1]];
         c.is_whole() && changed[0] != changed[1] && is_power(c.alpha) && is_power(c.beta)
     }));
-    let factors: Vec<f64> = chosen.iter().map(|c| exp10(c.log_likelihood - printed.log_likelihood)).collect();
+    let factors: Vec<f64> =
+        chosen.iter().map(|c| exp10(c.log_likelihood - printed.log_likelihood)).collect();
     let others = (chosen.len() - 1).max(1) as f64;
     let posterior = |prior: f64, factors: &[f64]| -> Vec<f64> {
         let weight = |i: usize| if i == 0 { prior } else { (1.0 - prior) / others };
@@ -177,7 +189,10 @@ pub fn candidates(cells: &[Cell], rules: &Rules) -> Option<Vec<Candidate>> {
         cell,
         bayes_factor: factors[i],
         factor_interval: central(&mut drawn[i]),
-        posterior: [0, 1].map(|k| Probability { mean: means[k][i], interval: central(&mut drawn_posteriors[i][k]) }),
+        posterior: [0, 1].map(|k| Probability {
+            mean: means[k][i],
+            interval: central(&mut drawn_posteriors[i][k]),
+        }),
     };
     Some(chosen.into_iter().enumerate().map(candidate).collect())
 }
@@ -196,9 +211,18 @@ pub fn cell_table(cells: &[Cell]) -> Table {
     }));
     let mut table = Table::new("audit", columns);
     for cell in cells {
-        let counts = cell.runs.iter().zip(&cell.hits).flat_map(|(n, k)| [*n, *k]).map(|v| Entry::Integer(v as i64));
-        let head: [Entry; 4] =
-            [cell.alpha.into(), cell.beta.into(), cell.log_likelihood.into(), Entry::Integer(cell.far as i64)];
+        let counts = cell
+            .runs
+            .iter()
+            .zip(&cell.hits)
+            .flat_map(|(n, k)| [*n, *k])
+            .map(|v| Entry::Integer(v as i64));
+        let head: [Entry; 4] = [
+            cell.alpha.into(),
+            cell.beta.into(),
+            cell.log_likelihood.into(),
+            Entry::Integer(cell.far as i64),
+        ];
         table.push(head.into_iter().chain(counts));
     }
     table
@@ -206,19 +230,26 @@ pub fn cell_table(cells: &[Cell]) -> Table {
 
 /// Candidates as a table.
 pub fn candidate_table(candidates: &[Candidate]) -> Table {
-    let mut columns = vec![Column::numbers("alpha"), Column::numbers("beta"), Column::integers("fewest_runs")];
+    let mut columns =
+        vec![Column::numbers("alpha"), Column::numbers("beta"), Column::integers("fewest_runs")];
     let names = ["log10_likelihood", "bayes_factor", "bayes_factor_low", "bayes_factor_high"];
     columns.extend(names.map(Column::numbers));
     for prior in PRIORS {
-        columns.extend(["", "_low", "_high"].map(|end| Column::numbers(&format!("posterior_prior_{prior}{end}"))));
+        columns.extend(
+            ["", "_low", "_high"]
+                .map(|end| Column::numbers(&format!("posterior_prior_{prior}{end}"))),
+        );
     }
     let mut table = Table::new("candidates", columns);
     for c in candidates {
         let fewest = c.cell.runs.iter().min().copied().unwrap_or(0);
-        let head: [Entry; 3] = [c.cell.alpha.into(), c.cell.beta.into(), Entry::Integer(fewest as i64)];
-        let numbers = [c.cell.log_likelihood, c.bayes_factor, c.factor_interval[0], c.factor_interval[1]];
+        let head: [Entry; 3] =
+            [c.cell.alpha.into(), c.cell.beta.into(), Entry::Integer(fewest as i64)];
+        let numbers =
+            [c.cell.log_likelihood, c.bayes_factor, c.factor_interval[0], c.factor_interval[1]];
         let posteriors = c.posterior.iter().flat_map(|p| [p.mean, p.interval[0], p.interval[1]]);
-        table.push(head.into_iter().chain(numbers.into_iter().chain(posteriors).map(Entry::Number)));
+        table
+            .push(head.into_iter().chain(numbers.into_iter().chain(posteriors).map(Entry::Number)));
     }
     table
 }
@@ -234,8 +265,13 @@ mod tests {
 
     #[test]
     fn candidates_differ_from_the_printed_numbers_in_one_exponent() {
-        let cells =
-            [cell(1e-3, 1e-5, 0), cell(1e-1, 1e-5, 9), cell(1e-3, 1e-4, 0), cell(1e-1, 1e-4, 9), cell(3e-3, 1e-5, 9)];
+        let cells = [
+            cell(1e-3, 1e-5, 0),
+            cell(1e-1, 1e-5, 9),
+            cell(1e-3, 1e-4, 0),
+            cell(1e-1, 1e-4, 9),
+            cell(3e-3, 1e-5, 9),
+        ];
         let rules = &claims().rules;
         let found = candidates(&cells, rules).unwrap();
         let pairs: Vec<[f64; 2]> = found.iter().map(|c| [c.cell.alpha, c.cell.beta]).collect();
@@ -246,28 +282,49 @@ mod tests {
             let sum: f64 = found.iter().map(|c| c.posterior[k].mean).sum();
             assert!((sum - 1.0).abs() < 1e-12);
         }
-        assert!(found[1].posterior[1].mean > 0.999 && found[1].posterior[0].mean > found[1].posterior[1].mean);
+        assert!(
+            found[1].posterior[1].mean > 0.999
+                && found[1].posterior[0].mean > found[1].posterior[1].mean
+        );
         assert_eq!(candidates(&cells[1..], rules), None);
-        // The printed numbers' own ratio is 1 in every draw; that of nine hits of nine has an interval around it.
+        // The printed numbers' own ratio is 1 in every draw; that of nine hits of nine has an
+        // interval around it.
         assert_eq!(found[0].factor_interval, [1.0, 1.0]);
         let [low, high] = found[1].factor_interval;
-        assert!(1.0 < low && low < found[1].bayes_factor && found[1].bayes_factor < high, "{low} {high}");
+        assert!(
+            1.0 < low && low < found[1].bayes_factor && found[1].bayes_factor < high,
+            "{low} {high}"
+        );
     }
 
     #[test]
     fn a_table_that_varies_one_number_has_the_printed_value_of_the_other() {
         let sweep = |columns: &[(&str, f64)]| {
-            let names = columns.iter().map(|(name, _)| Column::numbers(name)).chain([Column::words("outcome")]);
-            let mut table =
-                Table::new("sweep", names.chain([Column::integers("period"), Column::numbers("captured_at")]));
+            let names = columns
+                .iter()
+                .map(|(name, _)| Column::numbers(name))
+                .chain([Column::words("outcome")]);
+            let mut table = Table::new(
+                "sweep",
+                names.chain([Column::integers("period"), Column::numbers("captured_at")]),
+            );
             let head: Vec<Entry> = columns.iter().map(|(_, v)| Entry::Number(*v)).collect();
-            table.push(head.into_iter().chain(["period-1".into(), Entry::Integer(1), Entry::Number(10.0)]));
+            table.push(head.into_iter().chain([
+                "period-1".into(),
+                Entry::Integer(1),
+                Entry::Number(10.0),
+            ]));
             table
         };
-        let of =
-            |axis: (&str, f64), panel: &CensusPanel| sweep(&[axis].into_iter().chain(panel.column).collect::<Vec<_>>());
-        let all = |axis, range: std::ops::Range<usize>| PANELS[range].iter().map(|p| of(axis, p)).collect::<Vec<_>>();
-        for (axis, expected) in [(("params.alpha", 0.1), [0.1, 1e-5]), (("params.beta", 1e-4), [1e-3, 1e-4])] {
+        let of = |axis: (&str, f64), panel: &CensusPanel| {
+            sweep(&[axis].into_iter().chain(panel.column).collect::<Vec<_>>())
+        };
+        let all = |axis, range: std::ops::Range<usize>| {
+            PANELS[range].iter().map(|p| of(axis, p)).collect::<Vec<_>>()
+        };
+        for (axis, expected) in
+            [(("params.alpha", 0.1), [0.1, 1e-5]), (("params.beta", 1e-4), [1e-3, 1e-4])]
+        {
             let sweeps = [all(axis, 0..3), all(axis, 3..6), all(axis, 6..7)];
             let found = cells(&sweeps, ALL, &claims().rules);
             assert_eq!(found.len(), 1);

@@ -15,7 +15,8 @@ use twofold_num::elementary::{exp10, log10};
 use twofold_num::random::RandomStream;
 
 /// Stands before each text in docs/capture.md and docs/parameters.md.
-pub const BEGIN: &str = "<!-- capture: what figures/capture says; tests/it/capture.rs compares it; do not edit -->";
+pub const BEGIN: &str =
+    "<!-- capture: what figures/capture says; tests/it/capture.rs compares it; do not edit -->";
 /// Stands after it.
 pub const END: &str = "<!-- end of capture -->";
 
@@ -28,7 +29,8 @@ pub struct ByMethod {
     pub runs: Vec<CensusRun>,
 }
 
-/// When a run was captured, or that it was not until `end`. An undecided run counts as not captured.
+/// When a run was captured, or that it was not until `end`. An undecided run counts as not
+/// captured.
 pub fn time(run: &CensusRun, end: f64) -> Time {
     match run.kind(end) {
         MotionKind::Irregular | MotionKind::Undecided => (end, false),
@@ -37,7 +39,8 @@ pub fn time(run: &CensusRun, end: f64) -> Time {
     }
 }
 
-/// Until when the share of captured runs is stated, by reading: about half of LSODA's are captured then.
+/// Until when the share of captured runs is stated, by reading: about half of LSODA's are captured
+/// then.
 fn shown_by(reading: Reading) -> f64 {
     match reading {
         Reading::Printed => 2e3,
@@ -47,22 +50,34 @@ fn shown_by(reading: Reading) -> f64 {
 
 /// Two significant digits, and as many of the interval's ends.
 fn spread(e: Estimate, scale: f64) -> String {
-    let largest = [e.value, e.interval[0], e.interval[1]].map(|v| (scale * v).abs()).into_iter().fold(0.0, f64::max);
+    let largest = [e.value, e.interval[0], e.interval[1]]
+        .map(|v| (scale * v).abs())
+        .into_iter()
+        .fold(0.0, f64::max);
     let digits = if largest >= 10.0 { 0 } else { 2 };
-    format!("{:.digits$} [{:.digits$}, {:.digits$}]", scale * e.value, scale * e.interval[0], scale * e.interval[1])
+    format!(
+        "{:.digits$} [{:.digits$}, {:.digits$}]",
+        scale * e.value,
+        scale * e.interval[0],
+        scale * e.interval[1]
+    )
 }
 
-/// The table of rates, hazard ratios and tests; in each reading the first method is the one that the others are compared with.
+/// The table of rates, hazard ratios and tests; in each reading the first method is the one that
+/// the others are compared with.
 pub fn capture_text(readings: &[(Reading, Vec<ByMethod>)], rules: &Rules) -> String {
     let times = |m: &ByMethod| -> Vec<Time> { m.runs.iter().map(|r| time(r, rules.end)).collect() };
     let tests: Vec<LogRank> = readings
         .iter()
-        .flat_map(|(_, methods)| methods[1..].iter().map(|m| LogRank::of(&times(m), &times(&methods[0]))))
+        .flat_map(|(_, methods)| {
+            methods[1..].iter().map(|m| LogRank::of(&times(m), &times(&methods[0])))
+        })
         .collect();
     let adjusted = effects::holm(&tests.iter().map(LogRank::p).collect::<Vec<_>>());
     let mut tested = tests.iter().zip(adjusted);
     let mut text = String::from(
-        "| reading | method | runs | captured | undecided | captures in 10⁵ units of time | captured by t | hazard ratio to LSODA | log-rank p |\n\
+        "| reading | method | runs | captured | undecided | captures in 10⁵ units of time | \
+            captured by t | hazard ratio to LSODA | log-rank p |\n\
          |---|---|---|---|---|---|---|---|---|\n",
     );
     for (reading, methods) in readings {
@@ -96,19 +111,24 @@ pub fn capture_text(readings: &[(Reading, Vec<ByMethod>)], rules: &Rules) -> Str
     text
 }
 
-/// Differences of the shares of each kind of outcome at the end, reconstructed reading: the intervals 20 and 40 against 100, and tanh against its
-/// perturbation. `fig7` and `fig8` are the census' sweeps.
+/// Differences of the shares of each kind of outcome at the end, reconstructed reading: the
+/// intervals 20 and 40 against 100, and tanh against its perturbation. `fig7` and `fig8` are the
+/// census' sweeps.
 pub fn effects_text(fig7: &Table, fig8: &Table, rules: &Rules) -> String {
     let alpha = || ("params.alpha", Entry::Number(Reading::Reconstructed.caricature().alpha));
-    let panels: Vec<Vec<CensusRun>> =
-        PANELS.iter().enumerate().map(|(i, p)| p.runs([fig7, fig8][i / 3], vec![alpha()])).collect();
+    let panels: Vec<Vec<CensusRun>> = PANELS
+        .iter()
+        .enumerate()
+        .map(|(i, p)| p.runs([fig7, fig8][i / 3], vec![alpha()]))
+        .collect();
     let contrasts = [
         (panels[0].clone(), panels[2].clone()),
         (panels[1].clone(), panels[2].clone()),
         (panels[..3].concat(), panels[3..].concat()),
     ];
     let mut text = String::from(
-        "| kind at t = 2·10⁵ | interval 20 less interval 100 | 40 less 100 | fig. 7 less fig. 8 |\n|---|---|---|---|\n",
+        "| kind at t = 2·10⁵ | interval 20 less interval 100 | 40 less 100 | fig. 7 less fig. 8 \
+            |\n|---|---|---|---|\n",
     );
     for (i, kind) in MotionKind::ALL.into_iter().enumerate() {
         let cells: Vec<String> = contrasts
@@ -131,18 +151,21 @@ pub fn effects_text(fig7: &Table, fig8: &Table, rules: &Rules) -> String {
             vec![undecided, runs.len() as u64 - undecided]
         })
         .collect();
-    let test = twofold_analyse::counts::homogeneity(&rows, rules.permutations, rules.permutation_seed);
+    let test =
+        twofold_analyse::counts::homogeneity(&rows, rules.permutations, rules.permutation_seed);
     let counts: Vec<String> = rows.iter().map(|r| r[0].to_string()).collect();
     let _ = write!(
         text,
-        "\nPercentage points with 95 % intervals. Undecided runs of the intervals 20, 40 and 100: {}; the same share in all three: {}.",
+        "\nPercentage points with 95 % intervals. Undecided runs of the intervals 20, 40 and 100: \
+            {}; the same share in all three: {}.",
         counts.join(", "),
         census::p_in_words(test.p_permutation)
     );
     text
 }
 
-/// A candidate for alpha and beta: runs, and those that show the outcome, for each of the audit's seven panels and for the visits by t = 150.
+/// A candidate for alpha and beta: runs, and those that show the outcome, for each of the audit's
+/// seven panels and for the visits by t = 150.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Candidate {
     /// Its alpha and beta.
@@ -154,27 +177,37 @@ pub struct Candidate {
 }
 
 /// The printed alpha and beta, and the reconstructed ones.
-const READINGS: [([f64; 2], &str); 2] = [([1e-3, 1e-5], " (printed)"), ([1e-1, 1e-5], " (reconstructed)")];
+const READINGS: [([f64; 2], &str); 2] =
+    [([1e-3, 1e-5], " (printed)"), ([1e-1, 1e-5], " (reconstructed)")];
 
 /// Visits by t = 150 that the eighth outcome needs.
 const VISITS: f64 = 2.0;
 
 impl Candidate {
-    /// The candidates that the sweeps have runs of: as many of each panel as the one with the fewest has. `visits` has a row a run, with
-    /// `params.alpha`, `params.beta` and `visits`.
+    /// The candidates that the sweeps have runs of: as many of each panel as the one with the
+    /// fewest has. `visits` has a row a run, with `params.alpha`, `params.beta` and `visits`.
     pub fn all(sweeps: &Sweeps, visits: &Table, rules: &Rules) -> Vec<Self> {
         let whole = audit::cells(sweeps, audit::ALL, rules);
         let fewest = std::array::from_fn(|panel| {
-            usize::try_from(whole.iter().map(|cell| cell.runs[panel]).min().unwrap_or(0)).unwrap_or(usize::MAX)
+            usize::try_from(whole.iter().map(|cell| cell.runs[panel]).min().unwrap_or(0))
+                .unwrap_or(usize::MAX)
         });
         let candidate = |cell: &Cell| {
             let here = |row: &usize| {
-                visits.numbers("params.alpha")[*row] == cell.alpha && visits.numbers("params.beta")[*row] == cell.beta
+                visits.numbers("params.alpha")[*row] == cell.alpha
+                    && visits.numbers("params.beta")[*row] == cell.beta
             };
             let rows: Vec<usize> = (0..visits.len()).filter(here).collect();
-            let often = rows.iter().filter(|row| visits.numbers("visits")[**row] >= VISITS).count() as u64;
-            let with = |seven: [u64; 7], last: u64| std::array::from_fn(|i| if i < 7 { seven[i] } else { last });
-            Self { at: [cell.alpha, cell.beta], runs: with(cell.runs, rows.len() as u64), hits: with(cell.hits, often) }
+            let often =
+                rows.iter().filter(|row| visits.numbers("visits")[**row] >= VISITS).count() as u64;
+            let with = |seven: [u64; 7], last: u64| {
+                std::array::from_fn(|i| if i < 7 { seven[i] } else { last })
+            };
+            Self {
+                at: [cell.alpha, cell.beta],
+                runs: with(cell.runs, rows.len() as u64),
+                hits: with(cell.hits, often),
+            }
         };
         audit::cells(sweeps, fewest, rules).iter().map(candidate).collect()
     }
@@ -183,7 +216,8 @@ impl Candidate {
         self.hits.into_iter().zip(self.runs)
     }
 
-    /// Decimal logarithm of the probability that one new run of each comes out as published: (hits + a)/(runs + 2 a) a share.
+    /// Decimal logarithm of the probability that one new run of each comes out as published: (hits
+    /// + a)/(runs + 2 a) a share.
     fn predictive(&self, a: f64) -> f64 {
         self.counts().map(|(k, n)| log10((k as f64 + a) / (n as f64 + 2.0 * a))).sum()
     }
@@ -205,9 +239,11 @@ impl Candidate {
 
 /// The table of likelihoods: the number of runs that show each outcome.
 pub fn likelihood_text(candidates: &[Candidate], rules: &Rules) -> String {
-    let names = audit::PANELS.iter().map(|p| p.name).chain(["visits"]).collect::<Vec<_>>().join(" | ");
+    let names =
+        audit::PANELS.iter().map(|p| p.name).chain(["visits"]).collect::<Vec<_>>().join(" | ");
     let mut text = format!(
-        "| α, β | {names} | outcomes in no run | all eight, by the shares | at most |\n|---|{}---|---|---|\n",
+        "| α, β | {names} | outcomes in no run | all eight, by the shares | at most \
+            |\n|---|{}---|---|---|\n",
         "---|".repeat(8)
     );
     for c in candidates {
@@ -232,20 +268,26 @@ const DRAWS: usize = 4000;
 /// others, for each pseudo-count and prior.
 pub fn priors_text(candidates: &[Candidate], rules: &Rules) -> String {
     let place = |at: [f64; 2]| candidates.iter().position(|c| c.at == at);
-    let [Some(printed), Some(reconstructed)] = READINGS.map(|(at, _)| place(at)) else { return String::new() };
+    let [Some(printed), Some(reconstructed)] = READINGS.map(|(at, _)| place(at)) else {
+        return String::new();
+    };
     let mut text = String::from(
-        "| pseudo-count | printed before | printed after | reconstructed after | all others after |\n|---|---|---|---|---|\n",
+        "| pseudo-count | printed before | printed after | reconstructed after | all others after \
+            |\n|---|---|---|---|---|\n",
     );
     for a in PSEUDO_COUNTS {
         let mut random = RandomStream::new(rules.permutation_seed, 3);
         let means: Vec<f64> = candidates.iter().map(|c| c.predictive(a)).collect();
-        let drawn: Vec<Vec<f64>> =
-            (0..DRAWS).map(|_| candidates.iter().map(|c| c.draw(a, &mut random)).collect()).collect();
+        let drawn: Vec<Vec<f64>> = (0..DRAWS)
+            .map(|_| candidates.iter().map(|c| c.draw(a, &mut random)).collect())
+            .collect();
         for prior in PRIORS {
             let others = (1.0 - prior) / (candidates.len() - 1) as f64;
             let posterior = |logs: &[f64]| -> [f64; 3] {
                 let top = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-                let weight = |(i, l): (usize, &f64)| exp10(l - top) * if i == printed { prior } else { others };
+                let weight = |(i, l): (usize, &f64)| {
+                    exp10(l - top) * if i == printed { prior } else { others }
+                };
                 let weights: Vec<f64> = logs.iter().enumerate().map(weight).collect();
                 let sum: f64 = weights.iter().sum();
                 let [p, r] = [printed, reconstructed].map(|i| weights[i] / sum);
@@ -257,10 +299,18 @@ pub fn priors_text(candidates: &[Candidate], rules: &Rules) -> String {
                 let mut values: Vec<f64> = draws.iter().map(|d| d[k]).collect();
                 values.sort_by(f64::total_cmp);
                 let tail = 0.5 * (1.0 - rules.confidence);
-                let ends = [tail, 1.0 - tail].map(|q| values[((values.len() - 1) as f64 * q) as usize]);
+                let ends =
+                    [tail, 1.0 - tail].map(|q| values[((values.len() - 1) as f64 * q) as usize]);
                 census::percent(mean[k], ends)
             };
-            let _ = writeln!(text, "| {a} | {} % | {} | {} | {} |", 100.0 * prior, cell(0), cell(1), cell(2));
+            let _ = writeln!(
+                text,
+                "| {a} | {} % | {} | {} | {} |",
+                100.0 * prior,
+                cell(0),
+                cell(1),
+                cell(2)
+            );
         }
     }
     text
@@ -280,16 +330,23 @@ fn mapped([fig7, fig8]: [&Table; 2], rules: &Rules) -> Vec<Mapped> {
         found.dedup();
         found
     };
-    let pairs = values("params.alpha").into_iter().flat_map(|a| values("params.beta").into_iter().map(move |b| [a, b]));
+    let pairs = values("params.alpha")
+        .into_iter()
+        .flat_map(|a| values("params.beta").into_iter().map(move |b| [a, b]));
     let cell = |at: [f64; 2]| {
-        let chosen = || vec![("params.alpha", Entry::Number(at[0])), ("params.beta", Entry::Number(at[1]))];
+        let chosen =
+            || vec![("params.alpha", Entry::Number(at[0])), ("params.beta", Entry::Number(at[1]))];
         let panels: Vec<Vec<CensusRun>> =
             PANELS.iter().enumerate().map(|(i, p)| p.runs([fig7, fig8][i / 3], chosen())).collect();
         let share = |(panel, runs): (&census::CensusPanel, &Vec<CensusRun>)| {
             let hits = census::supporting(panel.said, runs, rules);
             log10((hits as f64 + 0.5) / (runs.len() as f64 + 1.0))
         };
-        Mapped { at, log_likelihood: PANELS.iter().zip(&panels).map(share).sum(), runs: panels.concat() }
+        Mapped {
+            at,
+            log_likelihood: PANELS.iter().zip(&panels).map(share).sum(),
+            runs: panels.concat(),
+        }
     };
     pairs.map(cell).collect()
 }
@@ -303,16 +360,25 @@ pub fn map_text(lsoda: [&Table; 2], dopri5: [&Table; 2], rules: &Rules) -> Strin
     betas.sort_by(f64::total_cmp);
     betas.dedup();
     let head: Vec<String> = betas.iter().map(|b| format!("{b:.2e}").replace(".00e", "e")).collect();
-    let mut text = format!("| α \\ β | {} |\n|---|{}\n", head.join(" | "), "---|".repeat(betas.len()));
+    let mut text =
+        format!("| α \\ β | {} |\n|---|{}\n", head.join(" | "), "---|".repeat(betas.len()));
     for row in ours.chunks(betas.len()) {
-        let cells: Vec<String> =
-            row.iter().map(|c| format!("{:.1}{}", c.log_likelihood, if mixed(c) { "*" } else { "" })).collect();
-        let _ = writeln!(text, "| {} | {} |", format!("{:.2e}", row[0].at[0]).replace(".00e", "e"), cells.join(" | "));
+        let cells: Vec<String> = row
+            .iter()
+            .map(|c| format!("{:.1}{}", c.log_likelihood, if mixed(c) { "*" } else { "" }))
+            .collect();
+        let _ = writeln!(
+            text,
+            "| {} | {} |",
+            format!("{:.2e}", row[0].at[0]).replace(".00e", "e"),
+            cells.join(" | ")
+        );
     }
     // The largest, and how many others are within a factor of 10 of it.
     let top = |cells: &[Mapped]| -> Option<(String, usize)> {
         let best = cells.iter().max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))?;
-        let near = cells.iter().filter(|c| c.log_likelihood > best.log_likelihood - 1.0).count() - 1;
+        let near =
+            cells.iter().filter(|c| c.log_likelihood > best.log_likelihood - 1.0).count() - 1;
         Some((format!("{:.1} at {}", best.log_likelihood, name(best.at)), near))
     };
     let [(ours_best, ours_near), (other_best, other_near)] =
@@ -327,15 +393,23 @@ pub fn map_text(lsoda: [&Table; 2], dopri5: [&Table; 2], rules: &Rules) -> Strin
             }
         })
         .collect();
-    let tests: Vec<f64> =
-        pairs.iter().map(|(a, b)| census::same_odds(&[a.runs.clone(), b.runs.clone()], rules).p_permutation).collect();
+    let tests: Vec<f64> = pairs
+        .iter()
+        .map(|(a, b)| census::same_odds(&[a.runs.clone(), b.runs.clone()], rules).p_permutation)
+        .collect();
     let adjusted = effects::holm(&tests);
-    let differ: Vec<String> =
-        pairs.iter().zip(&adjusted).filter(|(_, p)| **p < rules.significance).map(|((a, _), _)| name(a.at)).collect();
+    let differ: Vec<String> = pairs
+        .iter()
+        .zip(&adjusted)
+        .filter(|(_, p)| **p < rules.significance)
+        .map(|((a, _), _)| name(a.at))
+        .collect();
     let _ = write!(
         text,
-        "\nDecimal logarithm of the likelihood of the six outcomes of figs 7 and 8, LSODA, {} runs a cell; * marks the {} of {} cells whose runs are not all \
-         of one kind. The largest is {ours_best}, and {ours_near} others are within a factor of 10 of it; by Dormand-Prince, with {} runs a cell: \
+        "\nDecimal logarithm of the likelihood of the six outcomes of figs 7 and 8, LSODA, {} runs \
+            a cell; * marks the {} of {} cells whose runs are not all \
+         of one kind. The largest is {ours_best}, and {ours_near} others are within a factor of 10 \
+         of it; by Dormand-Prince, with {} runs a cell: \
          {other_best}, and {other_near} others. Of {} cells in which there is something to \
          test, the two methods' kinds of outcome differ in {} (permutation test, Holm){}.",
         runs(&ours),

@@ -85,12 +85,14 @@ pub struct CensusPanel {
     pub name: &'static str,
     /// The claim.
     pub said: Said,
-    /// The column that sets it apart from the other panels of its sweep, and its value there; `None` if the sweep is of this panel alone.
+    /// The column that sets it apart from the other panels of its sweep, and its value there;
+    /// `None` if the sweep is of this panel alone.
     pub column: Option<(&'static str, f64)>,
 }
 
 impl CensusPanel {
-    /// The runs of the panel in a sweep's table, among those in which every column of `chosen` has its value.
+    /// The runs of the panel in a sweep's table, among those in which every column of `chosen` has
+    /// its value.
     pub fn runs(&self, table: &Table, mut chosen: Vec<(&str, Entry)>) -> Vec<CensusRun> {
         chosen.extend(self.column.map(|(name, value)| (name, Entry::Number(value))));
         runs(table, &chosen)
@@ -164,7 +166,8 @@ pub fn tally(runs: &[CensusRun], t: f64) -> [u64; 6] {
 pub fn supporting(said: Said, runs: &[CensusRun], rules: &Rules) -> u64 {
     let is = |run: &&CensusRun| match said {
         Said::Periodic => {
-            run.kind(rules.shown_from) != MotionKind::Irregular && run.outcome == format!("period-{}", run.period)
+            run.kind(rules.shown_from) != MotionKind::Irregular
+                && run.outcome == format!("period-{}", run.period)
         }
         Said::PeriodThree => run.kind(rules.shown_from) == MotionKind::PeriodThree,
         Said::Chaos => run.kind(rules.end) == MotionKind::Irregular,
@@ -172,7 +175,8 @@ pub fn supporting(said: Said, runs: &[CensusRun], rules: &Rules) -> u64 {
     runs.iter().filter(is).count() as u64
 }
 
-/// The share of runs that is captured by time `t`, as a step function: (time, share) at every capture.
+/// The share of runs that is captured by time `t`, as a step function: (time, share) at every
+/// capture.
 pub fn captures(runs: &[CensusRun], of: impl Fn(&CensusRun) -> bool) -> Vec<[f64; 2]> {
     let mut times: Vec<f64> =
         runs.iter().filter(|r| of(r) && r.captured_at.is_finite()).map(|r| r.captured_at).collect();
@@ -207,11 +211,17 @@ pub struct PanelShare {
 }
 
 /// A panel's runs, judged.
-pub fn share(panel: &CensusPanel, reading: Reading, runs: &[CensusRun], rules: &Rules) -> PanelShare {
+pub fn share(
+    panel: &CensusPanel,
+    reading: Reading,
+    runs: &[CensusRun],
+    rules: &Rules,
+) -> PanelShare {
     let hits = supporting(panel.said, runs, rules);
     let at_end = tally(runs, rules.end);
     let captured: Vec<f64> = captures(runs, |_| true).iter().map(|p| p[0]).collect();
-    let quartile = |q: usize| captured.get((captured.len() * q / 4).min(captured.len().saturating_sub(1)));
+    let quartile =
+        |q: usize| captured.get((captured.len() * q / 4).min(captured.len().saturating_sub(1)));
     PanelShare {
         panel: panel.name.to_owned(),
         reading,
@@ -248,20 +258,23 @@ pub struct Together {
     pub as_claimed: Probability,
     /// Not all three runs have the same outcome: "settles to different attractors".
     pub differ: Probability,
-    /// Some run is periodic from `shown_from` on, and some irregular to the end: "jumps between regimes".
+    /// Some run is periodic from `shown_from` on, and some irregular to the end: "jumps between
+    /// regimes".
     pub both_regimes: Probability,
 }
 
 /// Draws from the posterior of shares.
 const POSTERIOR_DRAWS: usize = 20_000;
 
-/// The panels of one figure and reading together. Shares have the posterior that Jeffreys' prior gives (Dirichlet with 1/2 for each of the kinds
-/// at the end, and Beta with 1/2 for what is claimed); panels are independent.
+/// The panels of one figure and reading together. Shares have the posterior that Jeffreys' prior
+/// gives (Dirichlet with 1/2 for each of the kinds at the end, and Beta with 1/2 for what is
+/// claimed); panels are independent.
 pub fn together(panels: &[PanelShare], rules: &Rules) -> Together {
     let mut random = RandomStream::new(rules.permutation_seed, 1);
     let (mut claimed, mut differ, mut both) = (Vec::new(), Vec::new(), Vec::new());
     for _ in 0..POSTERIOR_DRAWS {
-        let (mut product, mut none_irregular, mut none_periodic, mut neither) = (1.0, 1.0, 1.0, 1.0);
+        let (mut product, mut none_irregular, mut none_periodic, mut neither) =
+            (1.0, 1.0, 1.0, 1.0);
         let mut same = [1.0; 6];
         for panel in panels {
             let shares = dirichlet(&panel.at_end.map(|n| n as f64 + 0.5), &mut random);
@@ -297,7 +310,8 @@ pub(super) fn dirichlet<const N: usize>(weights: &[f64; N], random: &mut RandomS
     variates.map(|v| v / sum)
 }
 
-/// A gamma variate (Marsaglia & Tsang 2000, ACM Trans. Math. Softw. 26, 363), for shapes below 1 by their boost.
+/// A gamma variate (Marsaglia & Tsang 2000, ACM Trans. Math. Softw. 26, 363), for shapes below 1 by
+/// their boost.
 fn gamma(shape: f64, random: &mut RandomStream) -> f64 {
     use twofold_num::elementary::{exp, ln, sqrt};
     if shape < 1.0 {
@@ -331,17 +345,29 @@ pub fn panel_table(shares: &[PanelShare]) -> Table {
     ];
     columns.extend(["share", "low", "high"].map(Column::numbers));
     for at in ["shown", "end"] {
-        columns.extend(MotionKind::ALL.map(|k| Column::integers(&format!("{} at {at}", k.words()).replace(' ', "_"))));
+        columns.extend(
+            MotionKind::ALL
+                .map(|k| Column::integers(&format!("{} at {at}", k.words()).replace(' ', "_"))),
+        );
     }
-    let bounds = |k: MotionKind| ["low", "high"].map(|e| format!("{} at end {e}", k.words()).replace(' ', "_"));
+    let bounds = |k: MotionKind| {
+        ["low", "high"].map(|e| format!("{} at end {e}", k.words()).replace(' ', "_"))
+    };
     columns.extend(MotionKind::ALL.into_iter().flat_map(bounds).map(|name| Column::numbers(&name)));
     columns.extend(["capture_q1", "capture_median", "capture_q3"].map(Column::numbers));
     let mut table = Table::new("census", columns);
     for s in shares {
         let whole = |v: u64| Entry::Integer(v as i64);
-        let mut row: Vec<Entry> =
-            vec![s.reading.word().into(), s.panel.as_str().into(), s.said.words().into(), whole(s.runs), whole(s.hits)];
-        row.extend([s.hits as f64 / s.runs as f64, s.interval[0], s.interval[1]].map(Entry::Number));
+        let mut row: Vec<Entry> = vec![
+            s.reading.word().into(),
+            s.panel.as_str().into(),
+            s.said.words().into(),
+            whole(s.runs),
+            whole(s.hits),
+        ];
+        row.extend(
+            [s.hits as f64 / s.runs as f64, s.interval[0], s.interval[1]].map(Entry::Number),
+        );
         row.extend(s.at_shown.iter().chain(&s.at_end).map(|v| whole(*v)));
         row.extend(s.intervals_at_end.iter().flatten().map(|v| Entry::Number(*v)));
         row.extend(s.capture_quartiles.map(Entry::Number));
@@ -351,7 +377,11 @@ pub fn panel_table(shares: &[PanelShare]) -> Table {
 }
 
 /// Groups of a table's runs by the values of a column, in order of first appearance.
-pub fn grouped(table: &Table, column: &str, chosen: &[(&str, Entry)]) -> Vec<(Entry, Vec<CensusRun>)> {
+pub fn grouped(
+    table: &Table,
+    column: &str,
+    chosen: &[(&str, Entry)],
+) -> Vec<(Entry, Vec<CensusRun>)> {
     let Some(values) = table.column(column) else { return Vec::new() };
     let mut order: Vec<Entry> = Vec::new();
     for row in 0..table.len() {
@@ -363,7 +393,8 @@ pub fn grouped(table: &Table, column: &str, chosen: &[(&str, Entry)]) -> Vec<(En
     order
         .into_iter()
         .map(|value| {
-            let all: Vec<(&str, Entry)> = chosen.iter().cloned().chain([(column, value.clone())]).collect();
+            let all: Vec<(&str, Entry)> =
+                chosen.iter().cloned().chain([(column, value.clone())]).collect();
             (value, runs(table, &all))
         })
         .collect()
@@ -428,8 +459,13 @@ pub const TESTS: [&str; 7] = [
 ];
 
 /// Limits by which a claim may be judged: the rules', and others.
-pub const LIMITS: [&str; 5] =
-    ["as ruled", "periodic from 5e4 on", "periodic from 1.5e5 on", "chaos until 1e5 is enough", "undecided is chaos"];
+pub const LIMITS: [&str; 5] = [
+    "as ruled",
+    "periodic from 5e4 on",
+    "periodic from 1.5e5 on",
+    "chaos until 1e5 is enough",
+    "undecided is chaos",
+];
 
 /// Number of a panel's runs that support the claim, for each limit in [`LIMITS`].
 pub fn influence(said: Said, runs: &[CensusRun], rules: &Rules) -> [u64; 5] {
@@ -448,9 +484,11 @@ impl Found {
     /// Evaluates the sweeps.
     pub fn of(reading: Reading, data: &Data, rules: &Rules) -> Self {
         let alpha = Entry::Number(reading.caricature().alpha);
-        let (mut shares, mut captured, mut groups, mut influences) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let (mut shares, mut captured, mut groups, mut influences) =
+            (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for (i, panel) in PANELS.iter().enumerate() {
-            let runs = panel.runs([&data.fig7, &data.fig8][i / 3], vec![("params.alpha", alpha.clone())]);
+            let runs =
+                panel.runs([&data.fig7, &data.fig8][i / 3], vec![("params.alpha", alpha.clone())]);
             shares.push(share(panel, reading, &runs, rules));
             captured.push(captures(&runs, |_| true));
             influences.push(influence(panel.said, &runs, rules));
@@ -468,10 +506,20 @@ impl Found {
         let mut by_method = in_parts(&data.methods, "method");
         by_method.insert(0, ("lsoda".into(), groups[2].clone()));
         let by_tolerance = in_parts(&data.tolerances, "tolerance");
-        let below: Vec<_> = by_tolerance.iter().filter(|(tolerance, _)| tolerance.value() < 1e-6).cloned().collect();
-        let shorter: Vec<(&Shorter, Vec<CensusRun>)> =
-            data.shorter.iter().map(|s| (s, runs(&s.table, &chosen))).filter(|(_, runs)| !runs.is_empty()).collect();
-        let only = |g: &[(Entry, Vec<CensusRun>)]| g.iter().map(|(_, runs)| runs.clone()).collect::<Vec<_>>();
+        let below: Vec<_> = by_tolerance
+            .iter()
+            .filter(|(tolerance, _)| tolerance.value() < 1e-6)
+            .cloned()
+            .collect();
+        let shorter: Vec<(&Shorter, Vec<CensusRun>)> = data
+            .shorter
+            .iter()
+            .map(|s| (s, runs(&s.table, &chosen)))
+            .filter(|(_, runs)| !runs.is_empty())
+            .collect();
+        let only = |g: &[(Entry, Vec<CensusRun>)]| {
+            g.iter().map(|(_, runs)| runs.clone()).collect::<Vec<_>>()
+        };
         let between = [
             groups[..3].to_vec(),
             groups[3..].to_vec(),
@@ -481,7 +529,11 @@ impl Found {
             only(&below),
             shorter.iter().map(|(_, runs)| runs.clone()).collect(),
         ];
-        let tests = TESTS.into_iter().zip(between).map(|(name, groups)| (name, same_odds(&groups, rules))).collect();
+        let tests = TESTS
+            .into_iter()
+            .zip(between)
+            .map(|(name, groups)| (name, same_odds(&groups, rules)))
+            .collect();
         let ways = by_method
             .iter()
             .chain(&by_tolerance)
@@ -493,15 +545,30 @@ impl Found {
                 (name, tally(runs, rules.end))
             })
             .collect();
-        let shorter = shorter.into_iter().map(|(s, runs)| (s.name.to_owned(), s.end, tally(&runs, s.end))).collect();
+        let shorter = shorter
+            .into_iter()
+            .map(|(s, runs)| (s.name.to_owned(), s.end, tally(&runs, s.end)))
+            .collect();
         let together = [together(&shares[..3], rules), together(&shares[3..], rules)];
-        Self { reading, shares, captures: captured, tests, together, ways, shorter, influence: influences }
+        Self {
+            reading,
+            shares,
+            captures: captured,
+            tests,
+            together,
+            ways,
+            shorter,
+            influence: influences,
+        }
     }
 
-    /// As tables: panels, tests and figures together, capture curves, methods and tolerances, shorter runs.
+    /// As tables: panels, tests and figures together, capture curves, methods and tolerances,
+    /// shorter runs.
     pub fn tables(&self) -> Vec<Table> {
-        let mut curves =
-            Table::new("captures", [Column::words("panel"), Column::numbers("t"), Column::numbers("share")]);
+        let mut curves = Table::new(
+            "captures",
+            [Column::words("panel"), Column::numbers("t"), Column::numbers("share")],
+        );
         for (panel, points) in self.shares.iter().zip(&self.captures) {
             for [t, share] in points {
                 curves.push([panel.panel.as_str().into(), (*t).into(), (*share).into()]);
@@ -527,20 +594,24 @@ impl Found {
                 ("both regimes", together.both_regimes),
             ] {
                 let what = format!("fig. {figure}: {what}");
-                found.push(
-                    [Entry::Word(what)]
-                        .into_iter()
-                        .chain([p.mean, p.interval[0], p.interval[1], blank, blank].map(Entry::Number)),
-                );
+                found.push([Entry::Word(what)].into_iter().chain(
+                    [p.mean, p.interval[0], p.interval[1], blank, blank].map(Entry::Number),
+                ));
             }
         }
         let kinds = || MotionKind::ALL.map(|k| Column::integers(&k.words().replace(' ', "_")));
         let mut ways = Table::new("ways", [Column::words("group")].into_iter().chain(kinds()));
         for (name, counts) in &self.ways {
-            ways.push([Entry::Word(name.clone())].into_iter().chain(counts.map(|n| Entry::Integer(n as i64))));
+            ways.push(
+                [Entry::Word(name.clone())]
+                    .into_iter()
+                    .chain(counts.map(|n| Entry::Integer(n as i64))),
+            );
         }
-        let mut shorter =
-            Table::new("shorter", [Column::words("group"), Column::numbers("t")].into_iter().chain(kinds()));
+        let mut shorter = Table::new(
+            "shorter",
+            [Column::words("group"), Column::numbers("t")].into_iter().chain(kinds()),
+        );
         for (name, end, counts) in &self.shorter {
             let head = [Entry::Word(name.clone()), Entry::Number(*end)];
             shorter.push(head.into_iter().chain(counts.map(|n| Entry::Integer(n as i64))));
@@ -550,7 +621,8 @@ impl Found {
 }
 
 /// Stands before the text about the census in docs/census.md.
-pub const BEGIN: &str = "<!-- census: what figures/census says; tests/it/census.rs compares it; do not edit -->";
+pub const BEGIN: &str =
+    "<!-- census: what figures/census says; tests/it/census.rs compares it; do not edit -->";
 /// Stands after it.
 pub const END: &str = "<!-- end of census -->";
 
@@ -569,12 +641,13 @@ pub(super) fn percent(share: f64, interval: [f64; 2]) -> String {
     format!("{:.0} % [{:.0}, {:.0}]", 100.0 * share, 100.0 * interval[0], 100.0 * interval[1])
 }
 
-/// The text about the census in docs/census.md: the table of shares, the figures as groups, the tests. `reference` has the committed manifest of each
-/// figure, as text.
+/// The text about the census in docs/census.md: the table of shares, the figures as groups, the
+/// tests. `reference` has the committed manifest of each figure, as text.
 pub fn text(found: &[Found; 2], reference: impl Fn(&str) -> Option<&'static str>) -> String {
     use std::fmt::Write as _;
-    let mut text =
-        String::from("| panel | the paper says | printed reading | reconstructed reading |\n|---|---|---|---|\n");
+    let mut text = String::from(
+        "| panel | the paper says | printed reading | reconstructed reading |\n|---|---|---|---|\n",
+    );
     let [printed, reconstructed] = found;
     // Writing to a String cannot fail.
     for (a, b) in printed.shares.iter().zip(&reconstructed.shares) {
@@ -593,20 +666,30 @@ pub fn text(found: &[Found; 2], reference: impl Fn(&str) -> Option<&'static str>
         let _ = writeln!(text, "| {} | {} | {} | {} |", a.panel, a.said.words(), cell(a), cell(b));
     }
     let group = |f: fn(&Together) -> Probability, i: usize| {
-        found.iter().map(|one| f(&one.together[i])).map(|p| percent(p.mean, p.interval)).collect::<Vec<_>>()
+        found
+            .iter()
+            .map(|one| f(&one.together[i]))
+            .map(|p| percent(p.mean, p.interval))
+            .collect::<Vec<_>>()
     };
     for (i, figure) in ["7", "8"].iter().enumerate() {
         let (all, differ) = (group(|t| t.as_claimed, i), group(|t| t.differ, i));
-        let _ = writeln!(text, "| fig. {figure}, three runs | all as said | {} | {} |", all[0], all[1]);
+        let _ =
+            writeln!(text, "| fig. {figure}, three runs | all as said | {} | {} |", all[0], all[1]);
         let _ = writeln!(text, "| | different attractors | {} | {} |", differ[0], differ[1]);
     }
     let _ = writeln!(text);
     for one in found {
-        let words: Vec<String> = one.shares.iter().map(|s| format!("{}: {}", s.panel, in_words(&s.at_end))).collect();
-        let _ = writeln!(text, "Where runs end, {} reading: {}.", one.reading.word(), words.join("; "));
+        let words: Vec<String> =
+            one.shares.iter().map(|s| format!("{}: {}", s.panel, in_words(&s.at_end))).collect();
+        let _ =
+            writeln!(text, "Where runs end, {} reading: {}.", one.reading.word(), words.join("; "));
     }
     let listed = |ways: &[(String, [u64; 6])]| -> String {
-        ways.iter().map(|(name, n)| format!("{name}: {}", in_words(n))).collect::<Vec<_>>().join("; ")
+        ways.iter()
+            .map(|(name, n)| format!("{name}: {}", in_words(n)))
+            .collect::<Vec<_>>()
+            .join("; ")
     };
     for one in found {
         let _ = writeln!(
@@ -622,7 +705,11 @@ pub fn text(found: &[Found; 2], reference: impl Fn(&str) -> Option<&'static str>
             let captured = of - n[3] - n[5];
             let share = percent(captured as f64 / of as f64, wilson(captured, of, 0.95));
             let reading = one.reading.word();
-            let _ = writeln!(text, "Captured by t = {end}, {name}, {reading} reading: {share} ({}).", in_words(n));
+            let _ = writeln!(
+                text,
+                "Captured by t = {end}, {name}, {reading} reading: {share} ({}).",
+                in_words(n)
+            );
         }
     }
     for one in found {
@@ -642,8 +729,13 @@ pub fn text(found: &[Found; 2], reference: impl Fn(&str) -> Option<&'static str>
     text
 }
 
-/// Whether the one run that a panel shows supports the claim, by the committed reference of its figure.
-fn single_run(panel: &str, reading: Reading, reference: impl Fn(&str) -> Option<&'static str>) -> Option<bool> {
+/// Whether the one run that a panel shows supports the claim, by the committed reference of its
+/// figure.
+fn single_run(
+    panel: &str,
+    reading: Reading,
+    reference: impl Fn(&str) -> Option<&'static str>,
+) -> Option<bool> {
     let (figure, label) = panel.trim_end_matches(')').split_once('(')?;
     let id = format!("fig{figure}");
     let manifest = Manifest::parse(reference(&id)?, &id).ok()?;
@@ -652,14 +744,19 @@ fn single_run(panel: &str, reading: Reading, reference: impl Fn(&str) -> Option<
 }
 
 /// Stands before the text about other limits in docs/census-sweeps.md.
-pub const LIMITS_BEGIN: &str = "<!-- limits: what figures/census says; tests/it/census.rs compares it; do not edit -->";
+pub const LIMITS_BEGIN: &str =
+    "<!-- limits: what figures/census says; tests/it/census.rs compares it; do not edit -->";
 /// Stands after it.
 pub const LIMITS_END: &str = "<!-- end of limits -->";
 
 /// Support of the claims under other limits, as a table.
 pub fn limits_text(found: &[Found; 2]) -> String {
     use std::fmt::Write as _;
-    let mut text = format!("| panel | reading | runs | {} |\n|---|---|---|{}", LIMITS.join(" | "), "---|".repeat(5));
+    let mut text = format!(
+        "| panel | reading | runs | {} |\n|---|---|---|{}",
+        LIMITS.join(" | "),
+        "---|".repeat(5)
+    );
     for one in found {
         for (share, counts) in one.shares.iter().zip(&one.influence) {
             let counts: Vec<String> = counts.iter().map(u64::to_string).collect();
@@ -701,7 +798,10 @@ mod tests {
     #[test]
     fn what_a_run_is_depends_on_when_it_is_looked_at() {
         let late = run("period-3", 3, 1.5e5);
-        assert_eq!((late.kind(1e5), late.kind(2e5)), (MotionKind::Irregular, MotionKind::PeriodThree));
+        assert_eq!(
+            (late.kind(1e5), late.kind(2e5)),
+            (MotionKind::Irregular, MotionKind::PeriodThree)
+        );
         assert_eq!(run("quasi-periodic", 3, 5.0).kind(1e5), MotionKind::OtherRegular);
         assert_eq!(run("period-18", 18, 5.0).kind(1e5), MotionKind::OtherRegular);
         assert_eq!(run("irregular", 0, f64::NAN).kind(2e5), MotionKind::Irregular);
@@ -757,15 +857,27 @@ mod tests {
             capture_quartiles: [0.0; 3],
         };
         // All on one orbit: they do not differ.
-        let same = together(&[panel([3000, 0, 0, 0, 0, 0], 3000), panel([3000, 0, 0, 0, 0, 0], 0)], &rules);
-        assert!(same.differ.mean < 0.01 && same.as_claimed.mean < 0.001 && same.both_regimes.mean < 0.01, "{same:?}");
+        let same = together(
+            &[panel([3000, 0, 0, 0, 0, 0], 3000), panel([3000, 0, 0, 0, 0, 0], 0)],
+            &rules,
+        );
+        assert!(
+            same.differ.mean < 0.01
+                && same.as_claimed.mean < 0.001
+                && same.both_regimes.mean < 0.01,
+            "{same:?}"
+        );
         // A fair coin each, three times: 1 - 2/8.
         let fair = [500, 0, 0, 500, 0, 0];
         let coins = together(&[panel(fair, 500), panel(fair, 500), panel(fair, 500)], &rules);
         assert!((coins.differ.mean - 0.75).abs() < 0.01, "{coins:?}");
-        assert!((coins.both_regimes.mean - 0.75).abs() < 0.01 && (coins.as_claimed.mean - 0.125).abs() < 0.01);
         assert!(
-            coins.differ.interval[0] < coins.differ.mean && coins.differ.mean < coins.differ.interval[1],
+            (coins.both_regimes.mean - 0.75).abs() < 0.01
+                && (coins.as_claimed.mean - 0.125).abs() < 0.01
+        );
+        assert!(
+            coins.differ.interval[0] < coins.differ.mean
+                && coins.differ.mean < coins.differ.interval[1],
             "{coins:?}"
         );
     }

@@ -1,4 +1,5 @@
-//! Every testable sentence of the paper, and the rules by which sections are judged: `claims.toml`, embedded.
+//! Every testable sentence of the paper, and the rules by which sections are judged: `claims.toml`,
+//! embedded.
 //!
 //! ```
 //! let claims = twofold_paper::claims::claims();
@@ -39,7 +40,8 @@ pub struct Rules {
     pub permutation_seed: u64,
     /// Level of tests.
     pub significance: f64,
-    /// Confidence at which a noisy section must differ from noise-free ones, and still tell islands from sea.
+    /// Confidence at which a noisy section must differ from noise-free ones, and still tell islands
+    /// from sea.
     pub washed_out_confidence: f64,
 }
 
@@ -120,7 +122,8 @@ pub struct Quantity {
 pub fn claims() -> &'static Claims {
     static CLAIMS: OnceLock<Claims> = OnceLock::new();
     CLAIMS.get_or_init(|| {
-        toml::from_str(include_str!("claims.toml")).expect("the embedded file is well formed: a test reads it")
+        toml::from_str(include_str!("claims.toml"))
+            .expect("the embedded file is well formed: a test reads it")
     })
 }
 
@@ -137,15 +140,26 @@ mod tests {
         let ids: BTreeSet<&str> = claims.sentence.iter().map(|s| s.id.as_str()).collect();
         assert_eq!(ids.len(), claims.sentence.len(), "an id occurs twice");
         for s in &claims.sentence {
-            assert!(s.reads.is_empty() == s.untested.is_some(), "{}: measured or untested, one of the two", s.id);
-            assert!(!s.quote.is_empty() && !s.true_if.is_empty() && !s.measure.is_empty(), "{}", s.id);
+            assert!(
+                s.reads.is_empty() == s.untested.is_some(),
+                "{}: measured or untested, one of the two",
+                s.id
+            );
+            assert!(
+                !s.quote.is_empty() && !s.true_if.is_empty() && !s.measure.is_empty(),
+                "{}",
+                s.id
+            );
             let names: BTreeSet<&str> = s.reads.iter().map(|r| r.quantity.as_str()).collect();
             assert_eq!(names.len(), s.reads.len(), "{}: a quantity occurs twice", s.id);
             for Quantity { quantity, true_within: [low, high], .. } in &s.reads {
                 assert!(!quantity.is_empty() && low <= high, "{}: {quantity}", s.id);
             }
         }
-        for panel in ["7.1", "7.2", "7.3", "7.4", "8.1", "8.2", "8.3", "8.4", "9.1", "9.2", "6.1", "6.2", "6.3"] {
+        for panel in [
+            "7.1", "7.2", "7.3", "7.4", "8.1", "8.2", "8.3", "8.4", "9.1", "9.2", "6.1", "6.2",
+            "6.3",
+        ] {
             assert!(ids.contains(panel), "{panel} is missing");
         }
         let rules = &claims.rules;
@@ -153,8 +167,8 @@ mod tests {
         assert!(claims.similarity.runs >= 100 && claims.similarity.yardstick < 1.0);
     }
 
-    /// Sentences 4.5 and 8.5: fig. 8's transition function tends to the unit step (not to sign(x)), but it is further from it than
-    /// eq. (9) allows: by a multiple of the square root of eps.
+    /// Sentences 4.5 and 8.5: fig. 8's transition function tends to the unit step (not to sign(x)),
+    /// but it is further from it than eq. (9) allows: by a multiple of the square root of eps.
     #[test]
     fn the_perturbed_transition_function_is_outside_eq_9() {
         let sigma = 0.13;
@@ -165,7 +179,8 @@ mod tests {
             let x: f64 = 30.0 * eps;
             let excess = phi.eval(x, eps) - 1.0;
             assert!((excess / eps.sqrt() - sigma * (-x * x).exp()).abs() < 1e-9, "{excess}");
-            // Eq. (9): the excess over eps is bounded. It grows tenfold for every factor of a hundred.
+            // Eq. (9): the excess over eps is bounded. It grows tenfold for every factor of a
+            // hundred.
             let ratio = excess / eps;
             assert!(before.is_none_or(|b| ratio > 9.0 * b), "{ratio}");
             before = Some(ratio);

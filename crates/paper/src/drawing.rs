@@ -10,8 +10,8 @@ use twofold_job::JobError;
 use twofold_job::record::Hash;
 use twofold_job::recording::{Data, Future, Recording};
 use twofold_render::sheet::{
-    Anchor, Axis, ColumnWidth, DotStyle, LegendEntry, LegendKey, LineStyle, MarkerShape, MarkerStyle, PlanePanel,
-    Sheet, SpacePanel, range_of,
+    Anchor, Axis, ColumnWidth, DotStyle, LegendEntry, LegendKey, LineStyle, MarkerShape,
+    MarkerStyle, PlanePanel, Sheet, SpacePanel, range_of,
 };
 use twofold_render::{markup, style};
 use twofold_system::Compiled;
@@ -31,7 +31,9 @@ pub fn sheet(
     let runs: Vec<_> = picture.panels.iter().map(|p| &p.run).collect();
     let mut sheet = dress(Sheet::new(ColumnWidth::Wide, columns(picture), ""), picture, spec, data);
     if picture.panels.iter().any(|p| matches!(p.run.system.compiled(), Some(Compiled::Wheel(_)))) {
-        sheet = sheet.subtitle("our reconstruction: the paper gives the form of the equations, not their coefficients");
+        sheet = sheet.subtitle(
+            "our reconstruction: the paper gives the form of the equations, not their coefficients",
+        );
     }
     for line in wording::small_print(picture.reading, &runs) {
         sheet = sheet.footer(line);
@@ -40,15 +42,29 @@ pub fn sheet(
     // One panel's finding is said in the foot: it is too long to stand over the panel.
     for verdict in verdicts {
         let found = markup::literal(&verdict.found);
-        sheet = sheet.footer(if picture.panels.len() > 1 { format!("({}) {found}", verdict.panel) } else { found });
+        sheet = sheet.footer(if picture.panels.len() > 1 {
+            format!("({}) {found}", verdict.panel)
+        } else {
+            found
+        });
     }
     Ok(match &picture.view {
-        View::Section { horizontal, vertical } => {
-            section_panels(sheet, picture, recordings, &notes, [*horizontal, *vertical], &[Half::Late, Half::Early])
-        }
-        View::LateSection { horizontal, vertical } => {
-            section_panels(sheet, picture, recordings, &notes, [*horizontal, *vertical], &[Half::Late])
-        }
+        View::Section { horizontal, vertical } => section_panels(
+            sheet,
+            picture,
+            recordings,
+            &notes,
+            [*horizontal, *vertical],
+            &[Half::Late, Half::Early],
+        ),
+        View::LateSection { horizontal, vertical } => section_panels(
+            sheet,
+            picture,
+            recordings,
+            &notes,
+            [*horizontal, *vertical],
+            &[Half::Late],
+        ),
         View::Space { camera } => space_panels(sheet, picture, recordings, &notes, camera),
         View::Study(_) | View::Plots(_) => sheet,
     })
@@ -74,7 +90,8 @@ fn dress(mut sheet: Sheet, picture: &Picture, spec: &Hash, data: &Hash) -> Sheet
         sheet = sheet.subtitle(wording::reading(reading));
     }
     if !picture.alterations.is_empty() {
-        sheet = sheet.banner(format!("NOT THE PUBLISHED PICTURE: {}", picture.alterations.join("; ")));
+        sheet =
+            sheet.banner(format!("NOT THE PUBLISHED PICTURE: {}", picture.alterations.join("; ")));
     }
     sheet
 }
@@ -106,8 +123,8 @@ enum Half {
     Early,
 }
 
-/// Sections: the later half of each, as the paper shows it, and below it the early half. The same axes in every panel, so that sizes can be
-/// compared.
+/// Sections: the later half of each, as the paper shows it, and below it the early half. The same
+/// axes in every panel, so that sizes can be compared.
 fn section_panels(
     mut sheet: Sheet,
     picture: &Picture,
@@ -117,7 +134,8 @@ fn section_panels(
     halves: &[Half],
 ) -> Sheet {
     let late = |panel: &FigurePanel, c: &Crossing| c.t > 0.5 * panel.run.t_end;
-    let half = |panel: &FigurePanel, c: &Crossing| if late(panel, c) { Half::Late } else { Half::Early };
+    let half =
+        |panel: &FigurePanel, c: &Crossing| if late(panel, c) { Half::Late } else { Half::Early };
     let seen = || {
         let crossings = |(p, r): (&'_ FigurePanel, &'_ Recording)| {
             let kept = crossings(&r.data).iter().filter(|c| halves.contains(&half(p, c)));
@@ -126,18 +144,26 @@ fn section_panels(
         picture.panels.iter().zip(recordings).flat_map(crossings)
     };
     let names = picture.panels[0].run.system.coordinates();
-    let axis = |i: usize| Axis::covering(format!("*{}*", greek(names[axes[i]])), seen().map(|p| p[i]));
+    let axis =
+        |i: usize| Axis::covering(format!("*{}*", greek(names[axes[i]])), seen().map(|p| p[i]));
     let drawn: Vec<_> = picture.panels.iter().zip(recordings).zip(notes).collect();
-    let rows: Vec<_> =
-        drawn.chunks(sheet.columns).flat_map(|row| halves.iter().map(move |shown| (row, *shown))).collect();
+    let rows: Vec<_> = drawn
+        .chunks(sheet.columns)
+        .flat_map(|row| halves.iter().map(move |shown| (row, *shown)))
+        .collect();
     for (r, (row, shown)) in rows.iter().enumerate() {
         for (column, ((panel, recording), notes)) in row.iter().enumerate() {
             let points = crossings(&recording.data).iter().filter(|c| half(panel, c) == *shown);
             let points = points.map(|c| axes.map(|i| c.x[i])).collect();
-            let chart = PlanePanel::new(axis(0), axis(1)).labelled(r + 1 == rows.len(), column == 0);
+            let chart =
+                PlanePanel::new(axis(0), axis(1)).labelled(r + 1 == rows.len(), column == 0);
             sheet = match shown {
                 Half::Late => sheet
-                    .panel(label(picture, panel), panel.title.as_str(), chart.dots(points, DotStyle::late()))
+                    .panel(
+                        label(picture, panel),
+                        panel.title.as_str(),
+                        chart.dots(points, DotStyle::late()),
+                    )
                     .notes(notes.iter().cloned()),
                 Half::Early => sheet.panel("", "", chart.dots(points, DotStyle::early())),
             };
@@ -153,11 +179,20 @@ fn section_panels(
     sheet
 }
 
-/// What stands below the title of each panel: the paper's claim, whether the panel's run supports it, and how many runs do.
-fn verdict_notes(picture: &Picture, verdicts: &[PanelVerdict]) -> Result<Vec<Vec<String>>, JobError> {
+/// What stands below the title of each panel: the paper's claim, whether the panel's run supports
+/// it, and how many runs do.
+fn verdict_notes(
+    picture: &Picture,
+    verdicts: &[PanelVerdict],
+) -> Result<Vec<Vec<String>>, JobError> {
     let of = |panel: &FigurePanel| -> Result<Vec<String>, JobError> {
-        let Some(verdict) = verdicts.iter().find(|v| v.panel == panel.label) else { return Ok(Vec::new()) };
-        let mut notes = vec![format!("paper: {}", verdict.claim_text), format!("this run {}", outcome(verdict))];
+        let Some(verdict) = verdicts.iter().find(|v| v.panel == panel.label) else {
+            return Ok(Vec::new());
+        };
+        let mut notes = vec![
+            format!("paper: {}", verdict.claim_text),
+            format!("this run {}", outcome(verdict)),
+        ];
         if let Some(repeats) = &panel.repeats {
             let Support { support, runs } = (repeats.count)(&repeats.panel, repeats.reading)?;
             notes.push(format!("{support} of {runs} runs agree"));
@@ -167,7 +202,8 @@ fn verdict_notes(picture: &Picture, verdicts: &[PanelVerdict]) -> Result<Vec<Vec
     picture.panels.iter().map(of).collect()
 }
 
-/// Whether a panel's run supports its claim. What is not decided, as that of a shortened run may be, is neither.
+/// Whether a panel's run supports its claim. What is not decided, as that of a shortened run may
+/// be, is neither.
 fn outcome(verdict: &PanelVerdict) -> &'static str {
     let section = match &verdict.evidence {
         Grounds::Section(evidence) => Some(&evidence.verdict),
@@ -201,13 +237,16 @@ fn space_panels(
         Axis::linear(format!("*{}*", greek(names[order[k]])), low, high)
     };
     let turn = |x: [f64; 3]| order.map(|i| x[i]);
-    for (((panel, recording), curves), notes) in picture.panels.iter().zip(recordings).zip(&curves).zip(notes) {
+    for (((panel, recording), curves), notes) in
+        picture.panels.iter().zip(recordings).zip(&curves).zip(notes)
+    {
         let mut patches = surface::patches(&panel.run.system, &ranges, SURFACE_CELLS);
         for corner in patches.iter_mut().flat_map(|p| p.corners.iter_mut()) {
             *corner = turn(*corner);
         }
-        let mut chart =
-            SpacePanel::new(axis(0), axis(1), axis(2)).camera(camera.azimuth, camera.elevation).surface(patches);
+        let mut chart = SpacePanel::new(axis(0), axis(1), axis(2))
+            .camera(camera.azimuth, camera.elevation)
+            .surface(patches);
         for curve in curves {
             chart = chart.line(curve.points.iter().map(|x| turn(*x)).collect(), curve.style);
         }
@@ -226,13 +265,22 @@ fn space_panels(
         if let Some(point) = singularity {
             chart = chart.markers(vec![turn(point)], SINGULARITY);
         }
-        sheet = sheet.panel(label(picture, panel), panel.title.as_str(), chart).notes(notes.iter().cloned());
+        sheet = sheet
+            .panel(label(picture, panel), panel.title.as_str(), chart)
+            .notes(notes.iter().cloned());
         // At the size of the whole the exits lie under the two-fold's dot.
         if let (Some(point), [_]) = (singularity, picture.panels.as_slice())
-            && let Some(chart) =
-                passage(panel, recording, &connected(curves, connection), point, [order[0], order[1]], &ranges)
+            && let Some(chart) = passage(
+                panel,
+                recording,
+                &connected(curves, connection),
+                point,
+                [order[0], order[1]],
+                &ranges,
+            )
         {
-            sheet = sheet.panel("", "the passage, nearer, seen along the normal of the surface", chart);
+            sheet =
+                sheet.panel("", "the passage, nearer, seen along the normal of the surface", chart);
         }
     }
     let sheet = region_legend(sheet);
@@ -243,7 +291,10 @@ fn space_panels(
         Some(data @ Data::Funnel { futures, .. }) => sheet
             .footer(connection(data).map_or(String::new(), |c| c.words()))
             .footer(returns(futures))
-            .legend(LegendEntry::new(LegendKey::Line(CONNECTION), "from *A* to *B* through the singularity"))
+            .legend(LegendEntry::new(
+                LegendKey::Line(CONNECTION),
+                "from *A* to *B* through the singularity",
+            ))
             .legend(LegendEntry::new(LegendKey::Marker(EXIT), "exit"))
             .legend(LegendEntry::new(LegendKey::Line(APPROACH), "the one way in"))
             .legend(LegendEntry::new(LegendKey::Line(TO_PLUS), "ways out to *h* > 0"))
@@ -252,8 +303,9 @@ fn space_panels(
     }
 }
 
-/// The switching surface around the two-fold at `centre`, over the coordinates `axes`: what slides there, where it leaves, and the flights over
-/// it. So wide that half of the exits lie well inside; nothing if there is no exit.
+/// The switching surface around the two-fold at `centre`, over the coordinates `axes`: what slides
+/// there, where it leaves, and the flights over it. So wide that half of the exits lie well inside;
+/// nothing if there is no exit.
 fn passage(
     panel: &FigurePanel,
     recording: &Recording,
@@ -262,10 +314,12 @@ fn passage(
     axes: [usize; 2],
     ranges: &[(f64, f64); 3],
 ) -> Option<PlanePanel> {
-    let exits: Vec<[f64; 2]> = exits(&recording.data).into_iter().map(|x| axes.map(|i| x[i])).collect();
+    let exits: Vec<[f64; 2]> =
+        exits(&recording.data).into_iter().map(|x| axes.map(|i| x[i])).collect();
     let centre = axes.map(|i| centre[i]);
     // In heights of the view, which is wider than high.
-    let distance = |p: &[f64; 2]| (PASSAGE_ASPECT * (p[0] - centre[0]).abs()).max((p[1] - centre[1]).abs());
+    let distance =
+        |p: &[f64; 2]| (PASSAGE_ASPECT * (p[0] - centre[0]).abs()).max((p[1] - centre[1]).abs());
     let mut distances: Vec<f64> = exits.iter().map(distance).collect();
     distances.sort_by(f64::total_cmp);
     let reach = 2.0 * distances.get(distances.len() / 2)?;
@@ -285,7 +339,8 @@ fn passage(
     let mut chart = PlanePanel::new(axis(0), axis(1)).equal();
     chart.aspect = Some(PASSAGE_ASPECT);
     for patch in surface::patches(&panel.run.system, &window, PASSAGE_CELLS) {
-        chart = chart.area(patch.corners.iter().map(|x| axes.map(|i| x[i])).collect(), patch.colour);
+        chart =
+            chart.area(patch.corners.iter().map(|x| axes.map(|i| x[i])).collect(), patch.colour);
     }
     for curve in curves {
         let seen: Vec<[f64; 2]> = curve.points.iter().map(|x| axes.map(|i| x[i])).collect();
@@ -305,7 +360,9 @@ const PASSAGE_CELLS: usize = 12;
 
 /// How many futures came back to the two-fold.
 fn returns(futures: &[Future]) -> String {
-    let longest = futures.iter().filter_map(|f| Some(f.motion.samples().last()?.1.t - f.motion.samples().next()?.1.t));
+    let longest = futures
+        .iter()
+        .filter_map(|f| Some(f.motion.samples().last()?.1.t - f.motion.samples().next()?.1.t));
     format!(
         "drawn: {} of {} futures come back to the two-fold within {} of leaving it",
         futures.iter().filter(|f| comes_back(f)).count(),
@@ -325,24 +382,33 @@ impl Connection {
     fn words(&self) -> String {
         let [to, from] = self.times.map(|t| wording::number((10.0 * t).round() / 10.0));
         format!(
-            "*A* and *B* lie on two futures. From *A* the singularity is reached after {to}, from there *B* after {from}"
+            "*A* and *B* lie on two futures. From *A* the singularity is reached after {to}, from \
+                there *B* after {from}"
         )
     }
 }
 
-/// From a point of one future back to the two-fold, and on to a point of another one, on the other side; none if no future comes back.
-/// The points are the farthest from the two-fold of the last flight in and of the way out.
+/// From a point of one future back to the two-fold, and on to a point of another one, on the other
+/// side; none if no future comes back. The points are the farthest from the two-fold of the last
+/// flight in and of the way out.
 fn connection(data: &Data) -> Option<Connection> {
     let Data::Funnel { approach, futures } = data else { return None };
     let centre = approach.samples().last()?.1.x;
-    let distance = |s: &Sample| (0..3).map(|i| (s.x[i] - centre[i]) * (s.x[i] - centre[i])).sum::<f64>();
+    let distance =
+        |s: &Sample| (0..3).map(|i| (s.x[i] - centre[i]) * (s.x[i] - centre[i])).sum::<f64>();
     let farthest = |samples: &[Sample]| {
         (0..samples.len()).max_by(|i, k| distance(&samples[*i]).total_cmp(&distance(&samples[*k])))
     };
     let back = futures.iter().find(|f| comes_back(f))?;
     let other = futures.iter().rfind(|f| f.side != back.side && f.exit_time != back.exit_time)?;
-    let first = back.motion.pieces.iter().rposition(|(mode, samples)| !mode.slides() && samples.len() > 2)?;
-    let samples = |pieces: &[(Mode, Vec<Sample>)]| pieces.iter().flat_map(|(_, s)| s.iter().copied()).collect();
+    let first = back
+        .motion
+        .pieces
+        .iter()
+        .rposition(|(mode, samples)| !mode.slides() && samples.len() > 2)?;
+    let samples = |pieces: &[(Mode, Vec<Sample>)]| {
+        pieces.iter().flat_map(|(_, s)| s.iter().copied()).collect()
+    };
     let way_in: Vec<Sample> = samples(&back.motion.pieces[first..]);
     let way_out: Vec<Sample> = samples(&other.motion.pieces);
     let from = farthest(&way_in)?;
@@ -375,7 +441,11 @@ fn curves(data: &Data) -> Vec<Curve> {
     let points = |samples: &[Sample]| samples.iter().map(|s| s.x).collect::<Vec<_>>();
     let motion = |motion: &Motion, flight: LineStyle, sliding: LineStyle| -> Vec<Curve> {
         let style = |mode: &Mode| if mode.slides() { sliding } else { flight };
-        motion.pieces.iter().map(|(mode, samples)| Curve { points: points(samples), style: style(mode) }).collect()
+        motion
+            .pieces
+            .iter()
+            .map(|(mode, samples)| Curve { points: points(samples), style: style(mode) })
+            .collect()
     };
     match data {
         Data::Section(_) => Vec::new(),
@@ -396,20 +466,26 @@ fn curves(data: &Data) -> Vec<Curve> {
 /// Where a motion leaves repelling sliding.
 fn exits(data: &Data) -> Vec<[f64; 3]> {
     let of = |motion: &Motion| -> Vec<[f64; 3]> {
-        let leaves = |kind: &EventKind| matches!(kind, EventKind::Exit { .. } | EventKind::ExitAtBoundary { .. });
+        let leaves = |kind: &EventKind| {
+            matches!(kind, EventKind::Exit { .. } | EventKind::ExitAtBoundary { .. })
+        };
         motion.events.iter().filter(|e| leaves(&e.kind)).map(|e| e.state.into()).collect()
     };
     match data {
         Data::Motion(motion) => of(motion),
         // Of a future the first one: later ones are other visits.
-        Data::Funnel { futures, .. } => futures.iter().filter_map(|f| of(&f.motion).into_iter().next()).collect(),
+        Data::Funnel { futures, .. } => {
+            futures.iter().filter_map(|f| of(&f.motion).into_iter().next()).collect()
+        }
         _ => Vec::new(),
     }
 }
 
 /// What the colours of the surface mean.
 fn region_legend(sheet: Sheet) -> Sheet {
-    let area = |colour, text: &str| LegendEntry::new(LegendKey::Area(colour, style::SURFACE_OPACITY), text);
+    let area = |colour, text: &str| {
+        LegendEntry::new(LegendKey::Area(colour, style::SURFACE_OPACITY), text)
+    };
     sheet
         .legend(area(style::ATTRACTING, "attracting"))
         .legend(area(style::REPELLING, "repelling"))
@@ -436,7 +512,8 @@ const TO_PLUS: LineStyle = LineStyle::new(style::BLUE, 0.35);
 /// Futures on the side h < 0.
 const TO_MINUS: LineStyle = LineStyle::new(style::VERMILLION, 0.35);
 /// The end of repelling sliding.
-const EXIT: MarkerStyle = MarkerStyle { shape: MarkerShape::OpenDot, colour: style::GREEN, size: 3.6 };
+const EXIT: MarkerStyle =
+    MarkerStyle { shape: MarkerShape::OpenDot, colour: style::GREEN, size: 3.6 };
 /// The two-fold.
 const SINGULARITY: MarkerStyle = MarkerStyle::new(MarkerShape::Dot, style::MAGENTA);
 

@@ -1,4 +1,5 @@
-//! Effect sizes: times to an event in groups of runs, some of which are followed to their end without it, and differences of shares.
+//! Effect sizes: times to an event in groups of runs, some of which are followed to their end
+//! without it, and differences of shares.
 
 use twofold_analyse::counts::{chi_square_above, normal_quantile, wilson};
 use twofold_num::elementary::{exp, ln, sqrt};
@@ -43,21 +44,28 @@ impl LogRank {
         test
     }
 
-    /// Two-sided probability of so large a difference under equal hazards, from the chi-square distribution with one degree of freedom.
+    /// Two-sided probability of so large a difference under equal hazards, from the chi-square
+    /// distribution with one degree of freedom.
     pub fn p(&self) -> f64 {
         let difference = self.observed - self.expected;
-        if self.variance > 0.0 { chi_square_above(difference * difference / self.variance, 1) } else { 1.0 }
+        if self.variance > 0.0 {
+            chi_square_above(difference * difference / self.variance, 1)
+        } else {
+            1.0
+        }
     }
 
     /// The group's hazard over the other's, exp((O - E)/V) (Peto et al. 1977, Br. J. Cancer 35, 1).
     pub fn hazard_ratio(&self, confidence: f64) -> Estimate {
-        let (middle, half) = ((self.observed - self.expected) / self.variance, z(confidence) / sqrt(self.variance));
+        let (middle, half) =
+            ((self.observed - self.expected) / self.variance, z(confidence) / sqrt(self.variance));
         Estimate { value: exp(middle), interval: [exp(middle - half), exp(middle + half)] }
     }
 }
 
-/// Share of runs in which the event occurred by `t` (Kaplan & Meier 1958, J. Am. Stat. Assoc. 53, 457), with the log-log interval of Greenwood's variance
-/// (Kalbfleisch & Prentice 1980); [0, 1] without an event or without a run left.
+/// Share of runs in which the event occurred by `t` (Kaplan & Meier 1958, J. Am. Stat. Assoc. 53,
+/// 457), with the log-log interval of Greenwood's variance (Kalbfleisch & Prentice 1980); [0, 1]
+/// without an event or without a run left.
 pub fn share_by(times: &[Time], t: f64, confidence: f64) -> Estimate {
     let (mut left, mut greenwood) = (1.0, 0.0);
     for [n, d] in event_times(times).into_iter().take_while(|s| *s <= t).map(|s| at(times, s)) {
@@ -72,7 +80,8 @@ pub fn share_by(times: &[Time], t: f64, confidence: f64) -> Estimate {
     Estimate { value: 1.0 - left, interval: [bound(half), bound(-half)] }
 }
 
-/// Events over the time at risk, with the exact interval of a Poisson count (Garwood 1936, Biometrika 28, 437).
+/// Events over the time at risk, with the exact interval of a Poisson count (Garwood 1936,
+/// Biometrika 28, 437).
 pub fn rate(times: &[Time], confidence: f64) -> Estimate {
     let events = times.iter().filter(|(_, event)| *event).count();
     let at_risk: f64 = times.iter().map(|(t, _)| t).sum();
@@ -82,7 +91,8 @@ pub fn rate(times: &[Time], confidence: f64) -> Estimate {
     Estimate { value: events as f64 / at_risk, interval: [low / at_risk, high / at_risk] }
 }
 
-/// The difference of two shares, each `[hits, of]`, with its interval (Newcombe 1998, Stat. Med. 17, 873, method 10).
+/// The difference of two shares, each `[hits, of]`, with its interval (Newcombe 1998, Stat. Med.
+/// 17, 873, method 10).
 pub fn difference(a: [u64; 2], b: [u64; 2], confidence: f64) -> Estimate {
     let share = |[hits, of]: [u64; 2]| hits as f64 / of as f64;
     let ends = |[hits, of]: [u64; 2]| wilson(hits, of, confidence);
@@ -91,7 +101,8 @@ pub fn difference(a: [u64; 2], b: [u64; 2], confidence: f64) -> Estimate {
     Estimate { value: p - q, interval: [p - q - root(p - l, v - q), p - q + root(u - p, q - m)] }
 }
 
-/// Probabilities of several tests, so that all hold at once (Holm 1979, Scand. J. Stat. 6, 65), in the given order.
+/// Probabilities of several tests, so that all hold at once (Holm 1979, Scand. J. Stat. 6, 65), in
+/// the given order.
 pub fn holm(p: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..p.len()).collect();
     order.sort_by(|a, b| p[*a].total_cmp(&p[*b]));
@@ -117,7 +128,10 @@ fn event_times(times: &[Time]) -> Vec<f64> {
 
 /// Runs at risk just before `t`, and events at `t`.
 fn at(times: &[Time], t: f64) -> [f64; 2] {
-    [times.iter().filter(|(s, _)| *s >= t).count() as f64, times.iter().filter(|(s, e)| *e && *s == t).count() as f64]
+    [
+        times.iter().filter(|(s, _)| *s >= t).count() as f64,
+        times.iter().filter(|(s, e)| *e && *s == t).count() as f64,
+    ]
 }
 
 /// x with P(X <= x) = p for the chi-square distribution, by halving.
@@ -137,9 +151,11 @@ mod tests {
 
     /// Weeks in remission: 6-mercaptopurine and placebo (Freireich et al. 1963, Blood 21, 699).
     fn remissions() -> [Vec<Time>; 2] {
-        let weeks =
-            [6, 6, 6, 6, 7, 9, 10, 10, 11, 13, 16, 17, 19, 20, 22, 23, 25, 32, 32, 34, 35].map(f64::from).into_iter();
-        let relapsed = [1, 1, 1, 0, 1, 0, 1, 0, 0, 1, 1, 0, 0, 0, 1, 1, 0, 0, 0, 0, 0].map(|v| v == 1);
+        let weeks = [6, 6, 6, 6, 7, 9, 10, 10, 11, 13, 16, 17, 19, 20, 22, 23, 25, 32, 32, 34, 35]
+            .map(f64::from)
+            .into_iter();
+        let relapsed =
+            [1, 1, 1, 0, 1, 0, 1, 0, 0, 1, 1, 0, 0, 0, 1, 1, 0, 0, 0, 0, 0].map(|v| v == 1);
         let placebo = [1, 1, 2, 2, 3, 4, 4, 5, 5, 8, 8, 8, 8, 11, 11, 12, 12, 15, 17, 22, 23];
         [weeks.zip(relapsed).collect(), placebo.map(|t| (f64::from(t), true)).to_vec()]
     }
@@ -171,10 +187,12 @@ mod tests {
     #[test]
     fn shares_of_known_times() {
         let [drug, _] = remissions();
-        // SciPy 1.17.1: ecdf(CensoredData(...)).sf.evaluate(t), .confidence_interval(method="log-log").
-        for (t, left, low, high) in
-            [(10.0, 0.752_941_18, 0.503_199_51, 0.889_362_84), (23.0, 0.448_179_27, 0.188_052_01, 0.680_142_63)]
-        {
+        // SciPy 1.17.1: ecdf(CensoredData(...)).sf.evaluate(t),
+        // .confidence_interval(method="log-log").
+        for (t, left, low, high) in [
+            (10.0, 0.752_941_18, 0.503_199_51, 0.889_362_84),
+            (23.0, 0.448_179_27, 0.188_052_01, 0.680_142_63),
+        ] {
             let found = share_by(&drug, t, 0.95);
             let found = [found.value, found.interval[1], found.interval[0]].map(|v| 1.0 - v);
             for (a, b) in found.into_iter().zip([left, low, high]) {
@@ -202,7 +220,8 @@ mod tests {
 
     #[test]
     fn differences_of_known_shares() {
-        // Newcombe 1998, table II, method 10: 56/70 - 48/80 and 9/10 - 3/10; 0/20 - 0/10 by the same formula.
+        // Newcombe 1998, table II, method 10: 56/70 - 48/80 and 9/10 - 3/10; 0/20 - 0/10 by the
+        // same formula.
         for (a, b, low, high) in [
             ([56, 70], [48, 80], 0.0524, 0.3339),
             ([9, 10], [3, 10], 0.1705, 0.8090),
@@ -233,7 +252,8 @@ mod tests {
         let ratio = LogRank::of(&slow, &fast).hazard_ratio(0.95);
         assert!((ratio.value - 0.44).abs() < 0.04 && ratio.interval[0] < ratio.value, "{ratio:?}");
         // The nominal level: 5 % of tests between equal groups reject.
-        let rejected = (0..400).filter(|_| LogRank::of(&draw(1.0, 40), &draw(1.0, 60)).p() < 0.05).count();
+        let rejected =
+            (0..400).filter(|_| LogRank::of(&draw(1.0, 40), &draw(1.0, 60)).p() < 0.05).count();
         assert!((9..=33).contains(&rejected), "{rejected} of 400");
     }
 }

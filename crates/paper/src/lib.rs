@@ -7,7 +7,8 @@
 //! `figures/NAME/figure.rs`: every number of the paper's caption, and nothing else.
 //!
 #![forbid(unsafe_code)]
-#![cfg_attr(test, allow(clippy::disallowed_methods))] // tests compare with tolerances, not with hashes
+// tests compare with tolerances, not with hashes
+#![cfg_attr(test, allow(clippy::disallowed_methods))]
 
 // Tests try the paper's own figures. Their files call the library by its public name and paths.
 #[cfg(test)]
@@ -19,7 +20,8 @@ pub mod figures;
 #[cfg(test)]
 #[rustfmt::skip]
 use {
-    crate as paper, twofold_analyse as analyse, twofold_integrate as integrate, twofold_job as job, twofold_job::record, twofold_num as num,
+    crate as paper, twofold_analyse as analyse, twofold_integrate as integrate, twofold_job as job,
+        twofold_job::record, twofold_num as num,
     twofold_render as render, twofold_system as system,
 };
 
@@ -82,7 +84,8 @@ pub struct Picture {
     pub view: View,
     /// The panels, in the paper's order.
     pub panels: Vec<FigurePanel>,
-    /// What sets this picture apart from the published one ("t = 500 instead of 200000"), empty for the real thing.
+    /// What sets this picture apart from the published one ("t = 500 instead of 200000"), empty for
+    /// the real thing.
     pub alterations: Vec<String>,
 }
 
@@ -127,7 +130,8 @@ pub struct Support {
 /// How the panels of a picture are drawn.
 #[derive(Clone, Debug)]
 pub enum View {
-    /// A Poincare section in the plane of two coordinates: the later half, and the early half below it.
+    /// A Poincare section in the plane of two coordinates: the later half, and the early half below
+    /// it.
     Section {
         /// Index of the horizontal coordinate.
         horizontal: usize,
@@ -146,10 +150,11 @@ pub enum View {
         /// Camera and axes.
         camera: Camera,
     },
-    /// Something other than runs: a sketch computed from the model, a comparison of methods. The picture has no panels of
-    /// runs; the study makes its own.
+    /// Something other than runs: a sketch computed from the model, a comparison of methods. The
+    /// picture has no panels of runs; the study makes its own.
     Study(Study),
-    /// Panels that are drawn from answers of any kind, of systems of any dimension: the figures of a paper's folder.
+    /// Panels that are drawn from answers of any kind, of systems of any dimension: the figures of
+    /// a paper's folder.
     Plots(Arc<Plots>),
 }
 
@@ -197,7 +202,12 @@ impl Reading {
 
 impl Figure {
     /// A figure with one study per reading, printed first.
-    pub fn studied_in_both_readings(id: &'static str, title: &'static str, caption: &str, studies: [Study; 2]) -> Self {
+    pub fn studied_in_both_readings(
+        id: &'static str,
+        title: &'static str,
+        caption: &str,
+        studies: [Study; 2],
+    ) -> Self {
         let (id, title) = (Cow::from(id), Cow::from(title));
         let pictures = Reading::ALL
             .into_iter()
@@ -242,7 +252,13 @@ impl Figure {
 impl FigurePanel {
     /// A panel.
     pub fn new(label: &str, title: impl Into<String>, run: RunSpec) -> Self {
-        FigurePanel { label: label.to_owned(), title: title.into(), run, claim: None, repeats: None }
+        FigurePanel {
+            label: label.to_owned(),
+            title: title.into(),
+            run,
+            claim: None,
+            repeats: None,
+        }
     }
 
     /// The panel with the paper's claim about it.
@@ -256,7 +272,8 @@ impl FigurePanel {
     }
 }
 
-/// Changes a user may ask for. A changed picture gets another name and says on its face what was changed.
+/// Changes a user may ask for. A changed picture gets another name and says on its face what was
+/// changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Alterations {
     /// Another seed for kicks and exits.
@@ -280,7 +297,9 @@ impl Picture {
                 kick.seed = seed;
             }
             for panel in &mut self.panels {
-                if let SwitchSpec::Filippov { exit: ExitRule::Random { seed: old, .. }, .. } = &mut panel.run.switch {
+                if let SwitchSpec::Filippov { exit: ExitRule::Random { seed: old, .. }, .. } =
+                    &mut panel.run.switch
+                {
                     changed |= *old != seed;
                     *old = seed;
                 }

@@ -59,7 +59,8 @@ impl PictureRecord {
     /// The files that it vouches for: name and digest of the picture's own, then of its tables'.
     pub fn files(&self) -> Vec<(String, &Hash)> {
         let PictureEntry { name, png, svg, pdf, .. } = &self.hashes;
-        let drawn = [("png", png), ("svg", svg), ("pdf", pdf)].map(|(ending, hash)| (format!("{name}.{ending}"), hash));
+        let drawn = [("png", png), ("svg", svg), ("pdf", pdf)]
+            .map(|(ending, hash)| (format!("{name}.{ending}"), hash));
         drawn.into_iter().chain(self.tables.iter().map(|t| (t.file.clone(), &t.sha256))).collect()
     }
 }
@@ -134,13 +135,22 @@ pub fn pixel_hash(pixels: &Pixels) -> Hash {
 /// What a picture's panels ask, label by label; a study's questions are named after their kind.
 pub(super) fn parts(picture: &Picture) -> Vec<(String, AnyQuestion)> {
     match &picture.view {
-        View::Study(study) => (study.questions)().into_iter().map(|q| (q.kind().to_owned(), q)).collect(),
-        View::Plots(plots) => plots.plots.iter().map(|p| (p.label.clone(), p.question.clone())).collect(),
-        _ => picture.panels.iter().map(|p| (p.label.clone(), Arc::new(Run(p.run.clone())) as AnyQuestion)).collect(),
+        View::Study(study) => {
+            (study.questions)().into_iter().map(|q| (q.kind().to_owned(), q)).collect()
+        }
+        View::Plots(plots) => {
+            plots.plots.iter().map(|p| (p.label.clone(), p.question.clone())).collect()
+        }
+        _ => picture
+            .panels
+            .iter()
+            .map(|p| (p.label.clone(), Arc::new(Run(p.run.clone())) as AnyQuestion))
+            .collect(),
     }
 }
 
-/// Everything that making these pictures will ask, so that it can be computed side by side, the longest first.
+/// Everything that making these pictures will ask, so that it can be computed side by side, the
+/// longest first.
 pub fn questions<'a>(pictures: impl IntoIterator<Item = &'a Picture>) -> Vec<AnyQuestion> {
     let mut all = Vec::new();
     for picture in pictures {
@@ -150,7 +160,8 @@ pub fn questions<'a>(pictures: impl IntoIterator<Item = &'a Picture>) -> Vec<Any
     all
 }
 
-/// Makes one picture from answers, asking `executor` for those that it does not have yet. A pure view: the same answers give the same bytes.
+/// Makes one picture from answers, asking `executor` for those that it does not have yet. A pure
+/// view: the same answers give the same bytes.
 ///
 /// # Errors
 ///
@@ -162,8 +173,9 @@ pub fn compute(picture: &Picture, executor: &Executor<'_>) -> Result<Computed, P
 /// Receives a table's file: its name and its bytes.
 pub type Keep<'a> = dyn FnMut(&str, &[u8]) -> Result<(), FileError> + 'a;
 
-/// [`compute`], and hands a CSV file per table to `keep`, one after the other once the picture is drawn: its name and its bytes. All of them together take more
-/// memory than everything else that a picture needs.
+/// [`compute`], and hands a CSV file per table to `keep`, one after the other once the picture is
+/// drawn: its name and its bytes. All of them together take more memory than everything else that a
+/// picture needs.
 ///
 /// # Errors
 ///
@@ -200,8 +212,10 @@ pub fn compute_with_tables(
         })
         .collect();
     let joined = |hash: fn(&PanelEntry) -> Option<&Hash>| {
-        let hashes: Vec<String> =
-            entries.iter().map(|e| format!("{} {}", e.label, hash(e).map_or("none", Hash::as_str))).collect();
+        let hashes: Vec<String> = entries
+            .iter()
+            .map(|e| format!("{} {}", e.label, hash(e).map_or("none", Hash::as_str)))
+            .collect();
         Hash::of(hashes.join("\n").as_bytes())
     };
     let (spec, data) = (joined(|e| Some(&e.spec)), joined(|e| Some(&e.data)));
@@ -211,14 +225,15 @@ pub fn compute_with_tables(
     let drawn = match &picture.view {
         View::Study(study) => drawing::study_sheet(picture, (study.draw)(&answers), &spec, &data),
         View::Plots(plots) => {
-            let sheet = plots.sheet(&answers).map_err(|(part, why)| failed(&part)(JobError::Other(why)))?;
+            let sheet =
+                plots.sheet(&answers).map_err(|(part, why)| failed(&part)(JobError::Other(why)))?;
             drawing::study_sheet(picture, sheet, &spec, &data)
         }
         _ => {
             let mut recordings = Vec::new();
             for (panel, answer) in picture.panels.iter().zip(&answers) {
-                let recording =
-                    <Recording>::of_answer(&panel.run, answer).map_err(|e| failed(&panel.label)(e.into()))?;
+                let recording = <Recording>::of_answer(&panel.run, answer)
+                    .map_err(|e| failed(&panel.label)(e.into()))?;
                 panels.push(PanelRecord {
                     label: panel.label.clone(),
                     title: panel.title.clone(),
@@ -232,10 +247,12 @@ pub fn compute_with_tables(
                 });
                 recordings.push(recording);
             }
-            drawing::sheet(picture, &recordings, &verdicts, &spec, &data).map_err(failed("drawing"))?
+            drawing::sheet(picture, &recordings, &verdicts, &spec, &data)
+                .map_err(failed("drawing"))?
         }
     };
-    let rendered = render(&drawn).map_err(|source| PipelineError::Render { picture: picture.name.clone(), source })?;
+    let rendered = render(&drawn)
+        .map_err(|source| PipelineError::Render { picture: picture.name.clone(), source })?;
 
     let runs = !panels.is_empty();
     let labelled = !matches!(picture.view, View::Study(_));
@@ -265,7 +282,8 @@ pub fn compute_with_tables(
     Ok(Computed { rendered, record })
 }
 
-/// Hands over a CSV file per table, and says what is recorded of them. Tables of one name are one file: a study may ask the same of several parameters.
+/// Hands over a CSV file per table, and says what is recorded of them. Tables of one name are one
+/// file: a study may ask the same of several parameters.
 fn write_tables(
     picture: &Picture,
     labelled: bool,
@@ -281,8 +299,8 @@ fn write_tables(
     }
     let mut files: Vec<File<'_>> = Vec::new();
     for ((label, question), answer) in parts.iter().zip(answers) {
-        let about =
-            json!({ "kind": question.kind(), "question_sha256": question_hash(&**question), "stop": answer.stop });
+        let about = json!({ "kind": question.kind(), "question_sha256": question_hash(&**question),
+            "stop": answer.stop });
         for table in &answer.tables {
             // A run's main table is called after its panel.
             let ending = match (labelled, table.name.as_str()) {

@@ -1,4 +1,5 @@
-//! Pictures whose panels are drawn from answers of any kind, of systems of any dimension: the figures of a paper's folder.
+//! Pictures whose panels are drawn from answers of any kind, of systems of any dimension: the
+//! figures of a paper's folder.
 
 use std::sync::Arc;
 
@@ -8,8 +9,8 @@ use twofold_job::spec::RunSpec;
 use twofold_job::{Answer, AnyQuestion, Run, Table};
 use twofold_render::markup;
 use twofold_render::sheet::{
-    Axis, ColumnWidth, Content, DotStyle, LegendEntry, LegendKey, LineStyle, MarkerShape, MarkerStyle, PlanePanel,
-    Sheet,
+    Axis, ColumnWidth, Content, DotStyle, LegendEntry, LegendKey, LineStyle, MarkerShape,
+    MarkerStyle, PlanePanel, Sheet,
 };
 use twofold_render::style;
 
@@ -137,7 +138,11 @@ impl Plots {
     /// # Errors
     /// The panel, and why it cannot be drawn.
     pub fn sheet(&self, answers: &[Arc<Answer>]) -> Result<Sheet, (String, String)> {
-        let width = if self.columns == 1 && self.plots.len() == 1 { ColumnWidth::Single } else { ColumnWidth::Wide };
+        let width = if self.columns == 1 && self.plots.len() == 1 {
+            ColumnWidth::Single
+        } else {
+            ColumnWidth::Wide
+        };
         let mut whole = Sheet::new(width, self.columns, "");
         for (plot, answer) in self.plots.iter().zip(answers) {
             let part = plot.sheet(answer).map_err(|why| (plot.label.clone(), why))?;
@@ -145,8 +150,11 @@ impl Plots {
                 Some(Content::Plane(plane)) => plane.x.title.clone(),
                 _ => String::new(),
             };
-            let label =
-                if self.plots.len() > 1 { format!("({})", markup::literal(&plot.label)) } else { String::new() };
+            let label = if self.plots.len() > 1 {
+                format!("({})", markup::literal(&plot.label))
+            } else {
+                String::new()
+            };
             for (k, mut panel) in part.panels.into_iter().enumerate() {
                 if k == 0 {
                     (panel.label, panel.title) = (label.clone(), markup::literal(&plot.title));
@@ -182,9 +190,15 @@ impl Plot {
         if let (Some(points), Some(Content::Plane(plane))) =
             (&self.points, sheet.panels.first_mut().map(|p| &mut p.content))
         {
-            *plane = std::mem::replace(plane, PlanePanel::new(Axis::linear("", 0.0, 1.0), Axis::linear("", 0.0, 1.0)))
-                .markers(points.points.clone(), READ_OFF);
-            sheet = sheet.legend(LegendEntry::new(LegendKey::Marker(READ_OFF), markup::literal(&points.name)));
+            *plane = std::mem::replace(
+                plane,
+                PlanePanel::new(Axis::linear("", 0.0, 1.0), Axis::linear("", 0.0, 1.0)),
+            )
+            .markers(points.points.clone(), READ_OFF);
+            sheet = sheet.legend(LegendEntry::new(
+                LegendKey::Marker(READ_OFF),
+                markup::literal(&points.name),
+            ));
         }
         Ok(sheet)
     }
@@ -203,7 +217,10 @@ impl Columns {
         let ys = self.y.iter().map(|name| column(table, name)).collect::<Result<Vec<_>, _>>()?;
         let [horizontal, vertical] = match &self.labels {
             Some(labels) => labels.each_ref().map(|label| markup::literal(label)),
-            None => [markup::name(&self.x), if self.y.len() == 1 { markup::name(&self.y[0]) } else { String::new() }],
+            None => [
+                markup::name(&self.x),
+                if self.y.len() == 1 { markup::name(&self.y[0]) } else { String::new() },
+            ],
         };
         let mut panel = PlanePanel::new(
             Axis::covering(horizontal, x.iter().copied()),
@@ -223,11 +240,15 @@ impl Columns {
                 LegendKey::Line(line)
             };
             if ys.len() > 1 {
-                let name = self.names.get(k).map_or_else(|| markup::name(&self.y[k]), |name| markup::literal(name));
+                let name = self
+                    .names
+                    .get(k)
+                    .map_or_else(|| markup::name(&self.y[k]), |name| markup::literal(name));
                 legend.push(LegendEntry::new(key, name));
             }
         }
-        let mut sheet = Sheet::new(ColumnWidth::Single, 1, "").panel_aspect(0.75).panel("", "", panel);
+        let mut sheet =
+            Sheet::new(ColumnWidth::Single, 1, "").panel_aspect(0.75).panel("", "", panel);
         sheet.legend = legend;
         Ok(sheet)
     }
@@ -248,16 +269,22 @@ pub fn column<'a>(table: &'a Table, name: &str) -> Result<std::borrow::Cow<'a, [
         return Ok(integers.iter().map(|i| *i as f64).collect::<Vec<_>>().into());
     }
     let known: Vec<&str> = table.columns.iter().map(|c| c.name.as_str()).collect();
-    Err(format!("table \"{}\" has no column of numbers \"{name}\"; it has {}", table.name, listed(&known)))
+    Err(format!(
+        "table \"{}\" has no column of numbers \"{name}\"; it has {}",
+        table.name,
+        listed(&known)
+    ))
 }
 
 fn listed(names: &[&str]) -> String {
     if names.is_empty() { "none".into() } else { names.join(", ") }
 }
 
-const COLOURS: [twofold_render::colour::Colour; 4] = [style::INK, style::BLUE, style::VERMILLION, style::GREEN];
+const COLOURS: [twofold_render::colour::Colour; 4] =
+    [style::INK, style::BLUE, style::VERMILLION, style::GREEN];
 /// Numbers read off a paper.
-const READ_OFF: MarkerStyle = MarkerStyle { shape: MarkerShape::OpenDot, colour: style::VERMILLION, size: 3.6 };
+const READ_OFF: MarkerStyle =
+    MarkerStyle { shape: MarkerShape::OpenDot, colour: style::VERMILLION, size: 3.6 };
 
 #[cfg(test)]
 mod tests {
@@ -266,13 +293,18 @@ mod tests {
     use twofold_job::{Column, Entry, Executor};
 
     fn ball() -> Recorded {
-        let text = "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-2']\n[[event]]\nwhen = 'x'\ndirection = 'down'\nset = { v = '-0.5*v' }";
+        let text = "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-2']\n[[event]]\nwhen = \
+            'x'\ndirection = 'down'\nset = { v = '-0.5*v' }";
         let model = Model::new(Definition::from_toml(text, "ball").unwrap());
-        Recorded::General(GeneralRun { model, options: Options { t_end: 2.5, ..Options::default() } }, None)
+        Recorded::General(
+            GeneralRun { model, options: Options { t_end: 2.5, ..Options::default() } },
+            None,
+        )
     }
 
     fn plane(recorded: &Recorded) -> Plot {
-        let look = Look { kind: plot::PictureKind::Plane, axes: vec![0, 1], camera: None, title: None };
+        let look =
+            Look { kind: plot::PictureKind::Plane, axes: vec![0, 1], camera: None, title: None };
         Plot {
             label: "a".into(),
             title: "<b> & *c*".into(),
@@ -313,11 +345,15 @@ mod tests {
     #[test]
     fn each_state_of_a_series_has_the_time_below_it_when_they_stand_side_by_side() {
         let ball = ball();
-        let look = Look { kind: plot::PictureKind::Series, axes: vec![0, 1], camera: None, title: None };
-        let series = Plot { drawing: Drawing::Run(ball.clone().into(), look), points: None, ..plane(&ball) };
+        let look =
+            Look { kind: plot::PictureKind::Series, axes: vec![0, 1], camera: None, title: None };
+        let series =
+            Plot { drawing: Drawing::Run(ball.clone().into(), look), points: None, ..plane(&ball) };
         let answer = Executor::quiet().ask(&*series.question).unwrap();
         let titles = |columns| {
-            let sheet = Plots { columns, plots: vec![series.clone()] }.sheet(std::slice::from_ref(&answer)).unwrap();
+            let sheet = Plots { columns, plots: vec![series.clone()] }
+                .sheet(std::slice::from_ref(&answer))
+                .unwrap();
             let title = |p: &twofold_render::sheet::SheetPanel| match &p.content {
                 Content::Plane(plane) => plane.x.title.clone(),
                 _ => "no plane".into(),
@@ -334,18 +370,25 @@ mod tests {
         table.push(vec![Entry::Number(1.0)]);
         assert_eq!(&*column(&table, "period").unwrap(), [1.0]);
         let said = column(&table, "perod").unwrap_err();
-        assert!(said.contains("branch") && said.contains("\"perod\"") && said.contains("it has period"), "{said}");
+        assert!(
+            said.contains("branch") && said.contains("\"perod\"") && said.contains("it has period"),
+            "{said}"
+        );
     }
 
     #[test]
     fn whatever_is_drawn_is_part_of_the_looks() {
         let plots = Plots { columns: 1, plots: vec![plane(&ball())] };
-        let changes: [&dyn Fn(&mut Plots); 4] =
-            [&|p| p.columns = 2, &|p| p.plots[0].title.push('.'), &|p| p.plots[0].points = None, &|p| {
+        let changes: [&dyn Fn(&mut Plots); 4] = [
+            &|p| p.columns = 2,
+            &|p| p.plots[0].title.push('.'),
+            &|p| p.plots[0].points = None,
+            &|p| {
                 if let Drawing::Run(_, look) = &mut p.plots[0].drawing {
                     look.axes = vec![1, 0];
                 }
-            }];
+            },
+        ];
         for change in changes {
             let mut other = plots.clone();
             change(&mut other);

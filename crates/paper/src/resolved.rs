@@ -6,14 +6,17 @@ use std::fmt::Write as _;
 
 use super::Reading;
 use super::capture::time;
-use super::census::{self, CensusPanel, CensusRun, MotionKind, PANELS, p_in_words, percent, supporting, tally};
+use super::census::{
+    self, CensusPanel, CensusRun, MotionKind, PANELS, p_in_words, percent, supporting, tally,
+};
 use super::claims::Rules;
 use super::effects::{self, LogRank};
 use twofold_analyse::counts::{homogeneity, wilson};
 use twofold_job::table::{Entry, Table};
 
 /// Stands before each text in docs/resolved.md.
-pub const BEGIN: &str = "<!-- resolved: what figures/resolved says; tests/it/resolved.rs compares it; do not edit -->";
+pub const BEGIN: &str =
+    "<!-- resolved: what figures/resolved says; tests/it/resolved.rs compares it; do not edit -->";
 /// Stands after it.
 pub const END: &str = "<!-- end of resolved -->";
 
@@ -30,7 +33,8 @@ pub struct Compared {
     pub runs: Vec<CensusRun>,
 }
 
-/// Every panel in both readings: `reference` and `runs` are sweeps of fig. 7, and of fig. 8 if there are two.
+/// Every panel in both readings: `reference` and `runs` are sweeps of fig. 7, and of fig. 8 if
+/// there are two.
 pub fn compared(reference: &[Table], runs: &[Table]) -> Vec<Compared> {
     let of = |reading: Reading| {
         let chosen = move || vec![("params.alpha", Entry::Number(reading.caricature().alpha))];
@@ -61,7 +65,8 @@ pub enum Belongs {
 }
 
 impl Belongs {
-    /// By the rule: `[hits, of]` by LSODA and by runs that resolve the passage, and the probability of so large a difference.
+    /// By the rule: `[hits, of]` by LSODA and by runs that resolve the passage, and the probability
+    /// of so large a difference.
     pub fn of(lsoda: [u64; 2], resolved: [u64; 2], p: f64, rules: &Rules) -> Self {
         match (resolved[0] > 0, lsoda[0] > 0, p < rules.significance) {
             (true, _, false) => Belongs::System,
@@ -91,8 +96,10 @@ fn shown(panel: &CensusPanel, runs: &[CensusRun], rules: &Rules) -> [u64; 2] {
 
 /// Each panel's outcome by both methods, and its attribution.
 pub fn belongs(all: &[Compared], rules: &Rules) -> Vec<(Belongs, f64)> {
-    let counts: Vec<[[u64; 2]; 2]> =
-        all.iter().map(|c| [&c.reference, &c.runs].map(|runs| shown(&c.panel, runs, rules))).collect();
+    let counts: Vec<[[u64; 2]; 2]> = all
+        .iter()
+        .map(|c| [&c.reference, &c.runs].map(|runs| shown(&c.panel, runs, rules)))
+        .collect();
     let test = |counts: &[[u64; 2]; 2]| {
         let rows = counts.map(|[hits, of]| vec![hits, of - hits]);
         let p = homogeneity(&rows, rules.permutations, rules.permutation_seed).p_permutation;
@@ -106,11 +113,14 @@ pub fn belongs(all: &[Compared], rules: &Rules) -> Vec<(Belongs, f64)> {
 /// The table of outcomes.
 pub fn outcomes_text(all: &[Compared], rules: &Rules) -> String {
     let mut text = String::from(
-        "| reading | panel | the paper says | LSODA | resolved | difference in points | p | the outcome is |\n|---|---|---|---|---|---|---|---|\n",
+        "| reading | panel | the paper says | LSODA | resolved | difference in points | p | the \
+            outcome is |\n|---|---|---|---|---|---|---|---|\n",
     );
     for (c, (whose, p)) in all.iter().zip(belongs(all, rules)) {
         let [a, b] = [&c.reference, &c.runs].map(|runs| shown(&c.panel, runs, rules));
-        let share = |[hits, of]: [u64; 2]| percent(hits as f64 / of as f64, wilson(hits, of, rules.confidence));
+        let share = |[hits, of]: [u64; 2]| {
+            percent(hits as f64 / of as f64, wilson(hits, of, rules.confidence))
+        };
         let d = effects::difference(b, a, rules.confidence);
         let [v, low, high] = [d.value, d.interval[0], d.interval[1]].map(|v| 100.0 * v);
         // Writing to a String cannot fail.
@@ -137,10 +147,12 @@ pub fn kinds_text(all: &[Compared], named: [&str; 2], rules: &Rules) -> String {
         .map(|p| if p.is_nan() { 1.0 } else { p })
         .collect();
     let times = |runs: &[CensusRun]| runs.iter().map(|r| time(r, rules.end)).collect::<Vec<_>>();
-    let ranks: Vec<LogRank> = all.iter().map(|c| LogRank::of(&times(&c.runs), &times(&c.reference))).collect();
+    let ranks: Vec<LogRank> =
+        all.iter().map(|c| LogRank::of(&times(&c.runs), &times(&c.reference))).collect();
     let [odds, hazards] = [odds, ranks.iter().map(LogRank::p).collect()].map(|p| effects::holm(&p));
     let mut text = format!(
-        "| reading | panel | ends by {} | ends by {} | same odds, p | hazard of capture, over {} | log-rank p |\n|---|---|---|---|---|---|---|\n",
+        "| reading | panel | ends by {} | ends by {} | same odds, p | hazard of capture, over {} | \
+            log-rank p |\n|---|---|---|---|---|---|---|\n",
         named[0], named[1], named[0]
     );
     for (i, c) in all.iter().enumerate() {
@@ -167,25 +179,35 @@ pub fn kinds_text(all: &[Compared], named: [&str; 2], rules: &Rules) -> String {
     text
 }
 
-/// Whether runs at 1e-13 are captured as those at 1e-15 are: by reading, the runs at 1e-13 and at 1e-15.
-pub fn tolerance_text(readings: &[(Reading, Vec<CensusRun>, Vec<CensusRun>)], rules: &Rules) -> String {
+/// Whether runs at 1e-13 are captured as those at 1e-15 are: by reading, the runs at 1e-13 and at
+/// 1e-15.
+pub fn tolerance_text(
+    readings: &[(Reading, Vec<CensusRun>, Vec<CensusRun>)],
+    rules: &Rules,
+) -> String {
     let times = |runs: &[CensusRun]| runs.iter().map(|r| time(r, rules.end)).collect::<Vec<_>>();
-    let ranks: Vec<LogRank> =
-        readings.iter().map(|(_, loose, tight)| LogRank::of(&times(loose), &times(tight))).collect();
+    let ranks: Vec<LogRank> = readings
+        .iter()
+        .map(|(_, loose, tight)| LogRank::of(&times(loose), &times(tight)))
+        .collect();
     let adjusted = effects::holm(&ranks.iter().map(LogRank::p).collect::<Vec<_>>());
-    let said = readings.iter().zip(&ranks).zip(adjusted).map(|(((reading, loose, tight), rank), p)| {
-        let ratio = rank.hazard_ratio(rules.confidence);
-        let [low, high] = ratio.interval;
-        format!(
-            "{} reading {:.2} [{low:.2}, {high:.2}], {} ({} and {} runs)",
-            reading.word(),
-            ratio.value,
-            p_in_words(p),
-            loose.len(),
-            tight.len()
-        )
-    });
-    format!("Hazard of capture in fig. 7(iii) at 10⁻¹³ over that at 10⁻¹⁵: {}.", said.collect::<Vec<_>>().join("; "))
+    let said =
+        readings.iter().zip(&ranks).zip(adjusted).map(|(((reading, loose, tight), rank), p)| {
+            let ratio = rank.hazard_ratio(rules.confidence);
+            let [low, high] = ratio.interval;
+            format!(
+                "{} reading {:.2} [{low:.2}, {high:.2}], {} ({} and {} runs)",
+                reading.word(),
+                ratio.value,
+                p_in_words(p),
+                loose.len(),
+                tight.len()
+            )
+        });
+    format!(
+        "Hazard of capture in fig. 7(iii) at 10⁻¹³ over that at 10⁻¹⁵: {}.",
+        said.collect::<Vec<_>>().join("; ")
+    )
 }
 
 fn short(p: f64) -> String {

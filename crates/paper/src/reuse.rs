@@ -47,15 +47,19 @@ impl Question for Drawn<'_> {
         "picture"
     }
 
-    /// Everything that one program may put differently into two pictures. Colours, sizes and words are the program's, whose digest is part of the
-    /// answer.
+    /// Everything that one program may put differently into two pictures. Colours, sizes and words
+    /// are the program's, whose digest is part of the answer.
     fn json(&self) -> Value {
         let Picture { name, reading, title, caption, view, panels, alterations } = self.0;
-        let asked: Vec<_> = parts(self.0).into_iter().map(|(part, q)| (part, question_hash(&*q))).collect();
-        let said: Vec<_> =
-            panels.iter().map(|p| (&p.title, &p.claim, p.repeats.as_ref().map(|r| (&r.panel, r.reading)))).collect();
+        let asked: Vec<_> =
+            parts(self.0).into_iter().map(|(part, q)| (part, question_hash(&*q))).collect();
+        let said: Vec<_> = panels
+            .iter()
+            .map(|p| (&p.title, &p.claim, p.repeats.as_ref().map(|r| (&r.panel, r.reading))))
+            .collect();
         let view = match view {
-            // Which function draws: how far it lies from another one, since a program is loaded now here, now there.
+            // Which function draws: how far it lies from another one, since a program is loaded now
+            // here, now there.
             View::Study(study) => {
                 let here = ReusablePictures::of as *const () as usize;
                 json!({ "study": (study.draw as *const () as usize).wrapping_sub(here) })
@@ -64,7 +68,8 @@ impl Question for Drawn<'_> {
             other => json!(format!("{other:?}")),
         };
         json!({
-            "name": name, "reading": reading, "title": title, "caption": caption, "alterations": alterations, "view": view,
+            "name": name, "reading": reading, "title": title, "caption": caption,
+                "alterations": alterations, "view": view,
             "asked": asked, "said": said,
         })
     }
@@ -125,7 +130,11 @@ impl<'a> ReusablePictures<'a> {
     /// If the store cannot be written: the picture will be made again next time.
     pub fn remember(&self, picture: &Picture, record: &PictureRecord) -> Result<(), FileError> {
         let question = Drawn(picture);
-        self.store.put(&key(&question), &question, &answer(record).with_fact(PROGRAM, &self.program))
+        self.store.put(
+            &key(&question),
+            &question,
+            &answer(record).with_fact(PROGRAM, &self.program),
+        )
     }
 }
 
@@ -164,7 +173,9 @@ mod tests {
     fn made(reusable: &ReusablePictures<'_>, folder: &Path) -> (Picture, PictureRecord) {
         let picture = figures::fig1::figure().pictures.remove(0);
         let put = |file: &str, bytes: &[u8]| twofold_job::record::write(&folder.join(file), bytes);
-        let computed = compute_with_tables(&picture, &Executor::quiet(), &mut |file, bytes| put(file, bytes)).unwrap();
+        let computed =
+            compute_with_tables(&picture, &Executor::quiet(), &mut |file, bytes| put(file, bytes))
+                .unwrap();
         let name = &picture.name;
         put(&format!("{name}.png"), &computed.rendered.png).unwrap();
         put(&format!("{name}.svg"), &computed.rendered.svg).unwrap();
@@ -233,7 +244,10 @@ mod tests {
             &|p| p.caption.push('.'),
             &|p| p.name.push_str("-printed"),
             &|p| p.reading = Some(Reading::Printed),
-            &|p| p.view = View::Study(Study { draw: |_| Sheet::new(ColumnWidth::Single, 1, ""), ..study }),
+            &|p| {
+                p.view =
+                    View::Study(Study { draw: |_| Sheet::new(ColumnWidth::Single, 1, ""), ..study })
+            },
             &|p| p.view = View::Study(Study { questions: Vec::new, ..study }),
             &|p| p.view = View::Section { horizontal: 0, vertical: 2 },
         ];

@@ -1,4 +1,5 @@
-//! In which ways a delayed switch is similar to hysteresis (sentence 4.8), scored from committed runs by the rules that `claims.toml` fixes.
+//! In which ways a delayed switch is similar to hysteresis (sentence 4.8), scored from committed
+//! runs by the rules that `claims.toml` fixes.
 
 use twofold_analyse::counts::wilson;
 
@@ -21,7 +22,8 @@ pub enum Rule {
 }
 
 /// Every rule: the three that distances are taken to, then the delayed ones.
-pub const RULES: [Rule; 5] = [Rule::Smoothed, Rule::Literal, Rule::Single, Rule::Delayed, Rule::DelayedLong];
+pub const RULES: [Rule; 5] =
+    [Rule::Smoothed, Rule::Literal, Rule::Single, Rule::Delayed, Rule::DelayedLong];
 
 impl Rule {
     /// The name in claims.toml and in tables.
@@ -39,7 +41,8 @@ impl Rule {
 /// The ways, in the order of the table's columns.
 pub const WAYS: [&str; 4] = ["settles", "occupancy", "chatter", "exits"];
 
-/// The table's columns: of each way the distance from the runs of eq. (8), and of both readings of eq. (10).
+/// The table's columns: of each way the distance from the runs of eq. (8), and of both readings of
+/// eq. (10).
 pub const HEADER: &str = "reading,rule,run,outcome,captured_at,\
 settles_smoothed,settles_literal,settles_single,occupancy_smoothed,occupancy_literal,occupancy_single,\
 chatter_smoothed,chatter_literal,chatter_single,exits_smoothed,exits_literal,exits_single";
@@ -116,10 +119,18 @@ pub struct Score {
 }
 
 /// Scores the `delayed` runs against those of `hysteresis` in a way, an index of [`WAYS`].
-pub fn score(runs: &[RuleRun], reading: Reading, way: usize, delayed: Rule, hysteresis: Rule) -> Score {
+pub fn score(
+    runs: &[RuleRun],
+    reading: Reading,
+    way: usize,
+    delayed: Rule,
+    hysteresis: Rule,
+) -> Score {
     let (rules, confidence) = (claims().similarity, claims().rules.confidence);
     let to = RULES.iter().position(|r| *r == hysteresis).unwrap_or_default();
-    let of = |rule: Rule| runs.iter().filter(move |r| r.reading == reading.word() && r.rule == rule.name());
+    let of = |rule: Rule| {
+        runs.iter().filter(move |r| r.reading == reading.word() && r.rule == rule.name())
+    };
     let sorted = |mut values: Vec<f64>| {
         values.sort_by(f64::total_cmp);
         values
@@ -160,18 +171,24 @@ mod tests {
         format!("printed,{},{number},period-1,1.0,{}", rule.name(), cells.join(","))
     }
 
-    /// A hundred runs of hysteresis at distances 0.01 .. 1 from each other, and as many delayed ones of which `near` are at 0.5 from
-    /// it and 0.6 from smoothing, and the others the other way round.
+    /// A hundred runs of hysteresis at distances 0.01 .. 1 from each other, and as many delayed
+    /// ones of which `near` are at 0.5 from it and 0.6 from smoothing, and the others the other way
+    /// round.
     fn table(near: usize) -> Vec<RuleRun> {
-        let hysteresis = (0..100).map(|k| run(Rule::Literal, k, [1.0, (k + 1) as f64 / 100.0, 1.0]));
-        let delayed = (0..100).map(|k| run(Rule::Delayed, k, if k < near { [0.6, 0.5, 1.0] } else { [0.5, 0.6, 1.0] }));
+        let hysteresis =
+            (0..100).map(|k| run(Rule::Literal, k, [1.0, (k + 1) as f64 / 100.0, 1.0]));
+        let delayed = (0..100).map(|k| {
+            run(Rule::Delayed, k, if k < near { [0.6, 0.5, 1.0] } else { [0.5, 0.6, 1.0] })
+        });
         let lines: Vec<String> = hysteresis.chain(delayed).collect();
         runs(&format!("{HEADER}\n{}\n", lines.join("\n"))).unwrap()
     }
 
     #[test]
     fn scores_follow_the_rules() {
-        for (near, similar) in [(100, Similar::Yes), (61, Similar::Yes), (50, Similar::Undecided), (39, Similar::No)] {
+        for (near, similar) in
+            [(100, Similar::Yes), (61, Similar::Yes), (50, Similar::Undecided), (39, Similar::No)]
+        {
             let found = score(&table(near), Reading::Printed, 2, Rule::Delayed, Rule::Literal);
             assert_eq!((found.of, found.near.0, found.within.0), (100, near as u64, 100));
             assert_eq!((found.yardstick, found.similar), (0.95, similar), "{near}");

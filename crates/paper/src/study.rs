@@ -8,13 +8,14 @@ use twofold_integrate::Monitor;
 use twofold_job::{Answer, AnyQuestion, Executor, JobError, Question, Table};
 use twofold_render::Sheet;
 
-/// A picture that asks its own questions and draws the answers. Function pointers keep figures plain data.
+/// A picture that asks its own questions and draws the answers. Function pointers keep figures
+/// plain data.
 #[derive(Clone, Copy, Debug)]
 pub struct Study {
     /// The questions.
     pub questions: fn() -> Vec<AnyQuestion>,
-    /// Draws the answers, in the questions' order: panels, legend, subtitle, footer. Title, description and provenance are added by the
-    /// pipeline.
+    /// Draws the answers, in the questions' order: panels, legend, subtitle, footer. Title,
+    /// description and provenance are added by the pipeline.
     pub draw: fn(&[Arc<Answer>]) -> Sheet,
 }
 
@@ -80,14 +81,23 @@ mod tests {
             self.0.json()
         }
 
-        fn compute(&self, executor: &Executor<'_>, monitor: &dyn Monitor) -> Result<Answer, JobError> {
+        fn compute(
+            &self,
+            executor: &Executor<'_>,
+            monitor: &dyn Monitor,
+        ) -> Result<Answer, JobError> {
             self.0.compute(executor, monitor)
         }
     }
 
     #[test]
     fn what_a_figure_computes_is_stored_under_the_digest_of_its_code() {
-        let own = Computed { kind: "own", question: json!({ "x": 1 }), cost: 1.0, compute: || Ok(Vec::new()) };
+        let own = Computed {
+            kind: "own",
+            question: json!({ "x": 1 }),
+            cost: 1.0,
+            compute: || Ok(Vec::new()),
+        };
         let other = OfTheNumerics(own.clone());
         assert_eq!(question_hash(&own), question_hash(&other));
         assert_ne!(key(&own), key(&other));

@@ -1,7 +1,8 @@
 //! The paper's claims, panel by panel, and whether they hold.
 //!
-//! A claim is what the paper says of a panel (its words are quoted). A verdict is what our run shows, with its evidence.
-//! Whether they agree is decided by one rule per kind of claim, stated in [`SectionClaim::score`] and [`judge`]; no panel is judged by hand.
+//! A claim is what the paper says of a panel (its words are quoted). A verdict is what our run
+//! shows, with its evidence. Whether they agree is decided by one rule per kind of claim, stated in
+//! [`SectionClaim::score`] and [`judge`]; no panel is judged by hand.
 
 use std::sync::Arc;
 
@@ -23,11 +24,13 @@ pub enum Claim {
     Section(SectionClaim),
     /// "Less organisation" than in the next panel (6(i) against 6(ii)).
     LessOrganisedThanNext,
-    /// "Changes in structure sensitive to random noise": this panel and the next differ (6(iii), 6(iv)).
+    /// "Changes in structure sensitive to random noise": this panel and the next differ (6(iii),
+    /// 6(iv)).
     DiffersFromNext,
 }
 
-/// Two paths "differ markedly" when a quarter or more of their strides end where the other never comes.
+/// Two paths "differ markedly" when a quarter or more of their strides end where the other never
+/// comes.
 pub const MARKED_DIFFERENCE: f64 = 0.25;
 
 /// A panel's verdict: claim, evidence, agreement.
@@ -94,12 +97,14 @@ impl Claim {
 const NEIGHBOURS: usize = 12;
 /// How far apart those start.
 const NEIGHBOUR_SHIFT: f64 = 1e-10;
-/// 6(i) is less organised than 6(ii) if the means are so many standard errors of their difference apart.
+/// 6(i) is less organised than 6(ii) if the means are so many standard errors of their difference
+/// apart.
 const CLEARLY: f64 = 2.0;
 
 /// The comparisons of a panel with the next one from neighbouring starts, the paper's first.
 fn neighbours(picture: &Picture, index: usize) -> Vec<PathComparison> {
-    let (Some(here), Some(next)) = (picture.panels.get(index), picture.panels.get(index + 1)) else {
+    let (Some(here), Some(next)) = (picture.panels.get(index), picture.panels.get(index + 1))
+    else {
         return Vec::new();
     };
     (0..NEIGHBOURS)
@@ -113,7 +118,8 @@ fn neighbours(picture: &Picture, index: usize) -> Vec<PathComparison> {
         .collect()
 }
 
-/// The question behind a panel's verdict; none if there is nothing to judge it by (one panel alone of two that the claim compares).
+/// The question behind a panel's verdict; none if there is nothing to judge it by (one panel alone
+/// of two that the claim compares).
 fn question(picture: &Picture, index: usize) -> Option<AnyQuestion> {
     let panel = picture.panels.get(index)?;
     Some(match panel.claim? {
@@ -130,7 +136,10 @@ pub fn questions(picture: &Picture, index: usize) -> Vec<AnyQuestion> {
         Some(Claim::LessOrganisedThanNext) => neighbours(picture, index),
         _ => Vec::new(),
     };
-    question(picture, index).into_iter().chain(compared.into_iter().map(|c| Arc::new(c) as _)).collect()
+    question(picture, index)
+        .into_iter()
+        .chain(compared.into_iter().map(|c| Arc::new(c) as _))
+        .collect()
 }
 
 /// Judges every panel of a picture that a claim is made of.
@@ -147,7 +156,12 @@ pub fn judge(picture: &Picture, executor: &Executor<'_>) -> Result<Vec<PanelVerd
             Claim::Section(claim) => {
                 let evidence: Evidence = answer.fact("evidence")?;
                 let score = claim.score(&evidence);
-                (Grounds::Section(Box::new(evidence.clone())), evidence.summary, score.agrees, score.because)
+                (
+                    Grounds::Section(Box::new(evidence.clone())),
+                    evidence.summary,
+                    score.agrees,
+                    score.because,
+                )
             }
             Claim::LessOrganisedThanNext => {
                 let mut shares = [Vec::new(), Vec::new()];
@@ -159,7 +173,8 @@ pub fn judge(picture: &Picture, executor: &Executor<'_>) -> Result<Vec<PanelVerd
                 let error = sqrt(here_error * here_error + next_error * next_error);
                 let [p, q, dp, dq] = [here, next, here_error, next_error].map(|v| 100.0 * v);
                 let found = format!(
-                    "{p:.1} +- {dp:.1} % of its way leads to new places, {q:.1} +- {dq:.1} % in the next panel ({NEIGHBOURS} neighbouring starts)"
+                    "{p:.1} +- {dp:.1} % of its way leads to new places, {q:.1} +- {dq:.1} % in \
+                        the next panel ({NEIGHBOURS} neighbouring starts)"
                 );
                 let grounds = Grounds::Freshness {
                     mean: [here, next],
@@ -169,9 +184,16 @@ pub fn judge(picture: &Picture, executor: &Executor<'_>) -> Result<Vec<PanelVerd
                 (grounds, found.clone(), here - next > CLEARLY * error, found)
             }
             Claim::DiffersFromNext => {
-                let (freshness, shared): ([f64; 2], Shared) = (answer.fact("freshness")?, answer.fact("shared")?);
-                let found = format!("the two share {:.0} % of their places", 100.0 * shared.overlap);
-                (Grounds::Paths { freshness, shared }, found.clone(), shared.overlap <= 1.0 - MARKED_DIFFERENCE, found)
+                let (freshness, shared): ([f64; 2], Shared) =
+                    (answer.fact("freshness")?, answer.fact("shared")?);
+                let found =
+                    format!("the two share {:.0} % of their places", 100.0 * shared.overlap);
+                (
+                    Grounds::Paths { freshness, shared },
+                    found.clone(),
+                    shared.overlap <= 1.0 - MARKED_DIFFERENCE,
+                    found,
+                )
             }
         };
         verdicts.push(PanelVerdict {

@@ -6,7 +6,8 @@ use super::Reading;
 use twofold_job::record::{Manifest, PanelEntry, VerdictEntry};
 
 /// Stands before the table.
-pub const BEGIN: &str = "<!-- verdicts: made by `twofold bless` from figures/*/expected.json; do not edit -->";
+pub const BEGIN: &str =
+    "<!-- verdicts: made by `twofold bless` from figures/*/expected.json; do not edit -->";
 /// Stands after it.
 pub const END: &str = "<!-- end of verdicts -->";
 
@@ -16,7 +17,8 @@ const PAPER: [&str; 4] = ["fig6", "fig7", "fig8", "fig9"];
 /// The table, and how many claims agree in each reading.
 pub fn table(manifests: &[Manifest]) -> String {
     let mut text = String::from(
-        "| panel | the paper says | printed reading | | reconstructed reading | |\n|---|---|---|---|---|---|\n",
+        "| panel | the paper says | printed reading | | reconstructed reading | \
+            |\n|---|---|---|---|---|---|\n",
     );
     let mut counts = [[0_usize; 2]; 2];
     for figure in PAPER {
@@ -26,7 +28,10 @@ pub fn table(manifests: &[Manifest]) -> String {
         };
         for panel in panels(Reading::Printed) {
             let verdicts = Reading::ALL.map(|reading| {
-                panels(reading).iter().find(|p| p.label == panel.label).and_then(|p| p.verdict.as_ref())
+                panels(reading)
+                    .iter()
+                    .find(|p| p.label == panel.label)
+                    .and_then(|p| p.verdict.as_ref())
             });
             let [Some(first), _] = verdicts else { continue };
             let number = figure.trim_start_matches("fig");
@@ -36,17 +41,28 @@ pub fn table(manifests: &[Manifest]) -> String {
                 .map(|(verdict, count)| match verdict {
                     Some(VerdictEntry { found, agrees, .. }) => {
                         *count = [count[0] + usize::from(*agrees), count[1] + 1];
-                        format!("{} | {}", found.replace('|', "\\|"), if *agrees { "agrees" } else { "differs" })
+                        format!(
+                            "{} | {}",
+                            found.replace('|', "\\|"),
+                            if *agrees { "agrees" } else { "differs" }
+                        )
                     }
                     None => " | ".into(),
                 })
                 .collect();
             // Writing to a String cannot fail.
-            let _ = writeln!(text, "| {number}({}) | {} | {} |", panel.label, first.claim, cells.join(" | "));
+            let _ = writeln!(
+                text,
+                "| {number}({}) | {} | {} |",
+                panel.label,
+                first.claim,
+                cells.join(" | ")
+            );
         }
     }
     let [printed, reconstructed] = counts.map(|[agree, of]| format!("{agree} of {of}"));
-    let _ = write!(text, "\nClaims that agree: {printed} (printed), {reconstructed} (reconstructed).");
+    let _ =
+        write!(text, "\nClaims that agree: {printed} (printed), {reconstructed} (reconstructed).");
     text
 }
 

@@ -25,7 +25,8 @@ pub fn system(system: &System) -> String {
             number(c.v_minus)
         ),
         Some(Compiled::Wheel(w)) => format!(
-            "wheel (reconstruction): *m* = {}, *J* = {}, *d* = {}, *γ* = {}, *k*_{{w}} = {}, *c*_{{w}} = {}, *c*_{{h}} = {}, \
+            "wheel (reconstruction): *m* = {}, *J* = {}, *d* = {}, *γ* = {}, *k*_{{w}} = {}, \
+                *c*_{{w}} = {}, *c*_{{h}} = {}, \
              *ω*_{{0}} = {}, *F* = {}, *q* = {}, *V*_{{c}} = {}",
             number(w.m),
             number(w.j),
@@ -53,14 +54,17 @@ pub fn system(system: &System) -> String {
 
 /// An angle, where it is a plain fraction of π as that.
 fn angle(radians: f64) -> String {
-    let fraction = [2, 3, 4, 6, 8, 12].into_iter().find(|n| radians == std::f64::consts::PI / f64::from(*n));
+    let fraction =
+        [2, 3, 4, 6, 8, 12].into_iter().find(|n| radians == std::f64::consts::PI / f64::from(*n));
     fraction.map_or_else(|| number(radians), |n| format!("π/{n}"))
 }
 
 /// How the switch is modelled.
 pub fn switch(switch: &SwitchSpec) -> String {
     match switch {
-        SwitchSpec::Smoothed { eps, transition: Transition::Tanh } => format!("tanh smoothing, *ε* = {}", number(*eps)),
+        SwitchSpec::Smoothed { eps, transition: Transition::Tanh } => {
+            format!("tanh smoothing, *ε* = {}", number(*eps))
+        }
         SwitchSpec::Smoothed { eps, transition: Transition::PerturbedTanh { sigma } } => {
             format!("perturbed tanh smoothing, *ε* = {}, *σ* = {}", number(*eps), number(*sigma))
         }
@@ -70,7 +74,9 @@ pub fn switch(switch: &SwitchSpec) -> String {
         SwitchSpec::Smoothed { eps, transition: Transition::Algebraic } => {
             format!("algebraic smoothing, *ε* = {}", number(*eps))
         }
-        SwitchSpec::Smoothed { eps, transition: Transition::Erf } => format!("erf smoothing, *ε* = {}", number(*eps)),
+        SwitchSpec::Smoothed { eps, transition: Transition::Erf } => {
+            format!("erf smoothing, *ε* = {}", number(*eps))
+        }
         SwitchSpec::Hysteretic { eps, eps_prime, relaxation, .. } => format!(
             "hysteresis ({}), *ε* = {}, *ε*′ = {}",
             match relaxation {
@@ -81,11 +87,15 @@ pub fn switch(switch: &SwitchSpec) -> String {
             number(*eps_prime)
         ),
         SwitchSpec::Delayed { delay, eps, .. } => match eps {
-            Some(eps) => format!("switch delayed by {}, smoothed, *ε* = {}", number(*delay), number(*eps)),
+            Some(eps) => {
+                format!("switch delayed by {}, smoothed, *ε* = {}", number(*delay), number(*eps))
+            }
             None => format!("switch delayed by {}", number(*delay)),
         },
         SwitchSpec::Relay { band, .. } => format!("relay with memory, band ±{}", number(*band)),
-        SwitchSpec::Filippov { exit, .. } => format!("discontinuous (Filippov), exit {}", exit_rule(exit)),
+        SwitchSpec::Filippov { exit, .. } => {
+            format!("discontinuous (Filippov), exit {}", exit_rule(exit))
+        }
     }
 }
 
@@ -97,15 +107,22 @@ pub fn exit_rule(rule: &ExitRule) -> String {
     };
     match rule {
         ExitRule::AtOnce { side } => format!("at once to {}", to(*side)),
-        ExitRule::AfterTime { time, side } => format!("after a time of {} to {}", number(*time), to(*side)),
-        ExitRule::AfterArc { arc, side } => format!("after an arc of {} to {}", number(*arc), to(*side)),
+        ExitRule::AfterTime { time, side } => {
+            format!("after a time of {} to {}", number(*time), to(*side))
+        }
+        ExitRule::AfterArc { arc, side } => {
+            format!("after an arc of {} to {}", number(*arc), to(*side))
+        }
         ExitRule::Random { law, plus_probability, seed, stream } => {
             let law = match law {
                 SlidingLaw::Uniform { longest } => format!("uniform up to {}", number(*longest)),
-                SlidingLaw::Exponential { mean } => format!("exponential with mean {}", number(*mean)),
+                SlidingLaw::Exponential { mean } => {
+                    format!("exponential with mean {}", number(*mean))
+                }
             };
             format!(
-                "after a random time ({law}) to a random side (*h* > 0 with probability {}; ChaCha8, seed {seed}, stream {stream})",
+                "after a random time ({law}) to a random side (*h* > 0 with probability {}; \
+                    ChaCha8, seed {seed}, stream {stream})",
                 number(*plus_probability)
             )
         }
@@ -125,7 +142,9 @@ pub fn control(method: &MethodSpec) -> String {
     match method.step_cap {
         StepCap::None => tolerances,
         StepCap::Absolute(h) => format!("{tolerances}, steps up to {}", number(h)),
-        StepCap::FractionOfSegment(f) => format!("{tolerances}, steps up to {} of the interval", number(f)),
+        StepCap::FractionOfSegment(f) => {
+            format!("{tolerances}, steps up to {} of the interval", number(f))
+        }
     }
 }
 
@@ -136,16 +155,23 @@ pub fn method(method: &MethodSpec) -> String {
 
 /// Restarts and kicks of a run; empty if there are none.
 pub fn schedule(run: &RunSpec) -> String {
-    let restarts = run.schedule.restart_every.map(|every| format!("restarted every {}", number(every)));
+    let restarts =
+        run.schedule.restart_every.map(|every| format!("restarted every {}", number(every)));
     let kicks = run.schedule.kick.map(|k| kicks(&k));
     restarts.into_iter().chain(kicks).collect::<Vec<_>>().join(", ")
 }
 
 fn kicks(kick: &Kick) -> String {
-    format!("kicks of {} every {} (ChaCha8, seed {})", number(kick.size), number(kick.every), kick.seed)
+    format!(
+        "kicks of {} every {} (ChaCha8, seed {})",
+        number(kick.size),
+        number(kick.every),
+        kick.seed
+    )
 }
 
-/// What all runs of a picture have in common and how they differ, one line per subject, for its foot.
+/// What all runs of a picture have in common and how they differ, one line per subject, for its
+/// foot.
 pub fn small_print(reading: Option<Reading>, runs: &[&RunSpec]) -> Vec<String> {
     let all = |say: &dyn Fn(&RunSpec) -> Option<String>, join: &str| {
         let mut said: Vec<String> = Vec::new();
@@ -163,7 +189,10 @@ pub fn small_print(reading: Option<Reading>, runs: &[&RunSpec]) -> Vec<String> {
             all(&|r| Some(format!("*t* = 0 … {}", number(r.t_end))), "; "),
         ],
         vec![all(&|r| Some(switch(&r.switch)), "; ")],
-        vec![all(&|r| Some(r.method.name.name().to_owned()), ", "), all(&|r| Some(control(&r.method)), "; ")],
+        vec![
+            all(&|r| Some(r.method.name.name().to_owned()), ", "),
+            all(&|r| Some(control(&r.method)), "; "),
+        ],
         Vec::new(),
     ];
     let restarts = all(&|r| r.schedule.restart_every.map(number), ", ");

@@ -1,12 +1,14 @@
-//! A plotters backend whose canvas counts twelve units to a pixel and which keeps what is drawn as a [`Scene`].
+//! A plotters backend whose canvas counts twelve units to a pixel and which keeps what is drawn as
+//! a [`Scene`].
 //!
-//! Plotters works in whole pixels and leaves text to its backend. Drawing on a canvas twelve times finer and scaling when the files
-//! are written gives sub-pixel placement; text is turned into glyph outlines here.
+//! Plotters works in whole pixels and leaves text to its backend. Drawing on a canvas twelve times
+//! finer and scaling when the files are written gives sub-pixel placement; text is turned into
+//! glyph outlines here.
 
 use plotters::style::text_anchor::{HPos, VPos};
 use plotters_backend::{
-    BackendColor, BackendCoord, BackendStyle, BackendTextStyle, DrawingBackend, DrawingErrorKind, FontStyle,
-    FontTransform,
+    BackendColor, BackendCoord, BackendStyle, BackendTextStyle, DrawingBackend, DrawingErrorKind,
+    FontStyle, FontTransform,
 };
 
 use super::font::{CAP_HEIGHT, FontFace};
@@ -15,7 +17,8 @@ use super::scene::{Paint, Scene, UNITS_PER_POINT, Words, units};
 use super::sheet::Colour;
 use super::style::{HALO_PT, WHITE};
 
-/// A font family name that asks for a white margin around the letters: a text style of plotters has no other place to say so.
+/// A font family name that asks for a white margin around the letters: a text style of plotters has
+/// no other place to say so.
 pub const HALO_FAMILY: &str = "serif with halo";
 
 /// The backend.
@@ -34,7 +37,10 @@ type Outcome = Result<(), DrawingErrorKind<RichTextError>>;
 
 fn paint(colour: BackendColor) -> Paint {
     let (r, g, b) = colour.rgb;
-    Paint { colour: Colour::rgb(r, g, b), opacity: (colour.alpha.clamp(0.0, 1.0) * 100.0).round() as u8 }
+    Paint {
+        colour: Colour::rgb(r, g, b),
+        opacity: (colour.alpha.clamp(0.0, 1.0) * 100.0).round() as u8,
+    }
 }
 
 fn face(style: FontStyle) -> FontFace {
@@ -65,7 +71,12 @@ impl DrawingBackend for SceneBackend<'_> {
         Ok(())
     }
 
-    fn draw_line<S: BackendStyle>(&mut self, from: BackendCoord, to: BackendCoord, style: &S) -> Outcome {
+    fn draw_line<S: BackendStyle>(
+        &mut self,
+        from: BackendCoord,
+        to: BackendCoord,
+        style: &S,
+    ) -> Outcome {
         self.draw_path([from, to], style)
     }
 
@@ -85,30 +96,58 @@ impl DrawingBackend for SceneBackend<'_> {
         }
     }
 
-    fn draw_path<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(&mut self, path: I, style: &S) -> Outcome {
-        self.scene.polyline(paint(style.color()), style.stroke_width() as i32, path.into_iter().collect());
+    fn draw_path<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(
+        &mut self,
+        path: I,
+        style: &S,
+    ) -> Outcome {
+        self.scene.polyline(
+            paint(style.color()),
+            style.stroke_width() as i32,
+            path.into_iter().collect(),
+        );
         Ok(())
     }
 
-    fn draw_circle<S: BackendStyle>(&mut self, center: BackendCoord, radius: u32, style: &S, fill: bool) -> Outcome {
+    fn draw_circle<S: BackendStyle>(
+        &mut self,
+        center: BackendCoord,
+        radius: u32,
+        style: &S,
+        fill: bool,
+    ) -> Outcome {
         if fill {
             self.scene.dot(paint(style.color()), 2 * radius as i32, center);
         } else {
             // A ring is a disc with a smaller one of paper on top: no curve has to be stroked.
             let width = style.stroke_width() as i32;
             self.scene.dot(paint(style.color()), 2 * radius as i32 + width, center);
-            self.scene.dot(Paint { colour: WHITE, opacity: 100 }, 2 * radius as i32 - width, center);
+            self.scene.dot(
+                Paint { colour: WHITE, opacity: 100 },
+                2 * radius as i32 - width,
+                center,
+            );
         }
         Ok(())
     }
 
-    fn fill_polygon<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(&mut self, vert: I, style: &S) -> Outcome {
+    fn fill_polygon<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(
+        &mut self,
+        vert: I,
+        style: &S,
+    ) -> Outcome {
         self.scene.polygon(paint(style.color()), vert.into_iter().collect());
         Ok(())
     }
 
-    fn draw_text<T: BackendTextStyle>(&mut self, text: &str, style: &T, pos: BackendCoord) -> Outcome {
-        let line = rich_text::set(text, face(style.style())).map_err(DrawingErrorKind::DrawingError)?;
+    fn draw_text<T: BackendTextStyle>(
+        &mut self,
+        text: &str,
+        style: &T,
+        pos: BackendCoord,
+    ) -> Outcome {
+        let line =
+            rich_text::set(text, face(style.style())).map_err(DrawingErrorKind::DrawingError)?;
         let size = style.size() / f64::from(UNITS_PER_POINT);
         let width = units(line.width * size);
         let along = match style.anchor().h_pos {
@@ -135,7 +174,11 @@ impl DrawingBackend for SceneBackend<'_> {
         if style.family().as_str() == HALO_FAMILY {
             self.scene.halo(&path, units(2.0 * HALO_PT));
         }
-        self.scene.text(paint(style.color()), path, Words { text: line.plain, from: origin, to, size: units(size) });
+        self.scene.text(
+            paint(style.color()),
+            path,
+            Words { text: line.plain, from: origin, to, size: units(size) },
+        );
         Ok(())
     }
 
@@ -144,7 +187,8 @@ impl DrawingBackend for SceneBackend<'_> {
         text: &str,
         style: &T,
     ) -> Result<(u32, u32), DrawingErrorKind<RichTextError>> {
-        let line = rich_text::set(text, face(style.style())).map_err(DrawingErrorKind::DrawingError)?;
+        let line =
+            rich_text::set(text, face(style.style())).map_err(DrawingErrorKind::DrawingError)?;
         Ok(((line.width * style.size()).round() as u32, style.size().round() as u32))
     }
 }

@@ -1,4 +1,5 @@
-//! Drawing with plotters on the sheet's fine canvas: text, shapes and markers by place, series by data.
+//! Drawing with plotters on the sheet's fine canvas: text, shapes and markers by place, series by
+//! data.
 
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
@@ -12,7 +13,10 @@ use super::font::CAP_HEIGHT;
 use super::polyline;
 use super::rich_text::{self, RichTextError};
 use super::scene::{Position, UNITS_PER_POINT, units};
-use super::sheet::{Anchor, Colour, Dash, DotStyle, LegendEntry, LegendKey, LineStyle, MarkerShape, MarkerStyle, Note};
+use super::sheet::{
+    Anchor, Colour, Dash, DotStyle, LegendEntry, LegendKey, LineStyle, MarkerShape, MarkerStyle,
+    Note,
+};
 use super::style;
 use super::{font::FontFace, sheet::Corner};
 use twofold_num::elementary;
@@ -25,7 +29,9 @@ type DrawError = DrawingAreaErrorKind<RichTextError>;
 impl From<DrawError> for RenderError {
     fn from(error: DrawError) -> Self {
         match error {
-            DrawingAreaErrorKind::BackendError(plotters_backend::DrawingErrorKind::DrawingError(e)) => Self::Text(e),
+            DrawingAreaErrorKind::BackendError(
+                plotters_backend::DrawingErrorKind::DrawingError(e),
+            ) => Self::Text(e),
             other => Self::Drawing(other.to_string()),
         }
     }
@@ -57,7 +63,10 @@ impl Rect {
 
     /// Whether two rectangles share area.
     pub fn overlaps(self, other: Self) -> bool {
-        self.x < other.right() && other.x < self.right() && self.y < other.bottom() && other.y < self.bottom()
+        self.x < other.right()
+            && other.x < self.right()
+            && self.y < other.bottom()
+            && other.y < self.bottom()
     }
 }
 
@@ -112,7 +121,15 @@ pub struct TextFormat {
 impl TextFormat {
     /// Text of this size, anchored by the left end of its baseline.
     pub fn new(size: f64) -> Self {
-        Self { size, colour: style::INK, bold: false, upwards: false, halo: false, h: HPos::Left, v: VPos::Bottom }
+        Self {
+            size,
+            colour: style::INK,
+            bold: false,
+            upwards: false,
+            halo: false,
+            h: HPos::Left,
+            v: VPos::Bottom,
+        }
     }
 
     /// With another colour.
@@ -184,29 +201,46 @@ impl<'a> Canvas<'a> {
 
     /// Draws a solid polyline.
     pub fn line(&self, points: &[Position], colour: Colour, width: f64) -> Result<(), RenderError> {
-        Ok(self.area.draw(&PathElement::new(points.to_vec(), rgba(colour, 100).stroke_width(stroke(width))))?)
+        Ok(self.area.draw(&PathElement::new(
+            points.to_vec(),
+            rgba(colour, 100).stroke_width(stroke(width)),
+        ))?)
     }
 
     /// Draws a polyline in a style.
     pub fn styled_line(&self, points: &[Position], look: &LineStyle) -> Result<(), RenderError> {
-        let places: Vec<[f64; 2]> = points.iter().map(|p| [f64::from(p.0), f64::from(p.1)]).collect();
+        let places: Vec<[f64; 2]> =
+            points.iter().map(|p| [f64::from(p.0), f64::from(p.1)]).collect();
         for part in dashed(&places, look) {
-            let part: Vec<Position> = part.iter().map(|p| (p[0].round() as i32, p[1].round() as i32)).collect();
-            self.area
-                .draw(&PathElement::new(part, rgba(look.colour, look.opacity).stroke_width(stroke(look.width))))?;
+            let part: Vec<Position> =
+                part.iter().map(|p| (p[0].round() as i32, p[1].round() as i32)).collect();
+            self.area.draw(&PathElement::new(
+                part,
+                rgba(look.colour, look.opacity).stroke_width(stroke(look.width)),
+            ))?;
         }
         Ok(())
     }
 
     /// Fills a polygon.
-    pub fn polygon(&self, corners: Vec<Position>, colour: Colour, opacity: u8) -> Result<(), RenderError> {
+    pub fn polygon(
+        &self,
+        corners: Vec<Position>,
+        colour: Colour,
+        opacity: u8,
+    ) -> Result<(), RenderError> {
         Ok(self.area.draw(&Polygon::new(corners, rgba(colour, opacity)))?)
     }
 
     /// Fills a rectangle.
     pub fn fill(&self, rect: Rect, colour: Colour, opacity: u8) -> Result<(), RenderError> {
         self.polygon(
-            vec![(rect.x, rect.y), (rect.right(), rect.y), (rect.right(), rect.bottom()), (rect.x, rect.bottom())],
+            vec![
+                (rect.x, rect.y),
+                (rect.right(), rect.y),
+                (rect.right(), rect.bottom()),
+                (rect.x, rect.bottom()),
+            ],
             colour,
             opacity,
         )
@@ -216,7 +250,8 @@ impl<'a> Canvas<'a> {
         Ok(self.area.draw(&Circle::new(at, diameter / 2, rgba(colour, 100).filled()))?)
     }
 
-    /// Draws a marker. Filled shapes have a thin white rim, so that they stand off curves under them.
+    /// Draws a marker. Filled shapes have a thin white rim, so that they stand off curves under
+    /// them.
     pub fn marker(&self, at: Position, look: &MarkerStyle) -> Result<(), RenderError> {
         let size = units(look.size);
         let rim = units(0.5);
@@ -251,10 +286,17 @@ impl<'a> Canvas<'a> {
             }
             MarkerShape::Star => rimmed(&|r| {
                 (0..10)
-                    .map(|k| corner(90.0 + 36.0 * f64::from(k), if k % 2 == 0 { 1.25 * r } else { 0.52 * r }))
+                    .map(|k| {
+                        corner(
+                            90.0 + 36.0 * f64::from(k),
+                            if k % 2 == 0 { 1.25 * r } else { 0.52 * r },
+                        )
+                    })
                     .collect()
             }),
-            MarkerShape::Square => rimmed(&|r| (0..4).map(|k| corner(45.0 + 90.0 * f64::from(k), 1.2 * r)).collect()),
+            MarkerShape::Square => {
+                rimmed(&|r| (0..4).map(|k| corner(45.0 + 90.0 * f64::from(k), 1.2 * r)).collect())
+            }
             MarkerShape::Triangle => {
                 rimmed(&|r| (0..3).map(|k| corner(90.0 + 120.0 * f64::from(k), 1.25 * r)).collect())
             }
@@ -264,8 +306,10 @@ impl<'a> Canvas<'a> {
     /// Fills an arrow head at the end of a polyline.
     pub fn arrow_head(&self, points: &[Position], look: &LineStyle) -> Result<(), RenderError> {
         let Some(&tip) = points.last() else { return Ok(()) };
-        let length = f64::from(units(style::ARROW_PT)) * (look.width / style::CURVE_PT).clamp(0.8, 2.0);
-        // The direction is taken over the length of the head, so that a last short segment does not turn it.
+        let length =
+            f64::from(units(style::ARROW_PT)) * (look.width / style::CURVE_PT).clamp(0.8, 2.0);
+        // The direction is taken over the length of the head, so that a last short segment does not
+        // turn it.
         let tail = points.iter().rev().find(|p| {
             let (dx, dy) = (f64::from(p.0 - tip.0), f64::from(p.1 - tip.1));
             dx * dx + dy * dy >= 0.5 * length * length
@@ -283,7 +327,11 @@ impl<'a> Canvas<'a> {
                 tip.1 - (length * (aside * dx + along * dy)).round() as i32,
             )
         };
-        self.polygon(vec![at(-0.25, 0.0), at(0.75, 0.36), at(0.55, 0.0), at(0.75, -0.36)], look.colour, look.opacity)
+        self.polygon(
+            vec![at(-0.25, 0.0), at(0.75, 0.36), at(0.55, 0.0), at(0.75, -0.36)],
+            look.colour,
+            look.opacity,
+        )
     }
 
     /// Sets a note at a place on the sheet.
@@ -324,7 +372,11 @@ impl<'a> Canvas<'a> {
             LegendKey::Marker(marker) => self.marker(centre, &marker)?,
             LegendKey::Area(colour, opacity) => {
                 let h = units(6.0);
-                self.fill(Rect { x: x + key / 6, y: middle - h / 2, w: key * 2 / 3, h }, colour, opacity)?;
+                self.fill(
+                    Rect { x: x + key / 6, y: middle - h / 2, w: key * 2 / 3, h },
+                    colour,
+                    opacity,
+                )?;
             }
         }
         let how = TextFormat::new(style::TICK_PT).anchor(HPos::Left, VPos::Center);
@@ -332,7 +384,12 @@ impl<'a> Canvas<'a> {
     }
 
     /// Draws a legend into a corner of a rectangle.
-    pub fn legend(&self, entries: &[LegendEntry], rect: Rect, corner: Corner) -> Result<(), RenderError> {
+    pub fn legend(
+        &self,
+        entries: &[LegendEntry],
+        rect: Rect,
+        corner: Corner,
+    ) -> Result<(), RenderError> {
         let Some(widest) = entries.iter().map(Self::entry_width).max() else { return Ok(()) };
         let (leading, pad, inset) = (units(style::TICK_PT * 1.35), units(3.0), units(4.0));
         let (w, h) = (widest + 2 * pad, leading * entries.len() as i32 + 2 * pad - leading / 5);
@@ -370,7 +427,13 @@ impl<'a> Canvas<'a> {
     }
 
     /// Draws one row of a shared legend, centred.
-    pub fn legend_row(&self, row: &[LegendEntry], left: i32, width: i32, middle: i32) -> Result<(), RenderError> {
+    pub fn legend_row(
+        &self,
+        row: &[LegendEntry],
+        left: i32,
+        width: i32,
+        middle: i32,
+    ) -> Result<(), RenderError> {
         let gap = units(ENTRY_GAP_PT);
         let total: i32 = row.iter().map(|e| Self::entry_width(e) + gap).sum::<i32>() - gap;
         let mut x = left + (width - total) / 2;
@@ -383,7 +446,8 @@ impl<'a> Canvas<'a> {
 
     /// A chart over a rectangle.
     pub fn chart(&self, rect: Rect, x: Span, y: Span) -> Result<Chart<'a>, RenderError> {
-        // Plotters takes the last pixel of an area as the end of its range; one more makes the range the rectangle itself.
+        // Plotters takes the last pixel of an area as the end of its range; one more makes the
+        // range the rectangle itself.
         let area = self.area.clone().shrink((rect.x, rect.y), (rect.w + 1, rect.h + 1));
         let context = ChartBuilder::on(&area).build_cartesian_2d(x, y)?;
         Ok(Chart { context, rect, x, y })
@@ -403,8 +467,12 @@ fn dashed(places: &[[f64; 2]], look: &LineStyle) -> Vec<Vec<[f64; 2]>> {
     let scale = unit * (look.width / style::CURVE_PT).clamp(0.8, 2.0);
     match look.dash {
         Dash::Solid => vec![places.to_vec()],
-        Dash::Dashed => polyline::dashes(places, style::DASH_PT.0 * scale, style::DASH_PT.1 * scale),
-        Dash::Dotted => polyline::dashes(places, style::DOTTED_PT.0 * scale, style::DOTTED_PT.1 * scale),
+        Dash::Dashed => {
+            polyline::dashes(places, style::DASH_PT.0 * scale, style::DASH_PT.1 * scale)
+        }
+        Dash::Dotted => {
+            polyline::dashes(places, style::DOTTED_PT.0 * scale, style::DOTTED_PT.1 * scale)
+        }
     }
 }
 
@@ -421,7 +489,8 @@ impl Chart<'_> {
     /// Place of a point on the sheet, in units, not rounded.
     pub fn place(&self, p: &[f64; 2]) -> [f64; 2] {
         [
-            f64::from(self.rect.x) + f64::from(self.rect.w) * (p[0] - self.x.lower) / (self.x.upper - self.x.lower),
+            f64::from(self.rect.x)
+                + f64::from(self.rect.w) * (p[0] - self.x.lower) / (self.x.upper - self.x.lower),
             f64::from(self.rect.bottom())
                 - f64::from(self.rect.h) * (p[1] - self.y.lower) / (self.y.upper - self.y.lower),
         ]
@@ -430,7 +499,10 @@ impl Chart<'_> {
     /// Place of a point on the sheet, to the nearest unit.
     pub fn position(&self, p: &[f64; 2]) -> Position {
         let (x, y) = (&self.x, &self.y);
-        (x.map(&p[0], (self.rect.x, self.rect.right())), y.map(&p[1], (self.rect.bottom(), self.rect.y)))
+        (
+            x.map(&p[0], (self.rect.x, self.rect.right())),
+            y.map(&p[1], (self.rect.bottom(), self.rect.y)),
+        )
     }
 
     /// Whether a point lies in the chart.
@@ -446,14 +518,24 @@ impl Chart<'_> {
         for group in &cloud.groups {
             let points = group.members.iter().map(|i| (inside[*i][0], inside[*i][1]));
             let look = rgba(group.colour, 100).filled();
-            self.context.draw_series(PointSeries::of_element(points, cloud.diameter / 2, look, &Circle::new))?;
+            self.context.draw_series(PointSeries::of_element(
+                points,
+                cloud.diameter / 2,
+                look,
+                &Circle::new,
+            ))?;
         }
         Ok(())
     }
 
     /// Draws a polyline: clipped, thinned, dashed. Returns its parts as places on the sheet.
-    pub fn line(&mut self, points: &[[f64; 2]], look: &LineStyle) -> Result<Vec<Vec<Position>>, RenderError> {
-        let parts = polyline::clip(points, [self.x.lower, self.y.lower], [self.x.upper, self.y.upper]);
+    pub fn line(
+        &mut self,
+        points: &[[f64; 2]],
+        look: &LineStyle,
+    ) -> Result<Vec<Vec<Position>>, RenderError> {
+        let parts =
+            polyline::clip(points, [self.x.lower, self.y.lower], [self.x.upper, self.y.upper]);
         let mut drawn = Vec::new();
         for part in parts {
             let thinned = polyline::thin(&part, THINNING, |p| self.place(p));
@@ -464,7 +546,11 @@ impl Chart<'_> {
     }
 
     /// Draws a polyline that has been clipped and thinned.
-    pub fn thinned_line(&mut self, points: &[[f64; 2]], look: &LineStyle) -> Result<(), RenderError> {
+    pub fn thinned_line(
+        &mut self,
+        points: &[[f64; 2]],
+        look: &LineStyle,
+    ) -> Result<(), RenderError> {
         let pen = rgba(look.colour, look.opacity).stroke_width(stroke(look.width));
         if look.dash == Dash::Solid {
             self.context.draw_series(LineSeries::new(points.iter().map(|p| (p[0], p[1])), pen))?;
@@ -473,9 +559,12 @@ impl Chart<'_> {
         let places: Vec<[f64; 2]> = points.iter().map(|p| self.place(p)).collect();
         let back = |p: &[f64; 2]| {
             (
-                self.x.lower + (p[0] - f64::from(self.rect.x)) / f64::from(self.rect.w) * (self.x.upper - self.x.lower),
+                self.x.lower
+                    + (p[0] - f64::from(self.rect.x)) / f64::from(self.rect.w)
+                        * (self.x.upper - self.x.lower),
                 self.y.lower
-                    + (f64::from(self.rect.bottom()) - p[1]) / f64::from(self.rect.h) * (self.y.upper - self.y.lower),
+                    + (f64::from(self.rect.bottom()) - p[1]) / f64::from(self.rect.h)
+                        * (self.y.upper - self.y.lower),
             )
         };
         for part in dashed(&places, look) {
@@ -486,11 +575,21 @@ impl Chart<'_> {
     }
 
     /// Fills a polygon, clipped to the chart.
-    pub fn area(&mut self, outline: &[[f64; 2]], colour: Colour, opacity: u8) -> Result<(), RenderError> {
-        let cut = polyline::clip_polygon(outline, [self.x.lower, self.y.lower], [self.x.upper, self.y.upper]);
+    pub fn area(
+        &mut self,
+        outline: &[[f64; 2]],
+        colour: Colour,
+        opacity: u8,
+    ) -> Result<(), RenderError> {
+        let cut = polyline::clip_polygon(
+            outline,
+            [self.x.lower, self.y.lower],
+            [self.x.upper, self.y.upper],
+        );
         let corners: Vec<(f64, f64)> = cut.iter().map(|p| (p[0], p[1])).collect();
         if corners.len() >= 3 {
-            self.context.draw_series(std::iter::once(Polygon::new(corners, rgba(colour, opacity))))?;
+            self.context
+                .draw_series(std::iter::once(Polygon::new(corners, rgba(colour, opacity))))?;
         }
         Ok(())
     }

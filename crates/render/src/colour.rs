@@ -19,7 +19,8 @@ impl Colour {
 
     /// This colour with a share `white` (0 to 1) of white mixed in.
     pub fn lighten(self, white: f64) -> Self {
-        let mix = |c: u8| (f64::from(c) + (255.0 - f64::from(c)) * white.clamp(0.0, 1.0)).round() as u8;
+        let mix =
+            |c: u8| (f64::from(c) + (255.0 - f64::from(c)) * white.clamp(0.0, 1.0)).round() as u8;
         Self::rgb(mix(self.r), mix(self.g), mix(self.b))
     }
 }

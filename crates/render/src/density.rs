@@ -43,13 +43,18 @@ pub fn arrange(places: &[Position], look: &DotStyle) -> Cloud {
     let density: Vec<u32> = order.iter().map(|i| counts.around(places[*i])).collect();
     let mut sorted = density.clone();
     sorted.sort_unstable();
-    // From the fifth to the 95th percentile of density on a logarithmic scale: single outliers do not set the scale.
+    // From the fifth to the 95th percentile of density on a logarithmic scale: single outliers do
+    // not set the scale.
     let logarithm = |count: u32| elementary::ln(f64::from(count.max(1)));
     let quantile = |q: usize| logarithm(sorted[(sorted.len() - 1) * q / 100]);
     let (thin, dense) = (quantile(5), quantile(95));
     let top = style::DENSITY_LEVELS - 1;
     let level = |count: u32| {
-        let share = if dense > thin { ((logarithm(count) - thin) / (dense - thin)).clamp(0.0, 1.0) } else { 1.0 };
+        let share = if dense > thin {
+            ((logarithm(count) - thin) / (dense - thin)).clamp(0.0, 1.0)
+        } else {
+            1.0
+        };
         (share * top as f64).round() as usize
     };
     let most = sorted.last().map_or(0, |m| *m as usize);
@@ -67,8 +72,8 @@ pub fn arrange(places: &[Position], look: &DotStyle) -> Cloud {
     Cloud { diameter, groups }
 }
 
-/// One point for each cell of side [`SAME`], the first given, in rows from the top: neighbours follow each other, which keeps the
-/// vector files small.
+/// One point for each cell of side [`SAME`], the first given, in rows from the top: neighbours
+/// follow each other, which keeps the vector files small.
 fn distinct(places: &[Position]) -> Vec<usize> {
     let Some(bounds) = Bounds::of(places, SAME) else { return Vec::new() };
     if bounds.rows > 1 << 20 || bounds.columns > 1 << 20 || places.len() > 1 << 24 {
@@ -102,12 +107,20 @@ impl Bounds {
         let high = |f: fn(&Position) -> i32| places.iter().map(f).max();
         let (x0, y0) = (low(|p| p.0)?.div_euclid(side), low(|p| p.1)?.div_euclid(side));
         let (x1, y1) = (high(|p| p.0)?.div_euclid(side), high(|p| p.1)?.div_euclid(side));
-        Some(Self { first: (x0, y0), side, rows: (y1 - y0 + 1) as usize, columns: (x1 - x0 + 1) as usize })
+        Some(Self {
+            first: (x0, y0),
+            side,
+            rows: (y1 - y0 + 1) as usize,
+            columns: (x1 - x0 + 1) as usize,
+        })
     }
 
     /// Row and column of the cell that holds a place.
     fn cell(&self, p: Position) -> (usize, usize) {
-        ((p.1.div_euclid(self.side) - self.first.1) as usize, (p.0.div_euclid(self.side) - self.first.0) as usize)
+        (
+            (p.1.div_euclid(self.side) - self.first.1) as usize,
+            (p.0.div_euclid(self.side) - self.first.0) as usize,
+        )
     }
 }
 
@@ -150,7 +163,8 @@ mod tests {
 
     #[test]
     fn two_places_visited_often_become_two_large_dots() {
-        let places: Vec<Position> = (0..20_000).map(|i| if i % 2 == 0 { (1000, 1000) } else { (9000, 1000) }).collect();
+        let places: Vec<Position> =
+            (0..20_000).map(|i| if i % 2 == 0 { (1000, 1000) } else { (9000, 1000) }).collect();
         let cloud = arrange(&places, &DotStyle::late());
         assert_eq!(cloud.groups.len(), 1);
         assert_eq!(cloud.groups[0].members, [0, 1]);
@@ -159,7 +173,8 @@ mod tests {
 
     #[test]
     fn dense_places_are_darker_than_sparse_ones() {
-        let mut places: Vec<Position> = (0..30_000).map(|i| (i % 173 * 100, i / 173 * 100)).collect();
+        let mut places: Vec<Position> =
+            (0..30_000).map(|i| (i % 173 * 100, i / 173 * 100)).collect();
         places.extend((0..30_000).map(|i| (5_000 + i % 100 * 3, 5_000 + i / 100 * 3)));
         let cloud = arrange(&places, &DotStyle::late());
         assert_eq!(cloud.groups.len(), style::DENSITY_LEVELS);
@@ -173,11 +188,13 @@ mod tests {
     #[test]
     fn neighbourhoods_count_all_nine_cells() {
         let cells = [(0, 0), (0, 1), (0, 1), (1, 2), (-1, 0), (5, 5), (0, 3), (-1, -1)];
-        let places: Vec<Position> = cells.iter().map(|c| (c.0 * PLACE + 3, c.1 * PLACE + PLACE - 1)).collect();
+        let places: Vec<Position> =
+            cells.iter().map(|c| (c.0 * PLACE + 3, c.1 * PLACE + PLACE - 1)).collect();
         let counts = Counts::new(&places);
         assert_eq!(counts.occupied, 7);
         for (p, c) in places.iter().zip(&cells) {
-            let near = cells.iter().filter(|d| (d.0 - c.0).abs() <= 1 && (d.1 - c.1).abs() <= 1).count();
+            let near =
+                cells.iter().filter(|d| (d.0 - c.0).abs() <= 1 && (d.1 - c.1).abs() <= 1).count();
             assert_eq!(counts.around(*p) as usize, near, "{c:?}");
         }
     }

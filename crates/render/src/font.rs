@@ -4,13 +4,13 @@ use std::sync::OnceLock;
 
 /// Made of the fonts' files by tools/fonts. All numbers are little-endian.
 ///
-/// For each face its length in bytes (u32), then: units per em, number of characters, of rows and of
-/// columns of the table of kerning (u16 each); for each character, in increasing order, its code (u32),
-/// the offset of its outline among the outlines (u32), its advance (i16), its row as the left one of a
-/// pair and its column as the right one (u16 each); the table of kerning, row after row (i16 each); the
-/// outlines. An outline is a list of strokes that ends with a dot: a letter as in SVG (M, L, C, Z), then
-/// the coordinates of its points, each as the difference to the coordinate before: an i8, or, if that is
-/// -128, the i16 behind it.
+/// For each face its length in bytes (u32), then: units per em, number of characters, of rows and
+/// of columns of the table of kerning (u16 each); for each character, in increasing order, its code
+/// (u32), the offset of its outline among the outlines (u32), its advance (i16), its row as the
+/// left one of a pair and its column as the right one (u16 each); the table of kerning, row after
+/// row (i16 each); the outlines. An outline is a list of strokes that ends with a dot: a letter as
+/// in SVG (M, L, C, Z), then the coordinates of its points, each as the difference to the
+/// coordinate before: an i8, or, if that is -128, the i16 behind it.
 static GLYPHS: &[u8] = include_bytes!("../fonts/glyphs.bin");
 /// Bytes of a character's record.
 const RECORD: usize = 14;
@@ -28,7 +28,8 @@ pub enum FontFace {
     BoldItalic,
 }
 
-/// Height of capitals as a share of the font size: what the regular face's table OS/2 says (tools/fonts).
+/// Height of capitals as a share of the font size: what the regular face's table OS/2 says
+/// (tools/fonts).
 pub const CAP_HEIGHT: f64 = 0.658;
 
 /// The parts of [`GLYPHS`] that are a face's.
@@ -45,7 +46,8 @@ fn loaded(face: FontFace) -> &'static Loaded {
     let fonts = FONTS.get_or_init(|| {
         let mut rest = GLYPHS;
         [(); 4].map(|()| {
-            // The bytes are part of the program and a test reads all of them, so this cannot fail at run time.
+            // The bytes are part of the program and a test reads all of them, so this cannot fail
+            // at run time.
             let (face, next) = rest[4..].split_at(number(rest, 0) as usize);
             rest = next;
             let [characters, rows, columns] = [2, 4, 6].map(|at| usize::from(small(face, at)));
@@ -73,11 +75,13 @@ pub struct Glyph {
     record: &'static [u8; RECORD],
 }
 
-/// The glyph of a character; signs that a face lacks come from the regular one. `None` if the family has no such sign.
+/// The glyph of a character; signs that a face lacks come from the regular one. `None` if the
+/// family has no such sign.
 pub fn glyph(face: FontFace, character: char) -> Option<Glyph> {
     [face, FontFace::Regular].into_iter().find_map(|face| {
         let (records, _) = loaded(face).characters.as_chunks();
-        let at = records.binary_search_by_key(&u32::from(character), |record| number(record, 0)).ok()?;
+        let at =
+            records.binary_search_by_key(&u32::from(character), |record| number(record, 0)).ok()?;
         Some(Glyph { face, record: &records[at] })
     })
 }
@@ -93,7 +97,8 @@ pub fn kern(left: Glyph, right: Glyph) -> f64 {
         return 0.0;
     }
     let font = loaded(left.face);
-    let place = usize::from(small(left.record, 10)) * font.columns + usize::from(small(right.record, 12));
+    let place =
+        usize::from(small(left.record, 10)) * font.columns + usize::from(small(right.record, 12));
     f64::from(small(font.kerning, 2 * place) as i16) / font.units_per_em
 }
 
@@ -113,7 +118,8 @@ pub enum Stroke {
 /// The outline of a glyph.
 pub fn outline(glyph: Glyph) -> Vec<Stroke> {
     let font = loaded(glyph.face);
-    let mut bytes = font.outlines[number(glyph.record, 4) as usize..].iter().map(|byte| *byte as i8);
+    let mut bytes =
+        font.outlines[number(glyph.record, 4) as usize..].iter().map(|byte| *byte as i8);
     let mut next = move || bytes.next().unwrap_or(0);
     let mut strokes = Vec::new();
     let mut last = [0_i16; 2];
@@ -145,7 +151,8 @@ mod tests {
     #[test]
     fn every_face_has_the_letters_and_the_regular_one_the_signs() {
         for face in [FontFace::Regular, FontFace::Italic, FontFace::Bold, FontFace::BoldItalic] {
-            for c in "AZaz09()[]+,.;:=/αβγδεθλμνπρσφψωΓΔΛΣΦΨΩ−×≤".chars() {
+            for c in "AZaz09()[]+,.;:=/αβγδεθλμνπρσφψωΓΔΛΣΦΨΩ−×≤".chars()
+            {
                 let g = glyph(face, c).unwrap();
                 assert_eq!(g.face, face, "{c}");
                 assert!(!outline(g).is_empty(), "{c}");
@@ -192,8 +199,13 @@ mod tests {
                 }
             }
             // Latin, its supplement and Greek, with the signs of captions.
-            let signs = (0x20..0x7f).chain(0xa0..0x100).chain(0x391..0x3ca).chain(0x2010..0x2030).chain(0x2200..0x2270);
-            let glyphs: Vec<Glyph> = signs.filter_map(char::from_u32).filter_map(|c| glyph(face, c)).collect();
+            let signs = (0x20..0x7f)
+                .chain(0xa0..0x100)
+                .chain(0x391..0x3ca)
+                .chain(0x2010..0x2030)
+                .chain(0x2200..0x2270);
+            let glyphs: Vec<Glyph> =
+                signs.filter_map(char::from_u32).filter_map(|c| glyph(face, c)).collect();
             for left in &glyphs {
                 glyphs.iter().for_each(|right| number(kern(*left, *right)));
             }

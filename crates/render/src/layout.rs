@@ -48,8 +48,12 @@ pub fn draw(sheet: &Sheet) -> Result<Scene, RenderError> {
         canvas.fill(*rect, style::VERMILLION, 100)?;
         for (i, line) in lines.iter().enumerate() {
             let leading = units(style::BANNER_PT * style::LEADING);
-            let middle = rect.y + rect.h / 2 + leading * i as i32 - leading * (lines.len() as i32 - 1) / 2;
-            let how = TextFormat::new(style::BANNER_PT).bold().colour(style::WHITE).anchor(HPos::Center, VPos::Center);
+            let middle =
+                rect.y + rect.h / 2 + leading * i as i32 - leading * (lines.len() as i32 - 1) / 2;
+            let how = TextFormat::new(style::BANNER_PT)
+                .bold()
+                .colour(style::WHITE)
+                .anchor(HPos::Center, VPos::Center);
             canvas.text(line, (width / 2, middle), how)?;
         }
     }
@@ -70,7 +74,11 @@ pub fn draw(sheet: &Sheet) -> Result<Scene, RenderError> {
         canvas.legend_row(row, margin, width - 2 * margin, *middle)?;
     }
     for (line, baseline) in &plan.footer {
-        canvas.text(line, (margin, *baseline), TextFormat::new(style::FOOTER_PT).colour(style::SOFT_INK))?;
+        canvas.text(
+            line,
+            (margin, *baseline),
+            TextFormat::new(style::FOOTER_PT).colour(style::SOFT_INK),
+        )?;
     }
     drop(canvas);
     Ok(scene)
@@ -81,10 +89,13 @@ fn plan(sheet: &Sheet, width: i32) -> SheetLayout {
     let inner = width - 2 * margin;
     let mut y = margin;
     let mut heading = Vec::new();
-    for (text, size, bold) in [(&sheet.title, style::TITLE_PT, true), (&sheet.subtitle, style::LABEL_PT, false)] {
+    for (text, size, bold) in
+        [(&sheet.title, style::TITLE_PT, true), (&sheet.subtitle, style::LABEL_PT, false)]
+    {
         let Some(text) = text else { continue };
         let face = if bold { FontFace::Bold } else { FontFace::Regular };
-        for line in rich_text::wrap(text, face, size, f64::from(inner) / f64::from(UNITS_PER_POINT)) {
+        for line in rich_text::wrap(text, face, size, f64::from(inner) / f64::from(UNITS_PER_POINT))
+        {
             heading.push((line, size, bold, y + units(size * 0.8)));
             y += units(size * style::LEADING);
         }
@@ -114,7 +125,11 @@ fn plan(sheet: &Sheet, width: i32) -> SheetLayout {
     if !sheet.footer.is_empty() {
         y += units(4.0);
         let limit = f64::from(inner) / f64::from(UNITS_PER_POINT);
-        for line in sheet.footer.iter().flat_map(|l| rich_text::wrap(l, FontFace::Regular, style::FOOTER_PT, limit)) {
+        for line in sheet
+            .footer
+            .iter()
+            .flat_map(|l| rich_text::wrap(l, FontFace::Regular, style::FOOTER_PT, limit))
+        {
             footer.push((line, y + units(style::FOOTER_PT * 0.8)));
             y += units(style::FOOTER_PT * style::LEADING);
         }
@@ -186,7 +201,8 @@ fn plan_panels(sheet: &Sheet, inner: i32, margin: i32, y: &mut i32) -> Vec<(Rect
     let columns = sheet.columns.clamp(1, sheet.panels.len().max(1));
     let gutter = units(style::GUTTER_PT);
     let rows: Vec<&[SheetPanel]> = sheet.panels.chunks(columns).collect();
-    // Tick labels depend on the size of the drawing area and that on the room for tick labels: two rounds settle it.
+    // Tick labels depend on the size of the drawing area and that on the room for tick labels: two
+    // rounds settle it.
     let mut w = (inner - gutter * (columns as i32 - 1)) / columns as i32 - units(28.0);
     let mut left = vec![0; columns];
     let mut right = vec![0; columns];
@@ -206,7 +222,9 @@ fn plan_panels(sheet: &Sheet, inner: i32, margin: i32, y: &mut i32) -> Vec<(Rect
     let mut places = Vec::new();
     for (r, row) in rows.iter().enumerate() {
         let h = row.iter().map(|p| height(p, sheet, w)).max().unwrap_or(0);
-        let inset = |f: fn(Insets) -> i32| row.iter().map(|p| f(content_insets(p, w, h))).max().unwrap_or(0);
+        let inset = |f: fn(Insets) -> i32| {
+            row.iter().map(|p| f(content_insets(p, w, h))).max().unwrap_or(0)
+        };
         let title = row.iter().map(|p| title_height(p, w)).max().unwrap_or(0);
         if r > 0 {
             *y += units(7.0);
@@ -228,7 +246,13 @@ fn plan_panels(sheet: &Sheet, inner: i32, margin: i32, y: &mut i32) -> Vec<(Rect
 pub fn check_texts(sheet: &Sheet) -> Result<(), RenderError> {
     let mut texts: Vec<&str> = Vec::new();
     texts.extend(
-        sheet.title.iter().chain(&sheet.subtitle).chain(&sheet.banner).chain(&sheet.footer).map(String::as_str),
+        sheet
+            .title
+            .iter()
+            .chain(&sheet.subtitle)
+            .chain(&sheet.banner)
+            .chain(&sheet.footer)
+            .map(String::as_str),
     );
     texts.extend(sheet.legend.iter().map(|e| e.text.as_str()));
     for panel in &sheet.panels {

@@ -1,9 +1,10 @@
 //! Rendering of plain data to PNG, SVG and PDF. The only crate that uses plotters.
 //!
-//! A [`Sheet`] says what is drawn. It is laid out and drawn once, with plotters' charts and series, through a backend of our own
-//! (`backend`) into a device-independent list of paths (`scene`); three writers turn that one list into pixels, SVG and PDF,
-//! so the three are the same picture. All text is set from fonts embedded in the library (`font`, `rich_text`). How things look is said in
-//! [`style`] alone.
+//! A [`Sheet`] says what is drawn. It is laid out and drawn once, with plotters' charts and series,
+//! through a backend of our own (`backend`) into a device-independent list of paths (`scene`);
+//! three writers turn that one list into pixels, SVG and PDF, so the three are the same picture.
+//! All text is set from fonts embedded in the library (`font`, `rich_text`). How things look is
+//! said in [`style`] alone.
 //!
 //! ```
 //! use twofold_render::sheet::{Axis, ColumnWidth, DotStyle, PlanePanel};
@@ -15,10 +16,11 @@
 //! # Ok::<(), twofold_render::RenderError>(())
 //! ```
 //!
-//! Everything here is a pure function of the sheet: no file, clock, locale or machine property enters, and no platform logarithm or
-//! trigonometric function decides where ink lies.
+//! Everything here is a pure function of the sheet: no file, clock, locale or machine property
+//! enters, and no platform logarithm or trigonometric function decides where ink lies.
 #![forbid(unsafe_code)]
-#![cfg_attr(test, allow(clippy::disallowed_methods))] // tests compare with tolerances, not with hashes
+// tests compare with tolerances, not with hashes
+#![cfg_attr(test, allow(clippy::disallowed_methods))]
 
 pub mod colour;
 pub mod markup;
@@ -63,9 +65,11 @@ pub enum RenderError {
     /// A text cannot be set.
     #[error(transparent)]
     Text(#[from] RichTextError),
-    /// An axis has an end that is not a finite number, or a logarithmic axis one that is not positive.
+    /// An axis has an end that is not a finite number, or a logarithmic axis one that is not
+    /// positive.
     #[error(
-        "panel {panel}: the axis {title:?} runs from {lower} to {upper}; give finite ends (positive on a logarithmic axis)"
+        "panel {panel}: the axis {title:?} runs from {lower} to {upper}; give finite ends \
+            (positive on a logarithmic axis)"
     )]
     Axis {
         /// Number of the panel, from one.
@@ -129,7 +133,8 @@ pub struct Rendered {
     pub pdf: Vec<u8>,
     /// The pixels of the PNG file.
     pub pixels: Pixels,
-    /// How many given positions were not finite numbers (or not positive on a logarithmic axis) and were left out.
+    /// How many given positions were not finite numbers (or not positive on a logarithmic axis) and
+    /// were left out.
     pub left_out: usize,
 }
 
@@ -137,7 +142,8 @@ pub struct Rendered {
 ///
 /// # Errors
 ///
-/// If the sheet asks for something that cannot be drawn: no axes, an empty range, a picture that is too large.
+/// If the sheet asks for something that cannot be drawn: no axes, an empty range, a picture that is
+/// too large.
 pub fn render(sheet: &Sheet) -> Result<Rendered, RenderError> {
     check(sheet)?;
     let scene = layout::draw(sheet)?;
@@ -153,7 +159,13 @@ pub fn render(sheet: &Sheet) -> Result<Rendered, RenderError> {
     let sealed = Sealed::new(&sheet.provenance);
     Ok(Rendered {
         png: provenance::seal(png_file::write(&pixels, &title, &sheet.description, &sealed)?)?,
-        svg: provenance::seal(svg::write(&scene, &title, &sheet.description, &sealed, sheet.searchable_svg))?,
+        svg: provenance::seal(svg::write(
+            &scene,
+            &title,
+            &sheet.description,
+            &sealed,
+            sheet.searchable_svg,
+        ))?,
         pdf: provenance::seal(pdf::write(&scene, &title, &sheet.description, &sealed))?,
         pixels,
         left_out: left_out(sheet),
@@ -179,10 +191,15 @@ fn left_out(sheet: &Sheet) -> usize {
 fn check(sheet: &Sheet) -> Result<(), RenderError> {
     layout::check_texts(sheet)?;
     let number = |panel: usize, what: &'static str, value: f64, good: bool| {
-        if good && value.is_finite() { Ok(()) } else { Err(RenderError::Number { panel, what, value }) }
+        if good && value.is_finite() {
+            Ok(())
+        } else {
+            Err(RenderError::Number { panel, what, value })
+        }
     };
-    let aspect =
-        |panel: usize, value: f64| number(panel, "the aspect (0.05 to 20)", value, (0.05..=20.0).contains(&value));
+    let aspect = |panel: usize, value: f64| {
+        number(panel, "the aspect (0.05 to 20)", value, (0.05..=20.0).contains(&value))
+    };
     aspect(0, sheet.panel_aspect)?;
     for (i, p) in sheet.panels.iter().enumerate() {
         let panel = i + 1;
@@ -207,9 +224,19 @@ fn check(sheet: &Sheet) -> Result<(), RenderError> {
                 c.axes.iter().try_for_each(|a| axis(a, false))?;
                 c.aspect.map_or(Ok(()), |a| aspect(panel, a))?;
                 number(panel, "the camera's azimuth", c.azimuth, true)?;
-                number(panel, "the camera's elevation (-90 to 90)", c.elevation, c.elevation.abs() <= 90.0)?;
+                number(
+                    panel,
+                    "the camera's elevation (-90 to 90)",
+                    c.elevation,
+                    c.elevation.abs() <= 90.0,
+                )?;
                 for p in c.proportions {
-                    number(panel, "a proportion of the box (0.05 to 20)", p, (0.05..=20.0).contains(&p))?;
+                    number(
+                        panel,
+                        "a proportion of the box (0.05 to 20)",
+                        p,
+                        (0.05..=20.0).contains(&p),
+                    )?;
                 }
             }
             sheet::Content::Blank => {}

@@ -1,7 +1,9 @@
-//! The markup of rich text, read in one place: for setting it in type, for HTML, and for plain text.
+//! The markup of rich text, read in one place: for setting it in type, for HTML, and for plain
+//! text.
 //!
-//! `*x*` is italic; `^{...}` and `_{...}` raise and lower (one character needs no braces); a backslash takes the next character
-//! literally. A hyphen before a number or inside a superscript or subscript is a minus sign.
+//! `*x*` is italic; `^{...}` and `_{...}` raise and lower (one character needs no braces); a
+//! backslash takes the next character literally. A hyphen before a number or inside a superscript
+//! or subscript is a minus sign.
 
 /// What a text is made of, in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,7 +72,9 @@ pub fn parse(text: &str) -> Result<Vec<Token>, MarkupError> {
                 depth = depth.checked_sub(1).ok_or(MarkupError::Braces)?;
                 tokens.push(Token::End);
             }
-            '-' if depth > 0 || is_minus(next.checked_sub(2).and_then(at), at(next)) => tokens.push(Token::Minus),
+            '-' if depth > 0 || is_minus(next.checked_sub(2).and_then(at), at(next)) => {
+                tokens.push(Token::Minus)
+            }
             other => tokens.push(Token::Sign(other)),
         }
     }
@@ -81,15 +85,16 @@ pub fn parse(text: &str) -> Result<Vec<Token>, MarkupError> {
     }
 }
 
-/// A hyphen is a minus sign before a digit, unless it joins words or numbers such as `2-10`; and between spaces.
+/// A hyphen is a minus sign before a digit, unless it joins words or numbers such as `2-10`; and
+/// between spaces.
 fn is_minus(before: Option<char>, after: Option<char>) -> bool {
     let joins = before.is_some_and(char::is_alphanumeric);
     (!joins && after.is_some_and(|c| c.is_ascii_digit() || c == '.' || c == '*'))
         || (before == Some(' ') && after == Some(' '))
 }
 
-/// The text without its markup, for readers without typesetting: scripts keep their sign, minus signs stay hyphens. A text whose
-/// markup is faulty only loses asterisks and braces.
+/// The text without its markup, for readers without typesetting: scripts keep their sign, minus
+/// signs stay hyphens. A text whose markup is faulty only loses asterisks and braces.
 pub fn plain(text: &str) -> String {
     let Ok(tokens) = parse(text) else { return text.replace(['*', '{', '}'], "") };
     let mut plain = String::with_capacity(text.len());
@@ -146,7 +151,8 @@ const GREEK: [(&str, char); 24] = [
     ("Omega", 'Ω'),
 ];
 
-/// A program's name for a quantity, as mathematics sets it: `omega` is an italic ω, `v_plus` and `x1` have subscripts.
+/// A program's name for a quantity, as mathematics sets it: `omega` is an italic ω, `v_plus` and
+/// `x1` have subscripts.
 pub fn name(name: &str) -> String {
     let letters = name.trim_end_matches(|c: char| c.is_ascii_digit());
     let (base, script) = match name.split_once('_') {
@@ -158,7 +164,11 @@ pub fn name(name: &str) -> String {
         Some((_, letter)) => letter.to_string(),
         None => literal(base),
     };
-    if script.is_empty() { format!("*{base}*") } else { format!("*{base}*_{{{}}}", literal(script)) }
+    if script.is_empty() {
+        format!("*{base}*")
+    } else {
+        format!("*{base}*_{{{}}}", literal(script))
+    }
 }
 
 #[cfg(test)]
@@ -186,7 +196,8 @@ mod tests {
 
     #[test]
     fn hyphens_and_minus_signs() {
-        let minus = |text: &str| parse(text).unwrap().iter().filter(|t| **t == Token::Minus).count();
+        let minus =
+            |text: &str| parse(text).unwrap().iter().filter(|t| **t == Token::Minus).count();
         for (text, count) in [
             ("-1.2", 1),
             ("*v* = -1.2", 1),
@@ -206,7 +217,20 @@ mod tests {
         use Token::{End, Italic, Lower, Minus, Raise, Sign};
         assert_eq!(
             parse("*v*_{+}10^{-5}").unwrap(),
-            [Italic, Sign('v'), Italic, Lower, Sign('+'), End, Sign('1'), Sign('0'), Raise, Minus, Sign('5'), End]
+            [
+                Italic,
+                Sign('v'),
+                Italic,
+                Lower,
+                Sign('+'),
+                End,
+                Sign('1'),
+                Sign('0'),
+                Raise,
+                Minus,
+                Sign('5'),
+                End
+            ]
         );
         assert_eq!(parse("x^2").unwrap(), [Sign('x'), Raise, Sign('2'), End]);
     }

@@ -1,7 +1,8 @@
 //! A [`Scene`] as a one-page PDF, with no clock and no random identifier in it.
 //!
-//! Text is outlines, so that no font decides how it looks. Its words are there a second time, unseen, in a font whose glyphs are all empty, so that a reader can
-//! search and copy them (ISO 32000-1, 9.3.6: text rendering mode 3; 9.10.3: the map to Unicode).
+//! Text is outlines, so that no font decides how it looks. Its words are there a second time,
+//! unseen, in a font whose glyphs are all empty, so that a reader can search and copy them (ISO
+//! 32000-1, 9.3.6: text rendering mode 3; 9.10.3: the map to Unicode).
 
 use std::collections::BTreeMap;
 
@@ -26,8 +27,12 @@ const GLYPH_WIDTH: i64 = 500;
 
 /// Writes a scene.
 pub fn write(scene: &Scene, title: &str, description: &str, sealed: &Sealed) -> Vec<u8> {
-    let [catalog, pages, page, contents, info, font, glyph, unicode] = [1, 2, 3, 4, 5, 6, 7, 8].map(Ref::new);
-    let (w, h) = (scene.width() as f32 / UNITS_PER_POINT as f32, scene.height() as f32 / UNITS_PER_POINT as f32);
+    let [catalog, pages, page, contents, info, font, glyph, unicode] =
+        [1, 2, 3, 4, 5, 6, 7, 8].map(Ref::new);
+    let (w, h) = (
+        scene.width() as f32 / UNITS_PER_POINT as f32,
+        scene.height() as f32 / UNITS_PER_POINT as f32,
+    );
     let mut pdf = Pdf::new();
     let mut root = pdf.catalog(catalog);
     root.pages(pages).lang(TextStr("en"));
@@ -67,12 +72,15 @@ pub fn write(scene: &Scene, title: &str, description: &str, sealed: &Sealed) -> 
     let readable: Vec<String> = sealed.entries.iter().map(|(k, v)| format!("{k}={v}")).collect();
     let readable: Vec<String> = readable.into_iter().filter(|e| !e.starts_with(SEAL_KEY)).collect();
     details.keywords(TextStr(&readable.join("; ")));
-    details.insert(Name(INFO_KEY.as_bytes())).primitive(Str(to_ascii_json(&sealed.entries).as_bytes()));
+    details
+        .insert(Name(INFO_KEY.as_bytes()))
+        .primitive(Str(to_ascii_json(&sealed.entries).as_bytes()));
     details.finish();
     pdf.finish()
 }
 
-/// A one-byte code for each character that is set, in the characters' order. The embedded fonts have fewer characters than there are codes.
+/// A one-byte code for each character that is set, in the characters' order. The embedded fonts
+/// have fewer characters than there are codes.
 fn codes(scene: &Scene) -> BTreeMap<char, u8> {
     let mut characters: Vec<char> = scene.texts().flat_map(|w| w.text.chars()).collect();
     characters.sort_unstable();
@@ -85,14 +93,19 @@ fn invisible_font(pdf: &mut Pdf, [font, glyph, unicode]: [Ref; 3], codes: &BTree
     let name = |code: u8| format!("g{code}");
     let last = codes.len() as u8;
     let mut description = pdf.type3_font(font);
-    description.bbox(Rect::new(0.0, -200.0, GLYPH_WIDTH as f32, 800.0)).matrix([0.001, 0.0, 0.0, 0.001, 0.0, 0.0]);
+    description
+        .bbox(Rect::new(0.0, -200.0, GLYPH_WIDTH as f32, 800.0))
+        .matrix([0.001, 0.0, 0.0, 0.001, 0.0, 0.0]);
     let mut procedures = description.char_procs();
     for code in 1..=last {
         procedures.pair(Name(name(code).as_bytes()), glyph);
     }
     procedures.finish();
     let names: Vec<String> = (1..=last).map(name).collect();
-    description.encoding_custom().differences().consecutive(1, names.iter().map(|n| Name(n.as_bytes())));
+    description
+        .encoding_custom()
+        .differences()
+        .consecutive(1, names.iter().map(|n| Name(n.as_bytes())));
     description.first_char(1).last_char(last).widths((1..=last).map(|_| GLYPH_WIDTH as f32));
     description.resources();
     description.to_unicode(unicode);
@@ -108,22 +121,32 @@ fn invisible_font(pdf: &mut Pdf, [font, glyph, unicode]: [Ref; 3], codes: &BTree
     pdf.cmap(unicode, map.finish().as_slice());
 }
 
-/// The operators of the unseen words, each stretched to the length of the outlines that it stands for.
+/// The operators of the unseen words, each stretched to the length of the outlines that it stands
+/// for.
 fn words(out: &mut Vec<u8>, scene: &Scene, codes: &BTreeMap<char, u8>) {
     if codes.is_empty() {
         return;
     }
     out.extend_from_slice(b"BT\n3 Tr\n");
     for words in scene.texts() {
-        let text: String = words.text.chars().filter_map(|c| codes.get(&c)).map(|code| format!("{code:02x}")).collect();
+        let text: String = words
+            .text
+            .chars()
+            .filter_map(|c| codes.get(&c))
+            .map(|code| format!("{code:02x}"))
+            .collect();
         let (x, y) = words.from;
         // The page's matrix has y downwards; the text's turns it up again.
         let matrix = if words.upwards() { "0 -1 -1 0" } else { "1 0 0 -1" };
         let natural = (text.len() as i64 / 2 * GLYPH_WIDTH * i64::from(words.size)).max(1);
         // Per cent, with two decimals.
         let stretch = (i64::from(words.length()) * 10_000_000 + natural / 2) / natural;
-        let line =
-            format!("/F {} Tf {}.{:02} Tz {matrix} {x} {y} Tm <{text}> Tj\n", words.size, stretch / 100, stretch % 100);
+        let line = format!(
+            "/F {} Tf {}.{:02} Tz {matrix} {x} {y} Tm <{text}> Tj\n",
+            words.size,
+            stretch / 100,
+            stretch % 100
+        );
         out.extend_from_slice(line.as_bytes());
     }
     out.extend_from_slice(b"ET\n");
@@ -146,13 +169,16 @@ fn state(opacity: u8) -> String {
     format!("A{opacity}")
 }
 
-/// The page's drawing operators. Coordinates are whole units; one matrix turns them into points with y upwards.
+/// The page's drawing operators. Coordinates are whole units; one matrix turns them into points
+/// with y upwards.
 fn drawing(scene: &Scene) -> Vec<u8> {
     let mut head = Content::new();
     let unit = 1.0 / UNITS_PER_POINT as f32;
     head.transform([unit, 0.0, 0.0, -unit, 0.0, scene.height() as f32 * unit]);
     let mut out = head.finish().into_vec();
-    out.extend_from_slice(format!("\n1 J 1 j\n1 g 0 0 {} {} re f\n", scene.width(), scene.height()).as_bytes());
+    out.extend_from_slice(
+        format!("\n1 J 1 j\n1 g 0 0 {} {} re f\n", scene.width(), scene.height()).as_bytes(),
+    );
     let mut opacity = 100;
     for item in &scene.items {
         let paint = paint_of(item);
@@ -192,7 +218,8 @@ fn drawing(scene: &Scene) -> Vec<u8> {
             Item::Dots { diameter, centres, .. } => {
                 out.extend_from_slice(format!("{colour} RG {diameter} w\n").as_bytes());
                 for c in centres {
-                    // ISO 32000-1, 8.5.3.2: a single-point closed path with round caps paints a disc.
+                    // ISO 32000-1, 8.5.3.2: a single-point closed path with round caps paints a
+                    // disc.
                     operator(&mut out, &[*c], b"m h\n");
                 }
                 out.extend_from_slice(b"S\n");

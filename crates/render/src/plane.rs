@@ -63,10 +63,12 @@ fn x_ticks(axis: &Axis, span: Span, length: i32) -> Ticks {
     let mut spacing = style::TICK_SPACING_X_PT;
     for _ in 0..4 {
         let ticks = ticks_of(axis, span, length, spacing);
-        let place = |v: f64| (scaled(axis, v) - span.lower) / (span.upper - span.lower) * f64::from(length);
+        let place =
+            |v: f64| (scaled(axis, v) - span.lower) / (span.upper - span.lower) * f64::from(length);
         let crowded = ticks.major.windows(2).any(|w| {
             let room = place(w[1].value) - place(w[0].value);
-            let half = text_width(&w[0].label, style::TICK_PT) + text_width(&w[1].label, style::TICK_PT);
+            let half =
+                text_width(&w[0].label, style::TICK_PT) + text_width(&w[1].label, style::TICK_PT);
             room < f64::from(half) / 2.0 + f64::from(units(5.0))
         });
         if !crowded {
@@ -76,7 +78,8 @@ fn x_ticks(axis: &Axis, span: Span, length: i32) -> Ticks {
     }
     // The fewest labels still touch: every second one.
     let mut ticks = ticks_of(axis, span, length, spacing);
-    let (kept, dropped): (Vec<_>, Vec<_>) = ticks.major.into_iter().enumerate().partition(|(i, _)| i % 2 == 0);
+    let (kept, dropped): (Vec<_>, Vec<_>) =
+        ticks.major.into_iter().enumerate().partition(|(i, _)| i % 2 == 0);
     ticks.major = kept.into_iter().map(|(_, tick)| tick).collect();
     ticks.minor.extend(dropped.into_iter().map(|(_, tick)| tick.value));
     ticks
@@ -86,11 +89,13 @@ fn y_ticks(axis: &Axis, span: Span, length: i32) -> Ticks {
     ticks_of(axis, span, length, style::TICK_SPACING_Y_PT)
 }
 
-/// Ranges of a panel over a drawing area of this size: with equal axes the shorter range is widened about its centre.
+/// Ranges of a panel over a drawing area of this size: with equal axes the shorter range is widened
+/// about its centre.
 fn spans(panel: &PlanePanel, w: i32, h: i32) -> (Span, Span) {
     let (mut x, mut y) = (span(&panel.x), span(&panel.y));
     if panel.equal {
-        let (per_x, per_y) = ((x.upper - x.lower) / f64::from(w), (y.upper - y.lower) / f64::from(h));
+        let (per_x, per_y) =
+            ((x.upper - x.lower) / f64::from(w), (y.upper - y.lower) / f64::from(h));
         let widen = |s: Span, length: i32, per: f64| {
             let (middle, half) = (0.5 * (s.lower + s.upper), 0.5 * per * f64::from(length));
             Span { lower: middle - half, upper: middle + half }
@@ -104,7 +109,8 @@ fn spans(panel: &PlanePanel, w: i32, h: i32) -> (Span, Span) {
     (x, y)
 }
 
-/// Height divided by width that suits a panel by itself: that of its ranges if a unit is equally long on both axes.
+/// Height divided by width that suits a panel by itself: that of its ranges if a unit is equally
+/// long on both axes.
 pub fn natural_aspect(panel: &PlanePanel) -> Option<f64> {
     panel.aspect.or_else(|| {
         let (x, y) = (span(&panel.x), span(&panel.y));
@@ -119,9 +125,18 @@ pub fn insets(panel: &PlanePanel, w: i32, h: i32) -> Insets {
     }
     let (x, y) = spans(panel, w, h);
     let [across, up] = panel.labelled;
-    let widest = y_ticks(&panel.y, y, h).major.iter().map(|t| text_width(&t.label, style::TICK_PT)).max().unwrap_or(0);
+    let widest = y_ticks(&panel.y, y, h)
+        .major
+        .iter()
+        .map(|t| text_width(&t.label, style::TICK_PT))
+        .max()
+        .unwrap_or(0);
     let y_title = if panel.y.title.is_empty() { 0 } else { units(style::LABEL_PT * 1.1) };
-    let x_title = if panel.x.title.is_empty() { 0 } else { units(3.5 + CAP_HEIGHT * style::LABEL_PT + DESCENT_PT) };
+    let x_title = if panel.x.title.is_empty() {
+        0
+    } else {
+        units(3.5 + CAP_HEIGHT * style::LABEL_PT + DESCENT_PT)
+    };
     // The last label of the horizontal axis may stand out by half its width.
     let ticks = x_ticks(&panel.x, x, w);
     let right = ticks.major.last().map_or(0, |t| {
@@ -164,7 +179,12 @@ pub fn draw(canvas: &Canvas, panel: &PlanePanel, rect: Rect) -> Result<(), Rende
     canvas.legend(&panel.legend, rect, panel.legend_corner)
 }
 
-fn draw_layer(canvas: &Canvas, chart: &mut Chart, panel: &PlanePanel, layer: &PlaneLayer) -> Result<(), RenderError> {
+fn draw_layer(
+    canvas: &Canvas,
+    chart: &mut Chart,
+    panel: &PlanePanel,
+    layer: &PlaneLayer,
+) -> Result<(), RenderError> {
     let convert = |p: &[f64; 2]| [scaled(&panel.x, p[0]), scaled(&panel.y, p[1])];
     match layer {
         PlaneLayer::Dots { points, style } => {
@@ -194,7 +214,11 @@ fn draw_layer(canvas: &Canvas, chart: &mut Chart, panel: &PlanePanel, layer: &Pl
         }
         PlaneLayer::Note(note) => {
             let at = convert(&note.at);
-            if at.iter().all(|v| v.is_finite()) { canvas.note(note, chart.position(&at)) } else { Ok(()) }
+            if at.iter().all(|v| v.is_finite()) {
+                canvas.note(note, chart.position(&at))
+            } else {
+                Ok(())
+            }
         }
     }
 }
@@ -210,7 +234,11 @@ fn draw_axes(
     let (major, minor) = (units(style::TICK_LENGTH_PT), units(style::MINOR_TICK_LENGTH_PT));
     let tick = |a: Position, b: Position| canvas.line(&[a, b], style::SOFT_INK, style::FRAME_PT);
     let values = |t: &Ticks| -> Vec<(f64, i32)> {
-        t.major.iter().map(|t| (t.value, major)).chain(t.minor.iter().map(|v| (*v, minor))).collect()
+        t.major
+            .iter()
+            .map(|t| (t.value, major))
+            .chain(t.minor.iter().map(|v| (*v, minor)))
+            .collect()
     };
     for (v, length) in values(xt) {
         let px = chart.position(&[scaled(&panel.x, v), y.lower]).0;
@@ -239,7 +267,11 @@ fn draw_axes(
     }
     for t in yt.major.iter().filter(|_| up) {
         let py = chart.position(&[x.lower, scaled(&panel.y, t.value)]).1;
-        canvas.text(&t.label, (rect.x - gap, py), TextFormat::new(style::TICK_PT).anchor(HPos::Right, VPos::Center))?;
+        canvas.text(
+            &t.label,
+            (rect.x - gap, py),
+            TextFormat::new(style::TICK_PT).anchor(HPos::Right, VPos::Center),
+        )?;
     }
     let room = insets(panel, rect.w, rect.h);
     let base = rect.bottom() + room.bottom - units(DESCENT_PT);

@@ -15,7 +15,12 @@ use super::seal::Sealed;
 pub const KEYWORD_PREFIX: &str = "twofold:";
 
 /// Writes pixels. Pictures of at most 256 colours are stored with a palette, others as RGB.
-pub fn write(pixels: &Pixels, title: &str, description: &str, sealed: &Sealed) -> Result<Vec<u8>, RenderError> {
+pub fn write(
+    pixels: &Pixels,
+    title: &str,
+    description: &str,
+    sealed: &Sealed,
+) -> Result<Vec<u8>, RenderError> {
     let mut info = Info::with_size(pixels.width, pixels.height);
     // 600 dpi is 23622 pixels per metre.
     let per_metre = (f64::from(DPI) / 0.0254).round() as u32;
@@ -56,8 +61,9 @@ pub(super) fn rgb(pixels: &Pixels) -> Vec<u8> {
 
 /// The compressed image data of rows of so many bytes.
 ///
-/// Rows are not filtered: drawings repeat whole stretches of pixels, and filters made for photographs hide that. Compressed here rather
-/// than by the PNG crate, whose compressor is chosen by cargo features that any dependency can turn on.
+/// Rows are not filtered: drawings repeat whole stretches of pixels, and filters made for
+/// photographs hide that. Compressed here rather than by the PNG crate, whose compressor is chosen
+/// by cargo features that any dependency can turn on.
 pub(super) fn image_stream(data: &[u8], row: usize) -> Vec<u8> {
     image_stream_at(data, row, LEVEL)
 }
@@ -94,7 +100,8 @@ pub(super) fn indexed(pixels: &Pixels) -> Option<(Vec<u8>, Vec<u8>)> {
         rank[*i] = position as u8;
     }
     indices.iter_mut().for_each(|i| *i = rank[usize::from(*i)]);
-    let palette = order.iter().flat_map(|i| table.colours[*i].to_be_bytes()[1..].to_vec()).collect();
+    let palette =
+        order.iter().flat_map(|i| table.colours[*i].to_be_bytes()[1..].to_vec()).collect();
     Some((palette, indices))
 }
 
@@ -129,7 +136,8 @@ impl ColourTable {
     }
 }
 
-/// The most pixels that are decoded: five times the largest picture that [`render`](super::render) makes.
+/// The most pixels that are decoded: five times the largest picture that [`render`](super::render)
+/// makes.
 const MOST_PIXELS: u64 = 1 << 26;
 
 /// Width and height as a PNG file's first bytes claim them; nothing else of the file is looked at.
@@ -139,10 +147,12 @@ pub fn png_size(bytes: &[u8]) -> Option<(u32, u32)> {
     Some((number(0)?, number(4)?))
 }
 
-/// Pixels of any PNG file, at eight bits per channel, as opaque RGBA where the file has no transparency.
+/// Pixels of any PNG file, at eight bits per channel, as opaque RGBA where the file has no
+/// transparency.
 ///
 /// # Errors
-/// If it is no PNG file, is damaged, has a palette that is none, or claims more than 67 million pixels: what it claims is checked before memory is asked for.
+/// If it is no PNG file, is damaged, has a palette that is none, or claims more than 67 million
+/// pixels: what it claims is checked before memory is asked for.
 pub fn decode_png(bytes: &[u8]) -> Result<Pixels, RenderError> {
     if let Some((width, height)) = png_size(bytes)
         && u64::from(width) * u64::from(height) > MOST_PIXELS
@@ -167,9 +177,13 @@ pub fn decode_png(bytes: &[u8]) -> Result<Pixels, RenderError> {
         ColorType::Rgba => data.to_vec(),
         ColorType::Rgb => data.chunks_exact(3).flat_map(|p| [p[0], p[1], p[2], 255]).collect(),
         ColorType::Grayscale => data.iter().flat_map(|g| [*g, *g, *g, 255]).collect(),
-        ColorType::GrayscaleAlpha => data.chunks_exact(2).flat_map(|p| [p[0], p[0], p[0], p[1]]).collect(),
+        ColorType::GrayscaleAlpha => {
+            data.chunks_exact(2).flat_map(|p| [p[0], p[0], p[0], p[1]]).collect()
+        }
         // `normalize_to_color8` expands palettes.
-        ColorType::Indexed => return Err(RenderError::Drawing("a palette was not expanded".to_owned())),
+        ColorType::Indexed => {
+            return Err(RenderError::Drawing("a palette was not expanded".to_owned()));
+        }
     };
     Ok(Pixels { width: frame.width, height: frame.height, rgba })
 }

@@ -1,7 +1,12 @@
 //! Clipping and thinning of polylines and polygons before they are drawn.
 
-/// Parts of a polyline inside a box, in any dimension (Liang & Barsky 1984). Vertices that are not finite break the line.
-pub fn clip<const N: usize>(points: &[[f64; N]], lower: [f64; N], upper: [f64; N]) -> Vec<Vec<[f64; N]>> {
+/// Parts of a polyline inside a box, in any dimension (Liang & Barsky 1984). Vertices that are not
+/// finite break the line.
+pub fn clip<const N: usize>(
+    points: &[[f64; N]],
+    lower: [f64; N],
+    upper: [f64; N],
+) -> Vec<Vec<[f64; N]>> {
     let mut parts: Vec<Vec<[f64; N]>> = Vec::new();
     let mut current: Vec<[f64; N]> = Vec::new();
     for pair in points.windows(2) {
@@ -70,8 +75,13 @@ fn clip_segment<const N: usize>(
     Some((at(enter), at(leave)))
 }
 
-/// The part of a polygon inside a box, in any dimension (Sutherland & Hodgman 1974). Empty if a corner is not finite.
-pub fn clip_polygon<const N: usize>(corners: &[[f64; N]], lower: [f64; N], upper: [f64; N]) -> Vec<[f64; N]> {
+/// The part of a polygon inside a box, in any dimension (Sutherland & Hodgman 1974). Empty if a
+/// corner is not finite.
+pub fn clip_polygon<const N: usize>(
+    corners: &[[f64; N]],
+    lower: [f64; N],
+    upper: [f64; N],
+) -> Vec<[f64; N]> {
     if !corners.iter().flatten().all(|v| v.is_finite()) {
         return Vec::new();
     }
@@ -98,8 +108,9 @@ pub fn clip_polygon<const N: usize>(corners: &[[f64; N]], lower: [f64; N], upper
     polygon
 }
 
-/// Leaves out vertices that lie within `tolerance` of the line drawn without them (Douglas & Peucker 1973), judged by `at`, their place
-/// on the sheet. The first and the last stay. Long lines are first cut into pieces, which bounds the work.
+/// Leaves out vertices that lie within `tolerance` of the line drawn without them (Douglas &
+/// Peucker 1973), judged by `at`, their place on the sheet. The first and the last stay. Long lines
+/// are first cut into pieces, which bounds the work.
 pub fn thin<P: Copy>(points: &[P], tolerance: f64, at: impl Fn(&P) -> [f64; 2]) -> Vec<P> {
     const PIECE: usize = 512;
     if points.len() < 3 {
@@ -147,12 +158,17 @@ pub fn thin<P: Copy>(points: &[P], tolerance: f64, at: impl Fn(&P) -> [f64; 2]) 
 fn distance_squared(p: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
     let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
     let length = dx * dx + dy * dy;
-    let t = if length > 0.0 { (((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / length).clamp(0.0, 1.0) } else { 0.0 };
+    let t = if length > 0.0 {
+        (((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / length).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
     let (ex, ey) = (a[0] + t * dx - p[0], a[1] + t * dy - p[1]);
     ex * ex + ey * ey
 }
 
-/// Cuts a polyline into dashes of length `on` separated by gaps of length `off`, measured by `at`; `between` interpolates.
+/// Cuts a polyline into dashes of length `on` separated by gaps of length `off`, measured by `at`;
+/// `between` interpolates.
 pub fn dashes(points: &[[f64; 2]], on: f64, off: f64) -> Vec<Vec<[f64; 2]>> {
     let mut parts = Vec::new();
     let Some(first) = points.first() else { return parts };
@@ -208,7 +224,8 @@ mod tests {
 
     #[test]
     fn a_vertex_that_is_no_number_breaks_the_line() {
-        let parts = clip(&[[0.1, 0.1], [0.2, 0.2], [f64::NAN, 0.3], [0.4, 0.4], [0.5, 0.4]], LOWER, UPPER);
+        let parts =
+            clip(&[[0.1, 0.1], [0.2, 0.2], [f64::NAN, 0.3], [0.4, 0.4], [0.5, 0.4]], LOWER, UPPER);
         assert_eq!(parts.len(), 2);
     }
 
@@ -225,12 +242,17 @@ mod tests {
 
     #[test]
     fn thinning_stays_within_its_tolerance() {
-        let curve: Vec<[f64; 2]> =
-            (0..20_000).map(|i| f64::from(i) * 1e-3).map(|t| [t, elementary::sin(3.0 * t)]).collect();
+        let curve: Vec<[f64; 2]> = (0..20_000)
+            .map(|i| f64::from(i) * 1e-3)
+            .map(|t| [t, elementary::sin(3.0 * t)])
+            .collect();
         let thinned = thin(&curve, 1e-3, |p| *p);
         assert!(thinned.len() < 1500, "{}", thinned.len());
         for p in &curve {
-            let nearest = thinned.windows(2).map(|w| distance_squared(*p, w[0], w[1])).fold(f64::INFINITY, f64::min);
+            let nearest = thinned
+                .windows(2)
+                .map(|w| distance_squared(*p, w[0], w[1]))
+                .fold(f64::INFINITY, f64::min);
             assert!(nearest <= 1.6e-3 * 1.6e-3, "{nearest}");
         }
     }

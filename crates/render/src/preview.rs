@@ -1,4 +1,5 @@
-//! Smaller versions of pictures, for pages that show many of them. Whole numbers all the way: the same bytes on every machine.
+//! Smaller versions of pictures, for pages that show many of them. Whole numbers all the way: the
+//! same bytes on every machine.
 
 use png::{BitDepth, ColorType, Encoder, Info, chunk};
 
@@ -14,12 +15,15 @@ pub enum Shrink {
     Strongest,
 }
 
-/// The picture at most `width` pixels wide, in its proportions; one that is not wider comes back as it is.
+/// The picture at most `width` pixels wide, in its proportions; one that is not wider comes back as
+/// it is.
 pub fn shrunk(pixels: &Pixels, width: u32, how: Shrink) -> Pixels {
     if pixels.width <= width || width == 0 || pixels.height == 0 {
         return pixels.clone();
     }
-    let height = (u64::from(pixels.height) * u64::from(width)).div_ceil(u64::from(pixels.width)).max(1) as u32;
+    let height = (u64::from(pixels.height) * u64::from(width))
+        .div_ceil(u64::from(pixels.width))
+        .max(1) as u32;
     let (columns, rows) = (shares(pixels.width, width), shares(pixels.height, height));
     let area = u64::from(pixels.width) * u64::from(pixels.height);
     let mut rgba = Vec::with_capacity(4 * width as usize * height as usize);
@@ -49,7 +53,9 @@ pub fn shrunk(pixels: &Pixels, width: u32, how: Shrink) -> Pixels {
                 Shrink::Strongest => row
                     .iter()
                     .flat_map(|(y, _)| column.iter().map(move |(x, _)| y * stride + 4 * x))
-                    .map(|start| [pixels.rgba[start], pixels.rgba[start + 1], pixels.rgba[start + 2]])
+                    .map(|start| {
+                        [pixels.rgba[start], pixels.rgba[start + 1], pixels.rgba[start + 2]]
+                    })
                     .max_by_key(|c| c.iter().map(|v| u32::from(255 - v)).sum::<u32>())
                     .unwrap_or([255; 3]),
             };
@@ -59,7 +65,8 @@ pub fn shrunk(pixels: &Pixels, width: u32, how: Shrink) -> Pixels {
     Pixels { width, height, rgba }
 }
 
-/// For each of `to` cells, the pixels out of `from` that it covers and how much of each, in units of 1/`to` of a pixel.
+/// For each of `to` cells, the pixels out of `from` that it covers and how much of each, in units
+/// of 1/`to` of a pixel.
 fn shares(from: u32, to: u32) -> Vec<Vec<(usize, u64)>> {
     let (from, to) = (u64::from(from), u64::from(to));
     (0..to)
@@ -71,7 +78,8 @@ fn shares(from: u32, to: u32) -> Vec<Vec<(usize, u64)>> {
         .collect()
 }
 
-/// The pixels as a PNG file for looking at: sixteen levels a channel, and a palette where 256 colours are enough. No metadata.
+/// The pixels as a PNG file for looking at: sixteen levels a channel, and a palette where 256
+/// colours are enough. No metadata.
 ///
 /// # Errors
 ///
@@ -98,7 +106,8 @@ pub fn encode_preview(pixels: &Pixels) -> Result<Vec<u8>, RenderError> {
     Ok(file)
 }
 
-/// Effort of compression: the highest levels take a sixth of the report's time to make its page a hundredth smaller.
+/// Effort of compression: the highest levels take a sixth of the report's time to make its page a
+/// hundredth smaller.
 const EFFORT: u8 = 6;
 
 #[cfg(test)]
@@ -108,7 +117,11 @@ mod tests {
 
     fn checkered(width: u32, height: u32) -> Pixels {
         let value = |i: u32| if (i % width + i / width).is_multiple_of(2) { 255 } else { 0 };
-        Pixels { width, height, rgba: (0..width * height).flat_map(|i| [value(i), value(i), value(i), 255]).collect() }
+        Pixels {
+            width,
+            height,
+            rgba: (0..width * height).flat_map(|i| [value(i), value(i), value(i), 255]).collect(),
+        }
     }
 
     #[test]
@@ -117,7 +130,11 @@ mod tests {
         assert_eq!((half.width, half.height), (4, 2));
         assert!(half.rgba.chunks(4).all(|p| p == [128, 128, 128, 255]), "{half:?}");
         // Three pixels become two: each keeps one whole and half of the middle one.
-        let three = Pixels { width: 3, height: 1, rgba: vec![0, 0, 0, 255, 90, 90, 90, 255, 240, 240, 240, 255] };
+        let three = Pixels {
+            width: 3,
+            height: 1,
+            rgba: vec![0, 0, 0, 255, 90, 90, 90, 255, 240, 240, 240, 255],
+        };
         let two = shrunk(&three, 2, Shrink::Mean);
         assert_eq!((two.rgba[0], two.rgba[4]), (30, 190));
         assert_eq!(shrunk(&three, 3, Shrink::Mean), three);
@@ -134,11 +151,17 @@ mod tests {
 
     #[test]
     fn previews_are_read_back_within_half_a_level() {
-        let grey = Pixels { width: 256, height: 1, rgba: (0..=255u8).flat_map(|v| [v, v, v, 255]).collect() };
+        let grey = Pixels {
+            width: 256,
+            height: 1,
+            rgba: (0..=255u8).flat_map(|v| [v, v, v, 255]).collect(),
+        };
         let colourful = Pixels {
             width: 64,
             height: 64,
-            rgba: (0..4096u32).flat_map(|i| [(i * 5) as u8, (i * 11) as u8, (i / 16) as u8, 255]).collect(),
+            rgba: (0..4096u32)
+                .flat_map(|i| [(i * 5) as u8, (i * 11) as u8, (i / 16) as u8, 255])
+                .collect(),
         };
         for pixels in [grey, colourful] {
             let back = decode_png(&encode_preview(&pixels).unwrap()).unwrap();

@@ -45,7 +45,10 @@ pub enum ProvenanceError {
     #[error("the file is neither PNG nor SVG nor PDF")]
     UnknownFormat,
     /// Nothing in it was written by this program.
-    #[error("the file carries no provenance of twofold: it was made by another program, or that part was removed")]
+    #[error(
+        "the file carries no provenance of twofold: it was made by another program, or that part \
+            was removed"
+    )]
     Foreign,
     /// It has been cut off or damaged.
     #[error("the file's provenance is damaged")]
@@ -68,7 +71,8 @@ fn put_seal(file: &mut [u8], format: Format, at: usize, seal: &[u8]) {
         let holder = chunks(file).find(|c| c.start <= at && at < c.start + c.length);
         if let Some(chunk) = holder {
             let sum = crc32(&file[chunk.start - 4..chunk.start + chunk.length]);
-            file[chunk.start + chunk.length..chunk.start + chunk.length + 4].copy_from_slice(&sum.to_be_bytes());
+            file[chunk.start + chunk.length..chunk.start + chunk.length + 4]
+                .copy_from_slice(&sum.to_be_bytes());
         }
     }
 }
@@ -94,11 +98,16 @@ fn seal_position(file: &[u8], format: Format) -> Option<usize> {
     let (open, from) = match format {
         Format::Png => {
             let keyword = format!("{}{SEAL_KEY}\0\0\0\0\0", png_file::KEYWORD_PREFIX);
-            let chunk = chunks(file).find(|c| &c.kind == b"iTXt" && c.data(file).starts_with(keyword.as_bytes()))?;
-            return (chunk.length == keyword.len() + SEAL_LENGTH).then_some(chunk.start + keyword.len());
+            let chunk = chunks(file)
+                .find(|c| &c.kind == b"iTXt" && c.data(file).starts_with(keyword.as_bytes()))?;
+            return (chunk.length == keyword.len() + SEAL_LENGTH)
+                .then_some(chunk.start + keyword.len());
         }
         Format::Svg => (format!("<entry key=\"{SEAL_KEY}\">"), 0),
-        Format::Pdf => (format!("[\"{SEAL_KEY}\",\""), find(file, format!("/{}", pdf::INFO_KEY).as_bytes(), 0)?),
+        Format::Pdf => (
+            format!("[\"{SEAL_KEY}\",\""),
+            find(file, format!("/{}", pdf::INFO_KEY).as_bytes(), 0)?,
+        ),
     };
     let at = find(file, open.as_bytes(), from)? + open.len();
     (at + SEAL_LENGTH <= file.len()).then_some(at)
@@ -127,7 +136,8 @@ fn is_intact(bytes: &[u8], format: Format) -> bool {
     let mut blank = bytes.to_vec();
     put_seal(&mut blank, format, at, BLANK.as_bytes());
     let Ok(fresh) = seal(blank) else { return false };
-    // Comparing the whole file, not only the seal, also checks the checksum of the seal's own chunk.
+    // Comparing the whole file, not only the seal, also checks the checksum of the seal's own
+    // chunk.
     fresh == bytes && fresh[at..at + SEAL_LENGTH] == found[..]
 }
 
@@ -164,7 +174,8 @@ fn png_entries(bytes: &[u8]) -> Result<Vec<(String, String)>, ProvenanceError> {
     for chunk in chunks(bytes).filter(|c| &c.kind == b"iTXt") {
         let data = chunk.data(bytes);
         let Some(rest) = data.strip_prefix(png_file::KEYWORD_PREFIX.as_bytes()) else { continue };
-        // Keyword, then compression flag and method, language and translated keyword (both empty), each ended by a zero byte.
+        // Keyword, then compression flag and method, language and translated keyword (both empty),
+        // each ended by a zero byte.
         let end = rest.iter().position(|b| *b == 0).ok_or(ProvenanceError::Damaged)?;
         let text = rest[end..].strip_prefix(b"\0\0\0\0\0").ok_or(ProvenanceError::Damaged)?;
         let string = |b: &[u8]| String::from_utf8(b.to_vec()).map_err(|_| ProvenanceError::Damaged);
@@ -181,7 +192,8 @@ fn svg_entries(bytes: &[u8]) -> Result<Vec<(String, String)>, ProvenanceError> {
     text.lines()
         .filter(|l| !l.is_empty())
         .map(|line| {
-            let (key, value) = line.strip_prefix("<entry key=\"")?.strip_suffix("</entry>")?.split_once("\">")?;
+            let (key, value) =
+                line.strip_prefix("<entry key=\"")?.strip_suffix("</entry>")?.split_once("\">")?;
             Some((unescape(key), unescape(value)))
         })
         .collect::<Option<_>>()
@@ -209,7 +221,8 @@ fn pdf_entries(bytes: &[u8]) -> Result<Vec<(String, String)>, ProvenanceError> {
         match bytes.get(at).ok_or(ProvenanceError::Damaged)? {
             b'\\' => {
                 at += 1;
-                // Only backslash and parentheses are ever escaped: JSON in ASCII holds no control characters.
+                // Only backslash and parentheses are ever escaped: JSON in ASCII holds no control
+                // characters.
                 json.push(*bytes.get(at).ok_or(ProvenanceError::Damaged)?);
             }
             b')' if depth == 0 => break,
@@ -253,7 +266,10 @@ mod tests {
         assert_eq!(find(b"abc", b"abc", 9), None);
         // A picture's beginning tells that it is an SVG: its first 1024 bytes.
         let later = |n: usize| format_of(&[&vec![b' '; n][..], b"<svg"].concat());
-        assert_eq!((later(1020), later(1021)), (Ok(Format::Svg), Err(ProvenanceError::UnknownFormat)));
+        assert_eq!(
+            (later(1020), later(1021)),
+            (Ok(Format::Svg), Err(ProvenanceError::UnknownFormat))
+        );
     }
 
     #[test]
@@ -273,13 +289,18 @@ mod tests {
 
     #[test]
     fn chunks_end_where_they_say() {
-        let chunk = |length: u32, data: &[u8]| [&length.to_be_bytes()[..], b"iTXt", data, b"crc!"].concat();
+        let chunk =
+            |length: u32, data: &[u8]| [&length.to_be_bytes()[..], b"iTXt", data, b"crc!"].concat();
         let file = |parts: &[Vec<u8>]| [b"\x89PNG\r\n\x1a\n".to_vec(), parts.concat()].concat();
         let lengths = |file: &[u8]| chunks(file).map(|c| (c.start, c.length)).collect::<Vec<_>>();
         assert_eq!(lengths(&file(&[chunk(3, b"abc"), chunk(0, b"")])), [(16, 3), (31, 0)]);
         assert_eq!(lengths(&file(&[chunk(4, b"abc")])), [], "it claims a byte more than there is");
         assert_eq!(lengths(&file(&[chunk(u32::MAX, b"abc")])), []);
-        assert_eq!(lengths(&file(&[chunk(2, b"ab"), vec![0; 7]])), [(16, 2)], "half a head is no chunk");
+        assert_eq!(
+            lengths(&file(&[chunk(2, b"ab"), vec![0; 7]])),
+            [(16, 2)],
+            "half a head is no chunk"
+        );
     }
 
     #[test]
@@ -287,7 +308,10 @@ mod tests {
         assert_eq!(read_provenance(b""), Err(ProvenanceError::UnknownFormat));
         assert_eq!(read_provenance(b"\x89PNG\r\n\x1a\n\0\0\0"), Err(ProvenanceError::Foreign));
         assert_eq!(read_provenance(b"<svg></svg>"), Err(ProvenanceError::Foreign));
-        assert_eq!(read_provenance(b"%PDF-1.7\n/TwofoldProvenance (["), Err(ProvenanceError::Damaged));
+        assert_eq!(
+            read_provenance(b"%PDF-1.7\n/TwofoldProvenance (["),
+            Err(ProvenanceError::Damaged)
+        );
         assert_eq!(read_provenance(b"%PDF-1.7\n/TwofoldProvenance"), Err(ProvenanceError::Damaged));
     }
 }

@@ -1,9 +1,13 @@
 //! A [`Scene`] as pixels, anti-aliased.
 //!
-//! Only straight lines reach the rasteriser: curves are divided here, because its own treatment of cubics may call the platform's
-//! trigonometry. Dots are stamped from masks computed in integers, which is also what makes many of them cheap.
+//! Only straight lines reach the rasteriser: curves are divided here, because its own treatment of
+//! cubics may call the platform's trigonometry. Dots are stamped from masks computed in integers,
+//! which is also what makes many of them cheap.
 
-use tiny_skia::{Color, FillRule, LineCap, LineJoin, Paint as SkPaint, Path, PathBuilder, Pixmap, Stroke, Transform};
+use tiny_skia::{
+    Color, FillRule, LineCap, LineJoin, Paint as SkPaint, Path, PathBuilder, Pixmap, Stroke,
+    Transform,
+};
 
 use super::scene::{Item, Paint, Position, Scene, Segment, UNITS_PER_PIXEL};
 use super::sheet::Colour;
@@ -28,7 +32,13 @@ pub fn rasterise(scene: &Scene) -> Option<Pixels> {
         match item {
             Item::Fill { paint, path, .. } => {
                 if let Some(path) = outline(path) {
-                    pixmap.fill_path(&path, &ink(*paint), FillRule::Winding, Transform::identity(), None);
+                    pixmap.fill_path(
+                        &path,
+                        &ink(*paint),
+                        FillRule::Winding,
+                        Transform::identity(),
+                        None,
+                    );
                 }
             }
             Item::Stroke { paint, width, lines } => {
@@ -43,7 +53,9 @@ pub fn rasterise(scene: &Scene) -> Option<Pixels> {
                 }
             }
             Item::Dots { paint, diameter, centres } => {
-                let known = stamps.iter().position(|s| (s.diameter, s.opacity) == (*diameter, paint.opacity));
+                let known = stamps
+                    .iter()
+                    .position(|s| (s.diameter, s.opacity) == (*diameter, paint.opacity));
                 let known = known.unwrap_or_else(|| {
                     stamps.push(Stamp::new(*diameter, paint.opacity));
                     stamps.len() - 1
@@ -111,23 +123,36 @@ fn outline(path: &[Segment]) -> Option<Path> {
 }
 
 /// Points on a cubic, close enough together that the chords look smooth.
-fn divide(from: Position, a: Position, b: Position, to: Position) -> impl Iterator<Item = (f32, f32)> {
+fn divide(
+    from: Position,
+    a: Position,
+    b: Position,
+    to: Position,
+) -> impl Iterator<Item = (f32, f32)> {
     let [p0, p1, p2, p3] = [from, a, b, to].map(|p| {
         let (x, y) = pixel(p);
         [x, y]
     });
     // The distance between curve and chord shrinks with the square of the number of parts.
-    let bend: f32 = (0..2).map(|i| (p0[i] - 2.0 * p1[i] + p2[i]).abs() + (p1[i] - 2.0 * p2[i] + p3[i]).abs()).sum();
+    let bend: f32 = (0..2)
+        .map(|i| (p0[i] - 2.0 * p1[i] + p2[i]).abs() + (p1[i] - 2.0 * p2[i] + p3[i]).abs())
+        .sum();
     let parts = ((bend * 4.0).sqrt().ceil() as usize).clamp(2, 64);
     (1..=parts).map(move |k| {
         let t = k as f32 / parts as f32;
         let s = 1.0 - t;
-        let at = |i: usize| s * s * s * p0[i] + 3.0 * s * s * t * p1[i] + 3.0 * s * t * t * p2[i] + t * t * t * p3[i];
+        let at = |i: usize| {
+            s * s * s * p0[i]
+                + 3.0 * s * s * t * p1[i]
+                + 3.0 * s * t * t * p2[i]
+                + t * t * t * p3[i]
+        };
         (at(0), at(1))
     })
 }
 
-/// Masks of discs of one size and opacity, one for each position of the centre within a pixel, made when first needed.
+/// Masks of discs of one size and opacity, one for each position of the centre within a pixel, made
+/// when first needed.
 struct Stamp {
     diameter: i32,
     opacity: u8,
@@ -146,8 +171,10 @@ impl Stamp {
         let data = pixmap.data_mut();
         let ink = [colour.r, colour.g, colour.b].map(u32::from);
         for centre in centres {
-            let (px, py) = (centre.0.div_euclid(UNITS_PER_PIXEL), centre.1.div_euclid(UNITS_PER_PIXEL));
-            let (fx, fy) = (centre.0.rem_euclid(UNITS_PER_PIXEL), centre.1.rem_euclid(UNITS_PER_PIXEL));
+            let (px, py) =
+                (centre.0.div_euclid(UNITS_PER_PIXEL), centre.1.div_euclid(UNITS_PER_PIXEL));
+            let (fx, fy) =
+                (centre.0.rem_euclid(UNITS_PER_PIXEL), centre.1.rem_euclid(UNITS_PER_PIXEL));
             let mask = self.masks[(fy * UNITS_PER_PIXEL + fx) as usize]
                 .get_or_insert_with(|| Mask::new(fx, fy, self.diameter, self.opacity));
             let left = px + mask.first;
@@ -163,12 +190,15 @@ impl Stamp {
                 }
                 let start = 4 * (y * width + left + from) as usize;
                 let line = &mut data[start..start + 4 * (to - from) as usize];
-                for (pixel, cover) in line.chunks_exact_mut(4).zip(&cover[from as usize..to as usize]) {
+                for (pixel, cover) in
+                    line.chunks_exact_mut(4).zip(&cover[from as usize..to as usize])
+                {
                     if *cover == 0 {
                         continue;
                     }
                     for (under, ink) in pixel.iter_mut().zip(ink) {
-                        *under = ((u32::from(*under) * (255 - cover) + ink * cover + 127) / 255) as u8;
+                        *under =
+                            ((u32::from(*under) * (255 - cover) + ink * cover + 127) / 255) as u8;
                     }
                 }
             }
@@ -192,7 +222,8 @@ impl Mask {
         let samples = (UNITS_PER_PIXEL * UNITS_PER_PIXEL) as u32;
         for row in 0..side {
             for column in 0..side {
-                // Twice the distances from the centre of the disc to the centre of each unit, so that all is whole.
+                // Twice the distances from the centre of the disc to the centre of each unit, so
+                // that all is whole.
                 let origin = |first: i32, f: i32| 2 * ((first) * UNITS_PER_PIXEL - f) + 1;
                 let (x0, y0) = (origin(first + column, fx), origin(first + row, fy));
                 let mut inside = 0u32;

@@ -84,7 +84,8 @@ pub fn set(source: &str, base: FontFace) -> Result<Line, RichTextError> {
     Ok(setter.line)
 }
 
-/// A script or group that is open: the size and rise of what surrounds it, and whether it is a script.
+/// A script or group that is open: the size and rise of what surrounds it, and whether it is a
+/// script.
 struct Around {
     scale: f64,
     rise: f64,
@@ -130,8 +131,8 @@ impl Setter<'_> {
             (true, _) => FontFace::Italic,
             (false, base) => base,
         };
-        let glyph =
-            font::glyph(face, c).ok_or_else(|| RichTextError::Glyph { text: self.source.to_owned(), character: c })?;
+        let glyph = font::glyph(face, c)
+            .ok_or_else(|| RichTextError::Glyph { text: self.source.to_owned(), character: c })?;
         if let Some(previous) = self.previous {
             self.pen += font::kern(previous, glyph) * scale;
             let leans = |g: Glyph| matches!(g.face, FontFace::Italic | FontFace::BoldItalic);
@@ -181,13 +182,15 @@ impl Line {
     }
 }
 
-/// Width in points of a text at a font size, or zero for a text that cannot be set (which drawing it then reports).
+/// Width in points of a text at a font size, or zero for a text that cannot be set (which drawing
+/// it then reports).
 pub fn width(source: &str, face: FontFace, size: f64) -> f64 {
     set(source, face).map_or(0.0, |line| line.width * size)
 }
 
-/// Breaks a text at spaces outside braces into lines no wider than `limit` points. A single long word stays whole. An italic passage
-/// must not contain a break; each line has to be complete markup, so a break inside one is not taken.
+/// Breaks a text at spaces outside braces into lines no wider than `limit` points. A single long
+/// word stays whole. An italic passage must not contain a break; each line has to be complete
+/// markup, so a break inside one is not taken.
 pub fn wrap(source: &str, face: FontFace, size: f64, limit: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     let mut current = String::new();
@@ -245,13 +248,17 @@ mod tests {
         assert!(matches!(set("a}", FontFace::Regular), Err(RichTextError::Braces { .. })));
         assert!(matches!(set("a^", FontFace::Regular), Err(RichTextError::Braces { .. })));
         assert!(matches!(set("*a", FontFace::Regular), Err(RichTextError::Italic { .. })));
-        assert!(matches!(set("\u{4e2d}", FontFace::Regular), Err(RichTextError::Glyph { character: '\u{4e2d}', .. })));
+        assert!(matches!(
+            set("\u{4e2d}", FontFace::Regular),
+            Err(RichTextError::Glyph { character: '\u{4e2d}', .. })
+        ));
         assert_eq!(plain("\\*\\{\\_"), "*{_");
     }
 
     #[test]
     fn wrapping_keeps_every_word_and_the_limit() {
-        let text = "reading printed, *α* = 10^{-3}, *β* = 10^{-5}, *ε* = 10^{-3}, *t* = 2×10^{5}, restart every 20";
+        let text = "reading printed, *α* = 10^{-3}, *β* = 10^{-5}, *ε* = 10^{-3}, *t* = 2×10^{5}, \
+            restart every 20";
         let lines = wrap(text, FontFace::Regular, 7.0, 120.0);
         assert!(lines.len() > 1);
         assert_eq!(lines.join(" "), text);

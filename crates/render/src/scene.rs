@@ -1,8 +1,10 @@
-//! The device-independent drawing: a list of filled paths, strokes, dots and set text in whole units of 1/50 point.
+//! The device-independent drawing: a list of filled paths, strokes, dots and set text in whole
+//! units of 1/50 point.
 //!
-//! Everything that decides where ink lies happens before or in this list; the writers for PNG, SVG and PDF only translate it. That
-//! is what makes the three files the same picture. Coordinates are integers, six to a pixel at 600 dpi, so that the formats
-//! round alike and the vector files stay small.
+//! Everything that decides where ink lies happens before or in this list; the writers for PNG, SVG
+//! and PDF only translate it. That is what makes the three files the same picture. Coordinates are
+//! integers, six to a pixel at 600 dpi, so that the formats round alike and the vector files stay
+//! small.
 
 use super::sheet::Colour;
 
@@ -68,7 +70,8 @@ impl Words {
     }
 }
 
-/// Something drawn. An item is painted as a whole: where its parts overlap, opacity does not add up.
+/// Something drawn. An item is painted as a whole: where its parts overlap, opacity does not add
+/// up.
 #[derive(Clone, Debug)]
 pub enum Item {
     /// Outlines filled by the non-zero rule: polygons and glyphs.
@@ -127,8 +130,8 @@ impl Scene {
         self.height_px as i32 * UNITS_PER_PIXEL
     }
 
-    /// Adds a polygon, to the last item if that has the same paint. All polygons are turned the same way round, so that neighbours
-    /// merge without a seam.
+    /// Adds a polygon, to the last item if that has the same paint. All polygons are turned the
+    /// same way round, so that neighbours merge without a seam.
     pub fn polygon(&mut self, paint: Paint, mut corners: Vec<Position>) {
         corners.dedup();
         if corners.len() > 1 && corners.first() == corners.last() {
@@ -158,7 +161,8 @@ impl Scene {
     pub fn polyline(&mut self, paint: Paint, width: i32, mut line: Vec<Position>) {
         line.dedup();
         if line.len() == 1 {
-            // A polyline that has shrunk to a point would be drawn by some renderers and not by others.
+            // A polyline that has shrunk to a point would be drawn by some renderers and not by
+            // others.
             return self.dot(paint, width, line[0]);
         }
         if line.is_empty() {
@@ -184,8 +188,8 @@ impl Scene {
         self.items.push(Item::Dots { paint, diameter, centres: vec![centre] });
     }
 
-    /// Draws the contours of a path in white, as a margin for what is then filled. Curves are followed by four chords, so that no
-    /// renderer has to stroke a curve.
+    /// Draws the contours of a path in white, as a margin for what is then filled. Curves are
+    /// followed by four chords, so that no renderer has to stroke a curve.
     pub fn halo(&mut self, path: &[Segment], width: i32) {
         let paint = Paint { colour: super::style::WHITE, opacity: 85 };
         let mut contour: Vec<Position> = Vec::new();
@@ -199,7 +203,10 @@ impl Scene {
                         let (t, s) = (k, 4 - k);
                         let at = |f: fn(Position) -> i32| {
                             let [p0, p1, p2, p3] = [from, a, b, p].map(|q| i64::from(f(q)));
-                            let sum = s * s * s * p0 + 3 * s * s * t * p1 + 3 * s * t * t * p2 + t * t * t * p3;
+                            let sum = s * s * s * p0
+                                + 3 * s * s * t * p1
+                                + 3 * s * t * t * p2
+                                + t * t * t * p3;
                             ((sum + 32).div_euclid(64)) as i32
                         };
                         contour.push((at(|q| q.0), at(|q| q.1)));

@@ -1,5 +1,5 @@
-//! Provenance as it is written into a file, whatever the file's format. How it is found and checked again is
-//! [`provenance`](super::provenance)'s.
+//! Provenance as it is written into a file, whatever the file's format. How it is found and checked
+//! again is [`provenance`](super::provenance)'s.
 
 /// Key under which the seal is kept.
 pub const SEAL_KEY: &str = "seal-sha256";

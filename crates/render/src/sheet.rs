@@ -1,7 +1,7 @@
 //! A picture as plain data: what is drawn, with no knowledge of models and none of file formats.
 //!
-//! A [`Sheet`] is a grid of panels at the printed width of a journal column. Every text is rich text (see
-//! `rich_text`): `*x*` is italic, `10^{-3}` a superscript, `v_{+}` a subscript.
+//! A [`Sheet`] is a grid of panels at the printed width of a journal column. Every text is rich
+//! text (see `rich_text`): `*x*` is italic, `10^{-3}` a superscript, `v_{+}` a subscript.
 
 pub use super::colour::Colour;
 use super::style;
@@ -28,7 +28,8 @@ pub struct Sheet {
     pub columns: usize,
     /// Panels, row by row.
     pub panels: Vec<SheetPanel>,
-    /// Height of a panel's drawing area divided by its width, for panels that do not fix it themselves.
+    /// Height of a panel's drawing area divided by its width, for panels that do not fix it
+    /// themselves.
     pub panel_aspect: f64,
     /// Legend shared by all panels, set in one row below them.
     pub legend: Vec<LegendEntry>,
@@ -38,10 +39,12 @@ pub struct Sheet {
     pub banner: Option<String>,
     /// What the picture shows, for readers who cannot see it.
     pub description: String,
-    /// Where the picture comes from, as ordered (key, value) pairs; written into each file, not drawn.
+    /// Where the picture comes from, as ordered (key, value) pairs; written into each file, not
+    /// drawn.
     pub provenance: Vec<(String, String)>,
-    /// Whether the SVG file says its words a second time as invisible text, which programs can search and copy. Outlines alone need no font anywhere
-    /// and are the default; the PDF file always has its words.
+    /// Whether the SVG file says its words a second time as invisible text, which programs can
+    /// search and copy. Outlines alone need no font anywhere and are the default; the PDF file
+    /// always has its words.
     pub searchable_svg: bool,
 }
 
@@ -65,7 +68,12 @@ impl Sheet {
     }
 
     /// Adds a panel.
-    pub fn panel(mut self, label: impl Into<String>, title: impl Into<String>, content: impl Into<Content>) -> Self {
+    pub fn panel(
+        mut self,
+        label: impl Into<String>,
+        title: impl Into<String>,
+        content: impl Into<Content>,
+    ) -> Self {
         self.panels.push(SheetPanel {
             label: label.into(),
             title: title.into(),
@@ -446,7 +454,9 @@ impl PlaneLayer {
     /// All positions of the layer.
     pub fn positions(&self) -> &[[f64; 2]] {
         match self {
-            Self::Dots { points, .. } | Self::Line { points, .. } | Self::Markers { points, .. } => points,
+            Self::Dots { points, .. }
+            | Self::Line { points, .. }
+            | Self::Markers { points, .. } => points,
             Self::Area { outline, .. } => outline,
             Self::Note(note) => std::slice::from_ref(&note.at),
         }
@@ -464,7 +474,8 @@ pub struct PlanePanel {
     pub equal: bool,
     /// Whether the axes are drawn.
     pub axes: bool,
-    /// Whether the horizontal axis has numbers and a title, and the vertical one: panels that share an axis say it once.
+    /// Whether the horizontal axis has numbers and a title, and the vertical one: panels that share
+    /// an axis say it once.
     pub labelled: [bool; 2],
     /// Whether grid lines are drawn at the major ticks.
     pub grid: bool,
@@ -626,8 +637,8 @@ impl SpaceLayer {
     }
 }
 
-/// A chart in space, seen in orthographic projection. The first two axes are horizontal, the third points up; all are linear. Curves and
-/// surfaces are cut off at the box.
+/// A chart in space, seen in orthographic projection. The first two axes are horizontal, the third
+/// points up; all are linear. Curves and surfaces are cut off at the box.
 #[derive(Clone, Debug)]
 pub struct SpacePanel {
     /// The two horizontal axes and the upright one.
@@ -640,7 +651,8 @@ pub struct SpacePanel {
     pub elevation: f64,
     /// Whether box, grid, ticks and axis titles are drawn.
     pub boxed: bool,
-    /// Height divided by width of the drawing area; if absent, what the box needs, at most the sheet's.
+    /// Height divided by width of the drawing area; if absent, what the box needs, at most the
+    /// sheet's.
     pub aspect: Option<f64>,
     /// What is drawn.
     pub layers: Vec<SpaceLayer>,
@@ -728,8 +740,8 @@ impl SpacePanel {
     }
 }
 
-/// The patches of a surface given by a function on a grid of `nu` by `nv` cells over `u` and `v`, coloured by the cell's centre.
-/// `point(u, v)` gives the position, `colour(u, v)` the region.
+/// The patches of a surface given by a function on a grid of `nu` by `nv` cells over `u` and `v`,
+/// coloured by the cell's centre. `point(u, v)` gives the position, `colour(u, v)` the region.
 pub fn grid_surface(
     (u0, u1, nu): (f64, f64, usize),
     (v0, v1, nv): (f64, f64, usize),

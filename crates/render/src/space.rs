@@ -1,8 +1,9 @@
 //! Charts in space: orthographic projection, box, surfaces, and curves ordered by depth.
 //!
-//! What hides what is decided by a depth buffer of the surfaces alone: a curve is cut into the parts in front of every surface and the
-//! parts behind one. Drawn are the far faces of the box, the hidden parts, the surfaces (translucent), the visible parts, and on top markers
-//! and text. Within each set, curves are drawn from far to near and faded towards the far side.
+//! What hides what is decided by a depth buffer of the surfaces alone: a curve is cut into the
+//! parts in front of every surface and the parts behind one. Drawn are the far faces of the box,
+//! the hidden parts, the surfaces (translucent), the visible parts, and on top markers and text.
+//! Within each set, curves are drawn from far to near and faded towards the far side.
 
 use plotters::style::text_anchor::{HPos, VPos};
 
@@ -36,7 +37,11 @@ impl Camera {
         let (a, e) = (azimuth * radians, elevation * radians);
         let (sa, ca) = (elementary::sin(a), elementary::cos(a));
         let (se, ce) = (elementary::sin(e), elementary::cos(e));
-        Self { right: [-sa, ca, 0.0], up: [-se * ca, -se * sa, ce], towards: [ce * ca, ce * sa, se] }
+        Self {
+            right: [-sa, ca, 0.0],
+            up: [-se * ca, -se * sa, ce],
+            towards: [ce * ca, ce * sa, se],
+        }
     }
 
     fn see(&self, p: [f64; 3]) -> Seen {
@@ -101,7 +106,8 @@ fn corners() -> impl Iterator<Item = [bool; 3]> {
     (0..8).map(|k| [k & 1 > 0, k & 2 > 0, k & 4 > 0])
 }
 
-/// The three edges that carry ticks: both horizontal axes along the lower rim nearest the viewer, the upright one at the left.
+/// The three edges that carry ticks: both horizontal axes along the lower rim nearest the viewer,
+/// the upright one at the left.
 fn ticked_edges(bounds: &Bounds, scale: f64) -> Vec<TickedEdge> {
     let towards = bounds.camera.towards;
     // Seen from below, the lower rim that is in front of nothing is the far one.
@@ -129,13 +135,15 @@ fn ticked_edges(bounds: &Bounds, scale: f64) -> Vec<TickedEdge> {
             let (a, b) = edge_ends(bounds, axis, at);
             let (dx, dy) = (b[0] - a[0], -(b[1] - a[1]));
             let length = (dx * dx + dy * dy).sqrt();
-            // Perpendicular to the edge, away from the box's centre; nearly vertical edges get labels beside them.
+            // Perpendicular to the edge, away from the box's centre; nearly vertical edges get
+            // labels beside them.
             let mut out = if length > 1e-9 { [dy / length, -dx / length] } else { [0.0, 1.0] };
             let middle = [0.5 * (a[0] + b[0]), -0.5 * (a[1] + b[1])];
             if out[0] * middle[0] + out[1] * middle[1] < 0.0 {
                 out = [-out[0], -out[1]];
             }
-            let spacing = if axis == 2 { style::TICK_SPACING_Y_PT } else { 1.2 * style::TICK_SPACING_X_PT };
+            let spacing =
+                if axis == 2 { style::TICK_SPACING_Y_PT } else { 1.2 * style::TICK_SPACING_X_PT };
             let wanted = (length * scale / (spacing * f64::from(UNITS_PER_POINT))).max(1.8);
             let s = bounds.spans[axis];
             TickedEdge { axis, at, ticks: ticks::linear(s.lower, s.upper, wanted).major, out }
@@ -155,7 +163,8 @@ struct Label {
     rect: Rect,
 }
 
-/// Places of all labels around the box, in units relative to the box's centre, at a scale of units per unit length.
+/// Places of all labels around the box, in units relative to the box's centre, at a scale of units
+/// per unit length.
 fn labels(panel: &SpacePanel, bounds: &Bounds, scale: f64) -> Vec<Label> {
     let mut labels: Vec<Label> = Vec::new();
     let edges = ticked_edges(bounds, scale);
@@ -166,8 +175,10 @@ fn labels(panel: &SpacePanel, bounds: &Bounds, scale: f64) -> Vec<Label> {
         let mut reach = 0.0f64;
         for t in &edge.ticks {
             let share = (t.value - s.lower) / (s.upper - s.lower);
-            let p = [a[0] + share * (b[0] - a[0]), -(a[1] + share * (b[1] - a[1]))].map(|v| v * scale);
-            let (rect, far) = label_rect(p, edge.out, &t.label, style::TICK_PT, style::TICK_LENGTH_PT + 2.0);
+            let p =
+                [a[0] + share * (b[0] - a[0]), -(a[1] + share * (b[1] - a[1]))].map(|v| v * scale);
+            let (rect, far) =
+                label_rect(p, edge.out, &t.label, style::TICK_PT, style::TICK_LENGTH_PT + 2.0);
             // Two numbers side by side must not read as one.
             let pad = units(3.0);
             let padded = Rect { x: rect.x - pad, w: rect.w + 2 * pad, ..rect };
@@ -190,14 +201,20 @@ fn labels(panel: &SpacePanel, bounds: &Bounds, scale: f64) -> Vec<Label> {
     labels
 }
 
-/// The rectangle of a text that stands off a point by `gap` points in direction `out`, and how far it reaches in that direction.
+/// The rectangle of a text that stands off a point by `gap` points in direction `out`, and how far
+/// it reaches in that direction.
 fn label_rect(p: [f64; 2], out: [f64; 2], text: &str, size: f64, gap: f64) -> (Rect, f64) {
     let (w, h) = (f64::from(text_width(text, size)), f64::from(units(CAP_HEIGHT * size)));
     // The centre lies so far out that the near side of the rectangle touches the gap.
     let half = 0.5 * (w * out[0].abs() + h * out[1].abs());
     let distance = f64::from(units(gap)) + half;
     let (cx, cy) = (p[0] + out[0] * distance, p[1] + out[1] * distance);
-    let rect = Rect { x: (cx - w / 2.0).round() as i32, y: (cy - h / 2.0).round() as i32, w: w as i32, h: h as i32 };
+    let rect = Rect {
+        x: (cx - w / 2.0).round() as i32,
+        y: (cy - h / 2.0).round() as i32,
+        w: w as i32,
+        h: h as i32,
+    };
     (rect, distance + half)
 }
 
@@ -206,11 +223,16 @@ pub fn draw(canvas: &Canvas, panel: &SpacePanel, rect: Rect) -> Result<(), Rende
     let bounds = Bounds::new(panel);
     let (scale, centre) = fit(panel, &bounds, rect);
     let origin = [f64::from(centre.0), f64::from(centre.1)];
-    // The chart's coordinates are those of the projected box, equally scaled; its rectangle is the panel's.
-    let x =
-        Span { lower: (f64::from(rect.x) - origin[0]) / scale, upper: (f64::from(rect.right()) - origin[0]) / scale };
-    let y =
-        Span { lower: (origin[1] - f64::from(rect.bottom())) / scale, upper: (origin[1] - f64::from(rect.y)) / scale };
+    // The chart's coordinates are those of the projected box, equally scaled; its rectangle is the
+    // panel's.
+    let x = Span {
+        lower: (f64::from(rect.x) - origin[0]) / scale,
+        upper: (f64::from(rect.right()) - origin[0]) / scale,
+    };
+    let y = Span {
+        lower: (origin[1] - f64::from(rect.bottom())) / scale,
+        upper: (origin[1] - f64::from(rect.y)) / scale,
+    };
     let mut chart = canvas.chart(rect, x, y)?;
     if panel.boxed {
         draw_box(canvas, &mut chart, &bounds, scale)?;
@@ -246,14 +268,22 @@ pub fn draw(canvas: &Canvas, panel: &SpacePanel, rect: Rect) -> Result<(), Rende
     }
     if panel.boxed {
         for label in labels(panel, &bounds, scale) {
-            let at = (centre.0 + label.rect.x + label.rect.w / 2, centre.1 + label.rect.y + label.rect.h / 2);
-            canvas.text(&label.text, at, TextFormat::new(label.size).anchor(HPos::Center, VPos::Center))?;
+            let at = (
+                centre.0 + label.rect.x + label.rect.w / 2,
+                centre.1 + label.rect.y + label.rect.h / 2,
+            );
+            canvas.text(
+                &label.text,
+                at,
+                TextFormat::new(label.size).anchor(HPos::Center, VPos::Center),
+            )?;
         }
     }
     canvas.legend(&panel.legend, rect, panel.legend_corner)
 }
 
-/// Height in units that a panel needs at a width, at most `highest`: that of the box with its labels.
+/// Height in units that a panel needs at a width, at most `highest`: that of the box with its
+/// labels.
 pub fn natural_height(panel: &SpacePanel, width: i32, highest: i32) -> i32 {
     let bounds = Bounds::new(panel);
     let rect = Rect { x: 0, y: 0, w: width, h: highest };
@@ -262,7 +292,8 @@ pub fn natural_height(panel: &SpacePanel, width: i32, highest: i32) -> i32 {
     ((e[3] - e[1]).ceil() as i32 + 4).min(highest)
 }
 
-/// Left, upper, right and lower end of the box with its labels relative to the box's centre, in units.
+/// Left, upper, right and lower end of the box with its labels relative to the box's centre, in
+/// units.
 fn extent(panel: &SpacePanel, bounds: &Bounds, scale: f64) -> [f64; 4] {
     let mut e = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
     let mut add = |x: f64, y: f64| e = [e[0].min(x), e[1].min(y), e[2].max(x), e[3].max(y)];
@@ -300,7 +331,12 @@ fn fit(panel: &SpacePanel, bounds: &Bounds, rect: Rect) -> (f64, (i32, i32)) {
 }
 
 /// Far faces with their grid, their edges, and the ticks.
-fn draw_box(canvas: &Canvas, chart: &mut Chart, bounds: &Bounds, scale: f64) -> Result<(), RenderError> {
+fn draw_box(
+    canvas: &Canvas,
+    chart: &mut Chart,
+    bounds: &Bounds,
+    scale: f64,
+) -> Result<(), RenderError> {
     let far = bounds.camera.towards.map(|t| t <= 0.0);
     let flat = |s: Seen| [s[0], s[1]];
     for (axis, end) in far.into_iter().enumerate() {
@@ -349,13 +385,18 @@ fn draw_box(canvas: &Canvas, chart: &mut Chart, bounds: &Bounds, scale: f64) -> 
     }
     for edge in &edges {
         let (p, q) = edge_ends(bounds, edge.axis, edge.at);
-        chart.thinned_line(&[flat(p), flat(q)], &LineStyle::new(style::SOFT_INK, style::FRAME_PT))?;
+        chart
+            .thinned_line(&[flat(p), flat(q)], &LineStyle::new(style::SOFT_INK, style::FRAME_PT))?;
         let s = bounds.spans[edge.axis];
         for t in &edge.ticks {
             let share = (t.value - s.lower) / (s.upper - s.lower);
-            let from = chart.position(&[p[0] + share * (q[0] - p[0]), p[1] + share * (q[1] - p[1])]);
+            let from =
+                chart.position(&[p[0] + share * (q[0] - p[0]), p[1] + share * (q[1] - p[1])]);
             let length = f64::from(units(style::TICK_LENGTH_PT));
-            let to = (from.0 + (edge.out[0] * length).round() as i32, from.1 + (edge.out[1] * length).round() as i32);
+            let to = (
+                from.0 + (edge.out[0] * length).round() as i32,
+                from.1 + (edge.out[1] * length).round() as i32,
+            );
             canvas.line(&[from, to], style::SOFT_INK, style::FRAME_PT)?;
         }
     }
@@ -364,11 +405,19 @@ fn draw_box(canvas: &Canvas, chart: &mut Chart, bounds: &Bounds, scale: f64) -> 
 
 /// A patch as the camera sees it, cut off at the box.
 fn seen_patch(patch: &Patch, bounds: &Bounds) -> Vec<Seen> {
-    polyline::clip_polygon(&patch.corners, bounds.lower(), bounds.upper()).into_iter().map(|p| bounds.see(p)).collect()
+    polyline::clip_polygon(&patch.corners, bounds.lower(), bounds.upper())
+        .into_iter()
+        .map(|p| bounds.see(p))
+        .collect()
 }
 
-/// Surfaces, far regions first. Patches of one colour are filled together, so that no seams show between them.
-fn draw_surfaces(chart: &mut Chart, panel: &SpacePanel, bounds: &Bounds) -> Result<(), RenderError> {
+/// Surfaces, far regions first. Patches of one colour are filled together, so that no seams show
+/// between them.
+fn draw_surfaces(
+    chart: &mut Chart,
+    panel: &SpacePanel,
+    bounds: &Bounds,
+) -> Result<(), RenderError> {
     for layer in &panel.layers {
         let SpaceLayer::Surface { patches, opacity } = layer else { continue };
         let mut regions: Vec<(Colour, f64, f64, Vec<Vec<Seen>>)> = Vec::new();
@@ -446,7 +495,8 @@ impl DepthBuffer {
             return;
         }
         let low = |i: usize| a[i].min(b[i]).min(c[i]).floor().max(0.0) as usize;
-        let high = |i: usize, n: usize| (a[i].max(b[i]).max(c[i]).ceil().max(0.0) as usize).min(n - 1);
+        let high =
+            |i: usize, n: usize| (a[i].max(b[i]).max(c[i]).ceil().max(0.0) as usize).min(n - 1);
         for row in low(1)..=high(1, self.rows) {
             for column in low(0)..=high(0, self.columns) {
                 let (x, y) = (column as f64 + 0.5, row as f64 + 0.5);
@@ -463,7 +513,8 @@ impl DepthBuffer {
         }
     }
 
-    /// Whether a point at a place on the sheet lies behind a surface; one within `margin` of it counts as in front.
+    /// Whether a point at a place on the sheet lies behind a surface; one within `margin` of it
+    /// counts as in front.
     fn hides(&self, place: [f64; 2], depth: f64, margin: f64) -> bool {
         if self.nearest.is_empty() {
             return false;
@@ -486,14 +537,21 @@ struct Piece {
     points: Vec<[f64; 2]>,
 }
 
-fn cut_curves(panel: &SpacePanel, bounds: &Bounds, chart: &Chart, buffer: &DepthBuffer, scale: f64) -> Vec<Piece> {
+fn cut_curves(
+    panel: &SpacePanel,
+    bounds: &Bounds,
+    chart: &Chart,
+    buffer: &DepthBuffer,
+    scale: f64,
+) -> Vec<Piece> {
     let depth = bounds.depth();
     let margin = 0.004 * depth;
     let level_of = |d: f64| {
         let share = (0.5 + 0.5 * d / depth).clamp(0.0, 1.0);
         ((share * style::DEPTH_LEVELS as f64) as usize).min(style::DEPTH_LEVELS - 1)
     };
-    // Long straight segments are cut so that each part has one depth class and is either hidden or not.
+    // Long straight segments are cut so that each part has one depth class and is either hidden or
+    // not.
     let step = 3.0 * CELL / scale;
     let mut pieces = Vec::new();
     for (layer, content) in panel.layers.iter().enumerate() {
@@ -541,8 +599,9 @@ fn draw_curves(chart: &mut Chart, pieces: &[Piece], hidden: bool) -> Result<(), 
     let of = |level: usize| pieces.iter().filter(move |p| p.level == level && p.hidden == hidden);
     for level in 0..style::DEPTH_LEVELS {
         if !hidden {
-            // A white margin where a curve passes over one at least two depth classes behind makes clear which is in front. It is drawn
-            // before the neighbouring class, so that it does not cut into the curve's own continuation.
+            // A white margin where a curve passes over one at least two depth classes behind makes
+            // clear which is in front. It is drawn before the neighbouring class, so that it does
+            // not cut into the curve's own continuation.
             for piece in of(level + 1) {
                 let width = piece.style.width + 2.0 * style::CASING_PT;
                 chart.thinned_line(&piece.points, &LineStyle::new(style::WHITE, width))?;

@@ -1,8 +1,9 @@
 //! The look of every picture: sizes, colours, fonts and ticks, in one place.
 //!
-//! Lengths are in printer's points (1 pt = 1/72 inch) at the printed size of the sheet. Colours are the palette of Okabe and Ito
-//! (2008), which stays distinguishable under the common forms of colour blindness; the three region colours also differ in
-//! lightness, so that they can be told apart in greyscale.
+//! Lengths are in printer's points (1 pt = 1/72 inch) at the printed size of the sheet. Colours are
+//! the palette of Okabe and Ito (2008), which stays distinguishable under the common forms of
+//! colour blindness; the three region colours also differ in lightness, so that they can be told
+//! apart in greyscale.
 
 use super::colour::Colour;
 
@@ -92,8 +93,9 @@ pub const DASH_PT: (f64, f64) = (3.2, 2.2);
 /// Dots and gaps of a dotted line.
 pub const DOTTED_PT: (f64, f64) = (0.05, 2.0);
 
-/// Diameter of a point by how many distinguishable places (cells of half a point) its layer occupies: few points are drawn large
-/// enough to be found at a glance, many small enough to show structure. Pairs (at most this many places, diameter).
+/// Diameter of a point by how many distinguishable places (cells of half a point) its layer
+/// occupies: few points are drawn large enough to be found at a glance, many small enough to show
+/// structure. Pairs (at most this many places, diameter).
 pub const DOT_DIAMETER_PT: [(usize, f64); 6] =
     [(16, 4.2), (80, 2.2), (300, 1.5), (1_500, 1.15), (6_000, 0.8), (usize::MAX, 0.55)];
 /// Number of places above which a layer is shaded by density, if it asks for that.

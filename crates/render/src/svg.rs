@@ -1,5 +1,5 @@
-//! A [`Scene`] as SVG: whole-number relative paths in units, no font needed. Text is outlines; on request its words are there a second
-//! time, unseen, for programs that search.
+//! A [`Scene`] as SVG: whole-number relative paths in units, no font needed. Text is outlines; on
+//! request its words are there a second time, unseen, for programs that search.
 
 use std::fmt::Write as _;
 
@@ -10,7 +10,8 @@ use super::sheet::Colour;
 /// Namespace of the provenance elements.
 pub const NAMESPACE: &str = "urn:twofold:provenance";
 
-/// Text with the characters that XML reserves replaced, and control characters (which XML forbids) left out.
+/// Text with the characters that XML reserves replaced, and control characters (which XML forbids)
+/// left out.
 pub fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
@@ -30,13 +31,20 @@ pub fn escape(text: &str) -> String {
 }
 
 /// Writes a scene, with its words as invisible text if it is to be searchable.
-pub fn write(scene: &Scene, title: &str, description: &str, provenance: &Sealed, searchable: bool) -> Vec<u8> {
+pub fn write(
+    scene: &Scene,
+    title: &str,
+    description: &str,
+    provenance: &Sealed,
+    searchable: bool,
+) -> Vec<u8> {
     let mut out = String::with_capacity(1 << 16);
     let (w, h) = (scene.width(), scene.height());
     let points = |units: i32| decimal(i64::from(units) * 100 / i64::from(UNITS_PER_POINT));
     let _ = write!(
         out,
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{}pt\" height=\"{}pt\" viewBox=\"0 0 {w} {h}\" role=\"img\">\n\
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{}pt\" height=\"{}pt\" viewBox=\"0 0 \
+            {w} {h}\" role=\"img\">\n\
          <title>{}</title>\n<desc>{}</desc>\n",
         points(w),
         points(h),
@@ -47,26 +55,36 @@ pub fn write(scene: &Scene, title: &str, description: &str, provenance: &Sealed,
     for (key, value) in &provenance.entries {
         let _ = writeln!(out, "<entry key=\"{}\">{}</entry>", escape(key), escape(value));
     }
-    let _ = writeln!(out, "</provenance></metadata>\n<path fill=\"#fff\" d=\"M0 0h{w}v{h}h-{w}z\"/>");
+    let _ =
+        writeln!(out, "</provenance></metadata>\n<path fill=\"#fff\" d=\"M0 0h{w}v{h}h-{w}z\"/>");
     out.push_str("<g fill=\"none\" stroke-linecap=\"round\" stroke-linejoin=\"round\">\n");
     for item in &scene.items {
         let mut pen = Pen { out: &mut out, at: (0, 0), last: b' ' };
         match item {
             Item::Fill { paint, path, .. } => {
-                pen.raw(&format!("<path fill=\"{}\"{} d=\"", hex(paint.colour), opacity(paint, "fill")));
+                pen.raw(&format!(
+                    "<path fill=\"{}\"{} d=\"",
+                    hex(paint.colour),
+                    opacity(paint, "fill")
+                ));
                 pen.segments(path);
             }
             Item::Stroke { paint, width, lines } => {
                 let (colour, opacity) = (hex(paint.colour), opacity(paint, "stroke"));
-                pen.raw(&format!("<path stroke=\"{colour}\"{opacity} stroke-width=\"{width}\" d=\""));
+                pen.raw(&format!(
+                    "<path stroke=\"{colour}\"{opacity} stroke-width=\"{width}\" d=\""
+                ));
                 for line in lines {
                     pen.polyline(line);
                 }
             }
             Item::Dots { paint, diameter, centres } => {
-                // A point with a round cap is a disc: the shortest way to write many of them in one path.
+                // A point with a round cap is a disc: the shortest way to write many of them in one
+                // path.
                 let (colour, opacity) = (hex(paint.colour), opacity(paint, "stroke"));
-                pen.raw(&format!("<path stroke=\"{colour}\"{opacity} stroke-width=\"{diameter}\" d=\""));
+                pen.raw(&format!(
+                    "<path stroke=\"{colour}\"{opacity} stroke-width=\"{diameter}\" d=\""
+                ));
                 for c in centres {
                     pen.command(b'm', &[*c]);
                     pen.raw("h0");
@@ -83,15 +101,21 @@ pub fn write(scene: &Scene, title: &str, description: &str, provenance: &Sealed,
     out.into_bytes()
 }
 
-/// The words, each stretched to the length of the outlines that it stands for, whatever font the reader's program takes.
+/// The words, each stretched to the length of the outlines that it stands for, whatever font the
+/// reader's program takes.
 fn words(out: &mut String, scene: &Scene) {
     out.push_str("<g fill-opacity=\"0\" font-family=\"sans-serif\">\n");
     for words in scene.texts() {
         let ((x, y), size, length) = (words.from, words.size, words.length());
-        let turned = if words.upwards() { format!(" transform=\"rotate(-90 {x} {y})\"") } else { String::new() };
+        let turned = if words.upwards() {
+            format!(" transform=\"rotate(-90 {x} {y})\"")
+        } else {
+            String::new()
+        };
         let _ = writeln!(
             out,
-            "<text x=\"{x}\" y=\"{y}\" font-size=\"{size}\" textLength=\"{length}\" lengthAdjust=\"spacingAndGlyphs\"{turned}>{}</text>",
+            "<text x=\"{x}\" y=\"{y}\" font-size=\"{size}\" textLength=\"{length}\" \
+                lengthAdjust=\"spacingAndGlyphs\"{turned}>{}</text>",
             escape(&words.text)
         );
     }
@@ -109,7 +133,11 @@ fn hex(c: Colour) -> String {
 }
 
 fn opacity(paint: &Paint, what: &str) -> String {
-    if paint.opacity >= 100 { String::new() } else { format!(" {what}-opacity=\".{:02}\"", paint.opacity) }
+    if paint.opacity >= 100 {
+        String::new()
+    } else {
+        format!(" {what}-opacity=\".{:02}\"", paint.opacity)
+    }
 }
 
 struct Pen<'a> {
@@ -124,7 +152,8 @@ impl Pen<'_> {
         self.last = b' ';
     }
 
-    /// Writes a relative command; the letter is left out where it repeats, the blank where a minus sign separates.
+    /// Writes a relative command; the letter is left out where it repeats, the blank where a minus
+    /// sign separates.
     fn command(&mut self, letter: u8, points: &[Position]) {
         let mut separate = true;
         if letter != self.last {

@@ -1,4 +1,5 @@
-//! Tests of whole pictures: where ink lies, that the three formats agree, that bytes repeat, and what is written into the files.
+//! Tests of whole pictures: where ink lies, that the three formats agree, that bytes repeat, and
+//! what is written into the files.
 
 use super::scene::{Item, Position, Scene, UNITS_PER_PIXEL};
 use super::sheet::*;
@@ -6,11 +7,16 @@ use super::*;
 
 fn dot_panel(points: Vec<[f64; 2]>) -> PlanePanel {
     let red = DotStyle { colour: Colour::rgb(255, 0, 0), diameter: Some(2.0), density: false };
-    PlanePanel::new(Axis::linear("*x*", -2.0, 3.0), Axis::linear("*z*", 10.0, 20.0)).dots(points, red)
+    PlanePanel::new(Axis::linear("*x*", -2.0, 3.0), Axis::linear("*z*", 10.0, 20.0))
+        .dots(points, red)
 }
 
 fn dot_sheet(points: Vec<[f64; 2]>) -> Sheet {
-    Sheet::new(ColumnWidth::Single, 1, "A point.").title("One *x*^{2} & <two>").panel("(i)", "point", dot_panel(points))
+    Sheet::new(ColumnWidth::Single, 1, "A point.").title("One *x*^{2} & <two>").panel(
+        "(i)",
+        "point",
+        dot_panel(points),
+    )
 }
 
 fn provenance_sheet() -> Sheet {
@@ -54,7 +60,8 @@ fn a_point_lands_where_its_coordinates_say() {
     for p in data {
         let x = f64::from(left) + f64::from(right - left) * (p[0] + 2.0) / 5.0;
         let y = f64::from(bottom) - f64::from(bottom - top) * (p[1] - 10.0) / 10.0;
-        let nearest = centres.iter().map(|c| (f64::from(c.0) - x).abs().max((f64::from(c.1) - y).abs()));
+        let nearest =
+            centres.iter().map(|c| (f64::from(c.0) - x).abs().max((f64::from(c.1) - y).abs()));
         // To half a unit, that is a 24th of a pixel.
         assert!(nearest.fold(f64::INFINITY, f64::min) <= 0.5 + 1e-9, "{p:?}");
     }
@@ -78,11 +85,22 @@ fn png_and_svg_put_the_point_at_the_same_place() {
             }
         }
         let unit = f64::from(UNITS_PER_PIXEL);
-        assert!((sx / sum - f64::from(centre.0) / unit).abs() < 0.02, "{} {}", sx / sum, f64::from(centre.0) / unit);
-        assert!((sy / sum - f64::from(centre.1) / unit).abs() < 0.02, "{} {}", sy / sum, f64::from(centre.1) / unit);
+        assert!(
+            (sx / sum - f64::from(centre.0) / unit).abs() < 0.02,
+            "{} {}",
+            sx / sum,
+            f64::from(centre.0) / unit
+        );
+        assert!(
+            (sy / sum - f64::from(centre.1) / unit).abs() < 0.02,
+            "{} {}",
+            sy / sum,
+            f64::from(centre.1) / unit
+        );
         let text = String::from_utf8(picture.svg).unwrap();
         let document = roxmltree::Document::parse(&text).unwrap();
-        let path = document.descendants().find(|n| n.attribute("stroke") == Some("#ff0000")).unwrap();
+        let path =
+            document.descendants().find(|n| n.attribute("stroke") == Some("#ff0000")).unwrap();
         assert_eq!(path.attribute("d").unwrap(), format!("m{} {}h0", centre.0, centre.1));
     }
 }
@@ -95,13 +113,17 @@ fn the_same_sheet_gives_the_same_bytes() {
 
 #[test]
 fn a_changed_sheet_gives_other_pixels() {
-    let (a, b) = (render(&dot_sheet(vec![[0.5, 12.0]])).unwrap(), render(&dot_sheet(vec![[0.51, 12.0]])).unwrap());
+    let (a, b) = (
+        render(&dot_sheet(vec![[0.5, 12.0]])).unwrap(),
+        render(&dot_sheet(vec![[0.51, 12.0]])).unwrap(),
+    );
     assert_ne!(a.pixels, b.pixels);
 }
 
 /// Every kind of panel and layer.
 fn full_sheet() -> Sheet {
-    let wave: Vec<[f64; 2]> = (0..400).map(|i| f64::from(i) * 0.01).map(|t| [t, t * (4.0 - t) - 2.0]).collect();
+    let wave: Vec<[f64; 2]> =
+        (0..400).map(|i| f64::from(i) * 0.01).map(|t| [t, t * (4.0 - t) - 2.0]).collect();
     let helix: Vec<[f64; 3]> = (0..500)
         .map(|i| f64::from(i) * 0.004 - 1.0)
         .map(|t| [t, 4.0 * t * t * t - 3.0 * t, 2.0 * t * t - 1.0])
@@ -123,8 +145,9 @@ fn full_sheet() -> Sheet {
         },
     );
     let unit = |title: &str| Axis::linear(title, -1.0, 1.0);
-    let space =
-        SpacePanel::new(unit("*x*"), unit("*y*"), unit("*z*")).surface(surface).line(helix, LineStyle::default());
+    let space = SpacePanel::new(unit("*x*"), unit("*y*"), unit("*z*"))
+        .surface(surface)
+        .line(helix, LineStyle::default());
     Sheet::new(ColumnWidth::Wide, 2, "Everything.")
         .title("Title")
         .subtitle("subtitle")
@@ -134,7 +157,8 @@ fn full_sheet() -> Sheet {
         .panel(
             "(iii)",
             "sketch",
-            PlanePanel::sketch((0.0, 1.0), (0.0, 1.0)).solid(vec![[0.0, 0.0], [1.0, 0.0], [0.5, 1.0]], style::GREEN),
+            PlanePanel::sketch((0.0, 1.0), (0.0, 1.0))
+                .solid(vec![[0.0, 0.0], [1.0, 0.0], [0.5, 1.0]], style::GREEN),
         )
         .panel("", "", Content::Blank)
         .legend(LegendEntry::new(LegendKey::Dots(DotStyle::early()), "early"))
@@ -148,12 +172,17 @@ fn svg_is_well_formed_and_needs_no_font() {
     let document = roxmltree::Document::parse(&text).unwrap();
     let root = document.root_element();
     assert_eq!(root.attribute("role"), Some("img"));
-    let child = |name: &str| root.children().find(|n| n.has_tag_name(("http://www.w3.org/2000/svg", name)));
+    let child =
+        |name: &str| root.children().find(|n| n.has_tag_name(("http://www.w3.org/2000/svg", name)));
     assert_eq!(child("title").and_then(|n| n.text()), Some("Title"));
     assert_eq!(child("desc").and_then(|n| n.text()), Some("Everything."));
     assert!(child("metadata").is_some());
     for node in document.descendants().filter(|n| n.is_element()) {
-        assert!(!["text", "tspan", "font", "image", "style", "script"].contains(&node.tag_name().name()), "{node:?}");
+        assert!(
+            !["text", "tspan", "font", "image", "style", "script"]
+                .contains(&node.tag_name().name()),
+            "{node:?}"
+        );
         assert!(node.attribute("font-family").is_none());
     }
 }
@@ -166,8 +195,8 @@ fn sixty_thousand_points_stay_under_two_megabytes() {
         (seed >> 11) as f64 / (1u64 << 53) as f64
     };
     let points: Vec<[f64; 2]> = (0..60_000).map(|_| [next(), next()]).collect();
-    let panel =
-        PlanePanel::new(Axis::linear("*x*", 0.0, 1.0), Axis::linear("*z*", 0.0, 1.0)).dots(points, DotStyle::late());
+    let panel = PlanePanel::new(Axis::linear("*x*", 0.0, 1.0), Axis::linear("*z*", 0.0, 1.0))
+        .dots(points, DotStyle::late());
     let picture = render(&Sheet::new(ColumnWidth::Wide, 1, "Noise.").panel("", "", panel)).unwrap();
     assert!(picture.svg.len() < 1_000_000, "{}", picture.svg.len());
     assert!(picture.pdf.len() < 1_000_000, "{}", picture.pdf.len());
@@ -194,7 +223,9 @@ fn the_png_states_its_printed_size_and_decodes_to_the_pixels() {
 fn provenance_comes_back_from_all_three() {
     let sheet = provenance_sheet();
     let picture = render(&sheet).unwrap();
-    for (bytes, format) in [(&picture.png, Format::Png), (&picture.svg, Format::Svg), (&picture.pdf, Format::Pdf)] {
+    for (bytes, format) in
+        [(&picture.png, Format::Png), (&picture.svg, Format::Svg), (&picture.pdf, Format::Pdf)]
+    {
         let found = read_provenance(bytes).unwrap();
         assert_eq!(found.format, format);
         assert_eq!(found.entries, sheet.provenance, "{format:?}");
@@ -233,10 +264,13 @@ fn the_pdf_has_no_clock_and_no_identifier() {
 
 /// The page's operators, decompressed.
 fn operators(pdf: &[u8]) -> String {
-    let find = |from: usize, what: &[u8]| from + pdf[from..].windows(what.len()).position(|w| w == what).unwrap();
+    let find = |from: usize, what: &[u8]| {
+        from + pdf[from..].windows(what.len()).position(|w| w == what).unwrap()
+    };
     let start = find(find(0, b"/FlateDecode"), b"stream\n") + b"stream\n".len();
     let end = find(start, b"endstream");
-    let found = miniz_oxide::inflate::decompress_to_vec_zlib(pdf[start..end].trim_ascii_end()).expect("deflated");
+    let found = miniz_oxide::inflate::decompress_to_vec_zlib(pdf[start..end].trim_ascii_end())
+        .expect("deflated");
     String::from_utf8(found).expect("operators are ASCII")
 }
 
@@ -259,7 +293,8 @@ fn words_of_the_pdf_can_be_found_and_stand_where_their_outlines_do() {
             let code = |i: usize| usize::from_str_radix(&hex[2 * i..2 * i + 2], 16).unwrap();
             let text: String = (0..hex.len() / 2).map(|i| characters[code(i) - 1]).collect();
             let numbers: Vec<f64> = line.split(' ').filter_map(|w| w.parse().ok()).collect();
-            // Size, stretch in per cent, four entries of the matrix, then x and y; every glyph is half a size wide.
+            // Size, stretch in per cent, four entries of the matrix, then x and y; every glyph is
+            // half a size wide.
             let length = numbers[0] * 0.5 * text.chars().count() as f64 * numbers[1] / 100.0;
             (text, numbers[6], length)
         })
@@ -293,15 +328,19 @@ fn an_svg_has_its_words_as_text_only_if_asked() {
 
 #[test]
 fn two_distinct_late_points_are_seen_among_a_faint_transient() {
-    let early: Vec<[f64; 2]> = (0..900).map(|i| [f64::from(i % 30) / 30.0, f64::from(i / 30) / 30.0]).collect();
-    let late: Vec<[f64; 2]> = (0..5000).map(|i| if i % 2 == 0 { [0.3, 0.512] } else { [0.7, 0.49] }).collect();
+    let early: Vec<[f64; 2]> =
+        (0..900).map(|i| [f64::from(i % 30) / 30.0, f64::from(i / 30) / 30.0]).collect();
+    let late: Vec<[f64; 2]> =
+        (0..5000).map(|i| if i % 2 == 0 { [0.3, 0.512] } else { [0.7, 0.49] }).collect();
     let panel = PlanePanel::new(Axis::linear("*x*", 0.0, 1.0), Axis::linear("*z*", 0.0, 1.0))
         .dots(early, DotStyle::early())
         .dots(late, DotStyle::late());
     let scene = layout::draw(&Sheet::new(ColumnWidth::Wide, 3, "").panel("", "", panel)).unwrap();
     let of = |colour: Colour| {
         scene.items.iter().find_map(|i| match i {
-            Item::Dots { paint, diameter, centres } if paint.colour == colour => Some((*diameter, centres.len())),
+            Item::Dots { paint, diameter, centres } if paint.colour == colour => {
+                Some((*diameter, centres.len()))
+            }
             _ => None,
         })
     };
@@ -321,9 +360,18 @@ fn positions_that_are_no_numbers_are_left_out_and_counted() {
 
 #[test]
 fn unusable_axes_and_numbers_are_named() {
-    let plane =
-        |x: Axis| Sheet::new(ColumnWidth::Single, 1, "").panel("", "", PlanePanel::new(x, Axis::linear("", 0.0, 1.0)));
-    for axis in [Axis::linear("a", 0.0, f64::NAN), Axis::log("a", 0.0, 1.0), Axis::linear("a", f64::MIN, f64::MAX)] {
+    let plane = |x: Axis| {
+        Sheet::new(ColumnWidth::Single, 1, "").panel(
+            "",
+            "",
+            PlanePanel::new(x, Axis::linear("", 0.0, 1.0)),
+        )
+    };
+    for axis in [
+        Axis::linear("a", 0.0, f64::NAN),
+        Axis::log("a", 0.0, 1.0),
+        Axis::linear("a", f64::MIN, f64::MAX),
+    ] {
         assert!(matches!(render(&plane(axis)), Err(RenderError::Axis { panel: 1, .. })));
     }
     let unit = || Axis::linear("", 0.0, 1.0);
@@ -331,7 +379,10 @@ fn unusable_axes_and_numbers_are_named() {
     let good = || SpacePanel::new(unit(), unit(), unit());
     assert!(render(&space(good())).is_ok());
     assert!(matches!(render(&space(good().camera(0.0, 91.0))), Err(RenderError::Number { .. })));
-    assert!(matches!(render(&space(good().proportions([1.0, 0.0, 1.0]))), Err(RenderError::Number { .. })));
+    assert!(matches!(
+        render(&space(good().proportions([1.0, 0.0, 1.0]))),
+        Err(RenderError::Number { .. })
+    ));
     let tower = (0..40).fold(Sheet::new(ColumnWidth::Wide, 1, ""), |s, _| s.panel("", "", good()));
     assert!(matches!(render(&tower), Err(RenderError::TooLarge)));
     let faulty = Sheet::new(ColumnWidth::Single, 1, "").title("*x");
@@ -352,7 +403,8 @@ fn empty_and_degenerate_pictures_are_drawn() {
         Sheet::new(ColumnWidth::Single, 1, "").panel(
             "",
             "",
-            PlanePanel::new(Axis::linear("", 1.0, -1.0), unit("")).dots(vec![[0.0, 0.5]], DotStyle::late()),
+            PlanePanel::new(Axis::linear("", 1.0, -1.0), unit(""))
+                .dots(vec![[0.0, 0.5]], DotStyle::late()),
         ),
         Sheet::new(ColumnWidth::Single, 1, "").panel(
             "",
@@ -377,7 +429,8 @@ fn empty_and_degenerate_pictures_are_drawn() {
 fn what_lies_behind_a_surface_is_drawn_before_it_and_the_rest_after() {
     // A vertical line seen along the second axis, half of it behind a wall.
     let unit = |t: &str| Axis::linear(t, -1.0, 1.0);
-    let wall = grid_surface((-1.0, 1.0, 4), (-1.0, 1.0, 4), |u, v| [u, 0.0, v], |_, _| style::ATTRACTING);
+    let wall =
+        grid_surface((-1.0, 1.0, 4), (-1.0, 1.0, 4), |u, v| [u, 0.0, v], |_, _| style::ATTRACTING);
     let green = |y: f64| (vec![[-0.5, y, 0.0], [0.5, y, 0.0]], LineStyle::new(style::GREEN, 1.0));
     let (near, far) = (green(-0.9), green(0.9));
     let order = |line: (Vec<[f64; 3]>, LineStyle)| {
@@ -385,11 +438,15 @@ fn what_lies_behind_a_surface_is_drawn_before_it_and_the_rest_after() {
             .camera(-90.0, 10.0)
             .surface(wall.clone())
             .line(line.0, line.1);
-        let scene = layout::draw(&Sheet::new(ColumnWidth::Single, 1, "").panel("", "", panel)).unwrap();
-        let wall =
-            scene.items.iter().position(|i| matches!(i, Item::Fill { paint, .. } if paint.colour == style::ATTRACTING));
+        let scene =
+            layout::draw(&Sheet::new(ColumnWidth::Single, 1, "").panel("", "", panel)).unwrap();
+        let wall = scene.items.iter().position(
+            |i| matches!(i, Item::Fill { paint, .. } if paint.colour == style::ATTRACTING),
+        );
         let curve = scene.items.iter().position(|i| match i {
-            Item::Stroke { paint, .. } => paint.colour.g > paint.colour.r && paint.colour.g > paint.colour.b,
+            Item::Stroke { paint, .. } => {
+                paint.colour.g > paint.colour.r && paint.colour.g > paint.colour.b
+            }
             _ => false,
         });
         curve.unwrap() > wall.unwrap()
@@ -406,7 +463,11 @@ fn region_colours_differ_in_greyscale() {
         let seen = c.lighten(1.0 - share);
         let linear = |v: u8| {
             let v = f64::from(v) / 255.0;
-            if v <= 0.04045 { v / 12.92 } else { twofold_num::elementary::pow((v + 0.055) / 1.055, 2.4) }
+            if v <= 0.04045 {
+                v / 12.92
+            } else {
+                twofold_num::elementary::pow((v + 0.055) / 1.055, 2.4)
+            }
         };
         0.2126 * linear(seen.r) + 0.7152 * linear(seen.g) + 0.0722 * linear(seen.b)
     };
@@ -416,11 +477,14 @@ fn region_colours_differ_in_greyscale() {
 
 #[test]
 fn density_shading_never_changes_where_points_are() {
-    let points: Vec<[f64; 2]> = (0..40_000).map(|i| [f64::from(i % 211) / 211.0, f64::from(i / 211) / 190.0]).collect();
+    let points: Vec<[f64; 2]> =
+        (0..40_000).map(|i| [f64::from(i % 211) / 211.0, f64::from(i / 211) / 190.0]).collect();
     let places = |density: bool| {
         let look = DotStyle { density, ..DotStyle::late() };
-        let panel = PlanePanel::new(Axis::linear("", 0.0, 1.0), Axis::linear("", 0.0, 1.0)).dots(points.clone(), look);
-        let scene = layout::draw(&Sheet::new(ColumnWidth::Wide, 1, "").panel("", "", panel)).unwrap();
+        let panel = PlanePanel::new(Axis::linear("", 0.0, 1.0), Axis::linear("", 0.0, 1.0))
+            .dots(points.clone(), look);
+        let scene =
+            layout::draw(&Sheet::new(ColumnWidth::Wide, 1, "").panel("", "", panel)).unwrap();
         let mut all: Vec<Position> = scene
             .items
             .into_iter()
@@ -452,7 +516,10 @@ fn palettes_have_whole_colours() {
     }
     // These the crate refuses.
     for bad in [1, 769, 771] {
-        assert!(matches!(decode_png(&picture(bad)).unwrap_err(), RenderError::PngDecoding(_)), "{bad}");
+        assert!(
+            matches!(decode_png(&picture(bad)).unwrap_err(), RenderError::PngDecoding(_)),
+            "{bad}"
+        );
     }
 }
 
@@ -460,11 +527,15 @@ fn palettes_have_whole_colours() {
 fn a_picture_that_claims_too_much_is_refused_before_memory_is_asked_for() {
     // 46 bytes that claim 100000 x 100000.
     let hex = "89504e470d0a1a0a0000000d49484452000186a0000186a00806000000a8520bc800000001494441547876e684e6";
-    let bytes: Vec<u8> = (0..hex.len()).step_by(2).map(|i| u8::from_str_radix(&hex[i..i + 2], 16).unwrap()).collect();
+    let bytes: Vec<u8> = (0..hex.len())
+        .step_by(2)
+        .map(|i| u8::from_str_radix(&hex[i..i + 2], 16).unwrap())
+        .collect();
     assert_eq!(png_size(&bytes), Some((100_000, 100_000)));
     let error = decode_png(&bytes).unwrap_err();
     assert!(matches!(error, RenderError::Claims { width: 100_000, height: 100_000 }), "{error}");
-    // Within the limit a claim without data is damage; a file cut anywhere, or grown in any byte, never panics.
+    // Within the limit a claim without data is damage; a file cut anywhere, or grown in any byte,
+    // never panics.
     let mut small = bytes.clone();
     small[16..24].copy_from_slice(&[0, 0, 16, 0, 0, 0, 16, 0]);
     assert!(decode_png(&small).is_err());

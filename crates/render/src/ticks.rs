@@ -1,4 +1,5 @@
-//! Placement and labelling of ticks, in whole-number arithmetic: no platform logarithm decides where a tick lies.
+//! Placement and labelling of ticks, in whole-number arithmetic: no platform logarithm decides
+//! where a tick lies.
 
 use twofold_num::elementary;
 
@@ -25,7 +26,8 @@ fn decimal(mantissa: i64, exponent: i32) -> f64 {
     format!("{mantissa}e{exponent}").parse().unwrap_or(f64::NAN)
 }
 
-/// Ticks of a linear axis from `lower` to `upper`, about `wanted` labelled ones, at multiples of 1, 2 or 5 times a power of ten.
+/// Ticks of a linear axis from `lower` to `upper`, about `wanted` labelled ones, at multiples of 1,
+/// 2 or 5 times a power of ten.
 pub fn linear(lower: f64, upper: f64, wanted: f64) -> Ticks {
     let (lower, upper) = (lower.min(upper), lower.max(upper));
     let span = upper - lower;
@@ -55,20 +57,27 @@ pub fn linear(lower: f64, upper: f64, wanted: f64) -> Ticks {
     if last - first > 1000 {
         return Ticks::default();
     }
-    // Very large or small numbers share a power of ten, which goes into every label: no separate exponent is overlooked.
+    // Very large or small numbers share a power of ten, which goes into every label: no separate
+    // exponent is overlooked.
     let largest = lower.abs().max(upper.abs());
-    let shift = if !(1e-3..1e5).contains(&largest) { elementary::log10(largest).floor() as i32 } else { 0 };
+    let shift =
+        if !(1e-3..1e5).contains(&largest) { elementary::log10(largest).floor() as i32 } else { 0 };
     let major = (first..=last)
-        .map(|k| Tick { value: decimal(k * mantissa, exponent), label: label(k * mantissa, exponent, shift) })
+        .map(|k| Tick {
+            value: decimal(k * mantissa, exponent),
+            label: label(k * mantissa, exponent, shift),
+        })
         .collect();
     let fine = step / f64::from(divisions);
     let first = ((lower - tolerance) / fine).ceil() as i64;
     let last = ((upper + tolerance) / fine).floor() as i64;
-    let minor = (first..=last).filter(|k| k % i64::from(divisions) != 0).map(|k| k as f64 * fine).collect();
+    let minor =
+        (first..=last).filter(|k| k % i64::from(divisions) != 0).map(|k| k as f64 * fine).collect();
     Ticks { major, minor }
 }
 
-/// `mantissa` times ten to `exponent` as a decimal number, with ten to `shift` taken out if that is not zero.
+/// `mantissa` times ten to `exponent` as a decimal number, with ten to `shift` taken out if that is
+/// not zero.
 fn label(mantissa: i64, exponent: i32, shift: i32) -> String {
     let text = fixed(mantissa, exponent - shift);
     match shift {
@@ -92,8 +101,9 @@ fn fixed(mantissa: i64, exponent: i32) -> String {
     format!("{sign}{whole}.{fraction}")
 }
 
-/// Ticks of a logarithmic axis from `lower` to `upper` (both positive), at most about `wanted` labelled ones: at powers of ten, and at
-/// twice and five times these where the axis covers few of them.
+/// Ticks of a logarithmic axis from `lower` to `upper` (both positive), at most about `wanted`
+/// labelled ones: at powers of ten, and at twice and five times these where the axis covers few of
+/// them.
 pub fn logarithmic(lower: f64, upper: f64, wanted: f64) -> Ticks {
     let (lower, upper) = (lower.min(upper), lower.max(upper));
     if !(lower > 0.0 && upper.is_finite() && lower < upper && wanted > 0.0) {
@@ -150,7 +160,11 @@ fn power_label(mantissa: i64, exponent: i32) -> String {
 }
 
 fn power_notation(mantissa: i64, exponent: i32) -> String {
-    if mantissa == 1 { format!("10^{{{exponent}}}") } else { format!("{mantissa}×10^{{{exponent}}}") }
+    if mantissa == 1 {
+        format!("10^{{{exponent}}}")
+    } else {
+        format!("{mantissa}×10^{{{exponent}}}")
+    }
 }
 
 #[cfg(test)]
@@ -164,7 +178,10 @@ mod tests {
 
     #[test]
     fn linear_ticks_are_round_numbers() {
-        assert_eq!(labels(&linear(-1.6, 1.6, 7.0)), ["-1.5", "-1.0", "-0.5", "0.0", "0.5", "1.0", "1.5"]);
+        assert_eq!(
+            labels(&linear(-1.6, 1.6, 7.0)),
+            ["-1.5", "-1.0", "-0.5", "0.0", "0.5", "1.0", "1.5"]
+        );
         assert_eq!(labels(&linear(0.0, 100.0, 5.0)), ["0", "20", "40", "60", "80", "100"]);
         assert_eq!(labels(&linear(-24.0, 34.0, 6.0)), ["-20", "-10", "0", "10", "20", "30"]);
         assert_eq!(labels(&linear(0.22, 0.79, 6.0)), ["0.3", "0.4", "0.5", "0.6", "0.7"]);
@@ -179,13 +196,19 @@ mod tests {
 
     #[test]
     fn large_and_small_numbers_carry_their_power_of_ten() {
-        assert_eq!(labels(&linear(0.0, 2e5, 4.0)), ["0", "0.5×10^{5}", "1.0×10^{5}", "1.5×10^{5}", "2.0×10^{5}"]);
+        assert_eq!(
+            labels(&linear(0.0, 2e5, 4.0)),
+            ["0", "0.5×10^{5}", "1.0×10^{5}", "1.5×10^{5}", "2.0×10^{5}"]
+        );
         assert_eq!(labels(&linear(0.0, 3e-4, 3.0)), ["0", "10^{-4}", "2×10^{-4}", "3×10^{-4}"]);
     }
 
     #[test]
     fn log_ticks_are_powers_of_ten() {
-        assert_eq!(labels(&logarithmic(1e-8, 1e-4, 8.0)), ["10^{-8}", "10^{-7}", "10^{-6}", "10^{-5}", "10^{-4}"]);
+        assert_eq!(
+            labels(&logarithmic(1e-8, 1e-4, 8.0)),
+            ["10^{-8}", "10^{-7}", "10^{-6}", "10^{-5}", "10^{-4}"]
+        );
         assert_eq!(labels(&logarithmic(3.0, 60.0, 8.0)), ["5", "10", "20", "50"]);
         assert_eq!(labels(&logarithmic(50.0, 2e5, 8.0)), ["10^{2}", "10^{3}", "10^{4}", "10^{5}"]);
         assert!(logarithmic(1e-300, 1e300, 6.0).major.len() <= 8);
@@ -202,7 +225,8 @@ mod tests {
 
     proptest! {
         #[test]
-        fn ticks_lie_in_range_ascend_and_say_what_they_are(centre in -1e6f64..1e6, span in 1e-3f64..1e6, wanted in 2.0f64..12.0) {
+        fn ticks_lie_in_range_ascend_and_say_what_they_are(centre in -1e6f64..1e6,
+            span in 1e-3f64..1e6, wanted in 2.0f64..12.0) {
             let (lower, upper) = (centre - span, centre + span);
             let ticks = linear(lower, upper, wanted);
             prop_assert!(!ticks.major.is_empty());

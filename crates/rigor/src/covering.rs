@@ -8,8 +8,10 @@
 //! sets each covers the next one, there is an orbit that visits them in this order, and for a loop
 //! a periodic one (their Theorem 4): two sets that both cover both make a horseshoe.
 //!
-//! The map is the return to the plane by a flow. The set is cut across the direction of stretching into pieces small enough for each image to be decided; the
-//! image of a piece is enclosed in the other set's own coordinates (u, v), so that an image much longer than wide is seen as what it is.
+//! The map is the return to the plane by a flow. The set is cut across the direction of stretching
+//! into pieces small enough for each image to be decided; the image of a piece is enclosed in the
+//! other set's own coordinates (u, v), so that an image much longer than wide is seen as what it
+//! is.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -20,8 +22,8 @@ use super::section::AxisPlane;
 use super::set::Set;
 use twofold_num::{Arithmetic, Enclosure, Interval, Tape};
 
-/// A parallelogram in a plane of section: { centre + u unstable + v stable : u, v in [-1, 1] }, in the plane's two coordinates, in the order of
-/// the states.
+/// A parallelogram in a plane of section: { centre + u unstable + v stable : u, v in [-1, 1] }, in
+/// the plane's two coordinates, in the order of the states.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HSet {
     /// Its middle.
@@ -84,7 +86,8 @@ impl HSet {
         let mut centre = SVector::<S, 3>::from_element(S::from_f64(plane.value));
         let mut stretch = SMatrix::<f64, 3, 3>::identity();
         for (i, k) in [p, q].into_iter().enumerate() {
-            centre[k] = S::from_f64(self.centre[i]) + S::from_f64(self.unstable[i]) * S::from_f64(middle);
+            centre[k] =
+                S::from_f64(self.centre[i]) + S::from_f64(self.unstable[i]) * S::from_f64(middle);
             (stretch[(k, p)], stretch[(k, q)]) = (self.unstable[i], self.stable[i]);
         }
         let mut weights = IVector::<3>::from_element(Interval::zero());
@@ -96,7 +99,8 @@ impl HSet {
     /// A set in the plane, in the coordinates (u, v).
     fn see<S: Enclosure>(&self, plane: AxisPlane, set: &Set<S, 3>) -> Result<[Interval; 2], Error> {
         let [p, q] = others(plane.axis);
-        let [[a, c], [b, d]] = [self.unstable.map(Interval::from_f64), self.stable.map(Interval::from_f64)];
+        let [[a, c], [b, d]] =
+            [self.unstable.map(Interval::from_f64), self.stable.map(Interval::from_f64)];
         let determinant = a * d - b * c;
         if determinant.contains(0.0) {
             return Err(Error::Singular);
@@ -111,7 +115,8 @@ impl HSet {
     }
 }
 
-/// Beyond one of the edges u = -1, u = 1, or away from the edges v = -1, v = 1: it does not meet the latter.
+/// Beyond one of the edges u = -1, u = 1, or away from the edges v = -1, v = 1: it does not meet
+/// the latter.
 fn keeps_away([u, v]: [Interval; 2]) -> bool {
     beyond([u, v]).is_some() || v.magnitude() < 1.0
 }
@@ -127,10 +132,12 @@ fn beyond([u, _]: [Interval; 2]) -> Option<bool> {
     }
 }
 
-/// Proves that `from` covers each of `to` under the return map of x' = f(x). `S` is the arithmetic of the sets' centres.
+/// Proves that `from` covers each of `to` under the return map of x' = f(x). `S` is the arithmetic
+/// of the sets' centres.
 ///
 /// # Errors
-/// See [`Error`]; [`Error::NotCovered`] if an edge's image is not beyond a set's edge, or a piece's image meets where it should not, however narrow.
+/// See [`Error`]; [`Error::NotCovered`] if an edge's image is not beyond a set's edge, or a piece's
+/// image meets where it should not, however narrow.
 pub fn prove_covering<S: Enclosure>(
     tape: &Tape,
     settings: FlowOptions,
@@ -147,7 +154,9 @@ pub fn prove_covering<S: Enclosure>(
             let crossing = flow.next_crossing(&set, map.plane, map.longest)?;
             // Directions alternate; the last is that of the start.
             let last = n + 1 == map.crossings;
-            if crossing.upward != (map.upward == (n % 2 == 1)) || last && crossing.upward != map.upward {
+            if crossing.upward != (map.upward == (n % 2 == 1))
+                || last && crossing.upward != map.upward
+            {
                 return Err(Error::WrongDirection(crossing.time.interval().midpoint()));
             }
             set = crossing.set;
@@ -157,7 +166,11 @@ pub fn prove_covering<S: Enclosure>(
         let seen = to.iter().map(|t| t.see(map.plane, &set)).collect::<Result<_, _>>()?;
         Ok(Image { part, seen, crossings })
     };
-    let not_covered = |image: &Image, set: usize| Error::NotCovered { part: image.part, set, seen: image.seen[set] };
+    let not_covered = |image: &Image, set: usize| Error::NotCovered {
+        part: image.part,
+        set,
+        seen: image.seen[set],
+    };
     let edges = [image([-1.0, -1.0])?, image([1.0, 1.0])?];
     for set in 0..to.len() {
         match edges.each_ref().map(|e| beyond(e.seen[set])) {
@@ -195,20 +208,29 @@ mod tests {
     use super::*;
     use twofold_num::tape::Recorded;
 
-    /// r' = c r (r^2 - 4), z' = -z/5, turning once in 2 pi: the circle r = 2 multiplies its neighbours' distance by exp(16 pi c) a turn.
+    /// r' = c r (r^2 - 4), z' = -z/5, turning once in 2 pi: the circle r = 2 multiplies its
+    /// neighbours' distance by exp(16 pi c) a turn.
     fn circle(c: f64) -> Tape {
         Tape::record(3, move |s: &[Recorded]| {
-            let growth = (s[0] * s[0] + s[1] * s[1] - Recorded::from_f64(4.0)) * Recorded::from_f64(c);
+            let growth =
+                (s[0] * s[0] + s[1] * s[1] - Recorded::from_f64(4.0)) * Recorded::from_f64(c);
             vec![s[0] * growth - s[1], s[1] * growth + s[0], -s[2] * Recorded::from_f64(0.2)]
         })
     }
 
-    const MAP: Return = Return { plane: AxisPlane { axis: 1, value: 0.0 }, upward: true, crossings: 2, longest: 20.0 };
+    const MAP: Return = Return {
+        plane: AxisPlane { axis: 1, value: 0.0 },
+        upward: true,
+        crossings: 2,
+        longest: 20.0,
+    };
 
     #[test]
     fn an_unstable_circle_covers_itself() {
         let set = HSet { centre: [2.0, 0.0], unstable: [0.1, 0.02], stable: [0.0, 0.1] };
-        let found = prove_covering::<Interval>(&circle(0.02), FlowOptions::PLAIN, &MAP, &set, &[set]).unwrap();
+        let found =
+            prove_covering::<Interval>(&circle(0.02), FlowOptions::PLAIN, &MAP, &set, &[set])
+                .unwrap();
         assert_eq!((found.pieces[0].part[0], found.pieces.last().unwrap().part[1]), (-1.0, 1.0));
         assert!(found.pieces.windows(2).all(|w| w[0].part[1] == w[1].part[0]));
         // The edge u = 1 has r = 2.1 exactly; 1/r^2 - 1/4 is multiplied by exp(16 pi c).
@@ -224,18 +246,29 @@ mod tests {
     fn what_does_not_stretch_or_squeeze_covers_nothing() {
         let set = HSet { centre: [2.0, 0.0], unstable: [0.1, 0.0], stable: [0.0, 0.1] };
         let fails = |c: f64, to: HSet| {
-            prove_covering::<Interval>(&circle(c), FlowOptions::PLAIN, &MAP, &set, &[to]).unwrap_err()
+            prove_covering::<Interval>(&circle(c), FlowOptions::PLAIN, &MAP, &set, &[to])
+                .unwrap_err()
         };
         assert!(matches!(fails(-0.02, set), Error::NotCovered { part: [-1.0, -1.0], set: 0, .. }));
         // Too high to be reached, too low to hold the image, beside it.
-        assert!(matches!(fails(0.02, HSet { centre: [2.0, 0.1], ..set }), Error::NotCovered { .. }));
-        assert!(matches!(fails(0.02, HSet { stable: [0.0, 0.02], ..set }), Error::NotCovered { .. }));
-        assert!(matches!(fails(0.02, HSet { centre: [2.3, 0.0], ..set }), Error::NotCovered { part: [1.0, 1.0], .. }));
+        assert!(matches!(
+            fails(0.02, HSet { centre: [2.0, 0.1], ..set }),
+            Error::NotCovered { .. }
+        ));
+        assert!(matches!(
+            fails(0.02, HSet { stable: [0.0, 0.02], ..set }),
+            Error::NotCovered { .. }
+        ));
+        assert!(matches!(
+            fails(0.02, HSet { centre: [2.3, 0.0], ..set }),
+            Error::NotCovered { part: [1.0, 1.0], .. }
+        ));
         // No area.
         assert_eq!(fails(0.02, HSet { stable: [0.2, 0.0], ..set }), Error::Singular);
         // An odd number of crossings is no return.
         let half = Return { crossings: 1, ..MAP };
-        let odd = prove_covering::<Interval>(&circle(0.02), FlowOptions::PLAIN, &half, &set, &[set]);
+        let odd =
+            prove_covering::<Interval>(&circle(0.02), FlowOptions::PLAIN, &half, &set, &[set]);
         assert!(matches!(odd, Err(Error::WrongDirection(_))));
     }
 }

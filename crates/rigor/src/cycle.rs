@@ -1,15 +1,16 @@
 //! Closed orbits, proved.
 //!
-//! A point of the plane that the return map takes to itself is a zero of F(x) = P(x) - x. If, for a box X around a point c and
-//! an approximate inverse Y of DF, the set
+//! A point of the plane that the return map takes to itself is a zero of F(x) = P(x) - x. If, for a
+//! box X around a point c and an approximate inverse Y of DF, the set
 //!
 //! ```text
 //! K = c - Y F(c) + (1 - Y DF(X)) (X - c)
 //! ```
 //!
-//! lies in the interior of X, then X holds exactly one zero, and it lies in K (Krawczyk 1969; Moore 1977; Neumaier 1990, sec. 5.1).
-//! The map's value and derivative are enclosures, so that the inclusion is a proof of existence and local uniqueness.
-//! The orbit attracts if both eigenvalues of DP at the point lie in the open unit disc, which is so if and only if
+//! lies in the interior of X, then X holds exactly one zero, and it lies in K (Krawczyk 1969; Moore
+//! 1977; Neumaier 1990, sec. 5.1). The map's value and derivative are enclosures, so that the
+//! inclusion is a proof of existence and local uniqueness. The orbit attracts if both eigenvalues
+//! of DP at the point lie in the open unit disc, which is so if and only if
 //! |trace| < 1 + det and det < 1 (Jury's conditions); DP(K) encloses DP there.
 
 use nalgebra::SVector;
@@ -23,7 +24,8 @@ use twofold_num::{Arithmetic, Interval, Tape};
 /// A proved closed orbit of a flow in three dimensions, with enclosures.
 #[derive(Clone, Debug)]
 pub struct Cycle {
-    /// The box, in the plane's coordinates, in which exactly one closed orbit with this number of crossings was proved to cross.
+    /// The box, in the plane's coordinates, in which exactly one closed orbit with this number of
+    /// crossings was proved to cross.
     pub candidate: [Interval; 2],
     /// Its image by Krawczyk's operator: it lies inside the candidate, and the orbit crosses in it.
     pub image: [Interval; 2],
@@ -56,11 +58,14 @@ impl Cycle {
             && (one + self.determinant + self.trace).is_positive()
     }
 
-    /// Whether one multiplier is proved to lie outside the closed unit disc and the other inside the open one, the orbit being a saddle: their
-    /// characteristic polynomial l^2 - trace l + det has different signs at 1 and at -1, so that exactly one of its zeros, both real, lies between.
+    /// Whether one multiplier is proved to lie outside the closed unit disc and the other inside
+    /// the open one, the orbit being a saddle: their characteristic polynomial l^2 - trace l + det
+    /// has different signs at 1 and at -1, so that exactly one of its zeros, both real, lies
+    /// between.
     pub fn is_saddle(&self) -> bool {
         let one = Interval::one();
-        let (above, below) = (one + self.determinant - self.trace, one + self.determinant + self.trace);
+        let (above, below) =
+            (one + self.determinant - self.trace, one + self.determinant + self.trace);
         above.is_positive() && below.is_negative() || above.is_negative() && below.is_positive()
     }
 }
@@ -113,7 +118,11 @@ fn turn(flow: &mut Flow<Interval, 3>, search: &Search, from: [Interval; 2]) -> R
     }
     let hull = set.hull();
     let d = set.derivative().ok_or(Error::Singular)?;
-    Ok(Turn { value: [hull[p], hull[q]], slope: [[d[(p, p)], d[(p, q)]], [d[(q, p)], d[(q, q)]]], crossings })
+    Ok(Turn {
+        value: [hull[p], hull[q]],
+        slope: [[d[(p, p)], d[(p, q)]], [d[(q, p)], d[(q, q)]]],
+        crossings,
+    })
 }
 
 /// The inverse of a 2 x 2 matrix, not rigorous.
@@ -182,7 +191,8 @@ pub fn prove_cycle(tape: &Tape, settings: FlowOptions, search: &Search) -> Resul
     for _ in 0..NEWTON_STEPS {
         let point = near.map(Interval::from_f64);
         let at = turn(&mut flow, search, point)?;
-        let next = krawczyk(point, near, at.value, at.slope, preconditioner(at.slope)?).map(Interval::midpoint);
+        let next = krawczyk(point, near, at.value, at.slope, preconditioner(at.slope)?)
+            .map(Interval::midpoint);
         let moved = (0..2).fold(0.0, |m: f64, i| m.max((next[i] - near[i]).abs()));
         near = next;
         if moved < 1e-3 * search.radius {

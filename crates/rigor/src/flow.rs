@@ -1,16 +1,17 @@
 //! Validated Taylor steps.
 //!
-//! A step of length h from a set X needs a box W that all solutions stay in. W is guessed from the series over X, and proved by the
-//! high-order enclosure: if
+//! A step of length h from a set X needs a box W that all solutions stay in. W is guessed from the
+//! series over X, and proved by the high-order enclosure: if
 //!
 //! ```text
 //! sum_{k<=K} [0,h]^k x_k(X) + [0,h]^(K+1) x_(K+1)(W)  lies in the interior of  W,
 //! ```
 //!
-//! x_k being the Taylor coefficients as functions of the state, then every solution from X exists and stays in W up to h (Corliss &
-//! Rihm 1996; Nedialkov & Jackson 1999), and its Lagrange remainder lies in h^(K+1) x_(K+1)(W). The test needs exactly
-//! the two series that the step needs anyway. It also decides the step size: the remainder must stay below the
-//! tolerance. So a thin layer cannot be jumped: the box W sees it.
+//! x_k being the Taylor coefficients as functions of the state, then every solution from X exists
+//! and stays in W up to h (Corliss & Rihm 1996; Nedialkov & Jackson 1999), and its Lagrange
+//! remainder lies in h^(K+1) x_(K+1)(W). The test needs exactly the two series that the step needs
+//! anyway. It also decides the step size: the remainder must stay below the tolerance. So a thin
+//! layer cannot be jumped: the box W sees it.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -41,7 +42,8 @@ impl FlowOptions {
 /// The shortest step tried.
 const SHORTEST_STEP: f64 = 1e-12;
 
-/// The flow of an autonomous equation x' = f(x), on sets. `S` is the arithmetic of the sets' centres.
+/// The flow of an autonomous equation x' = f(x), on sets. `S` is the arithmetic of the sets'
+/// centres.
 #[derive(Clone, Debug)]
 pub struct Flow<S, const N: usize> {
     settings: FlowOptions,
@@ -122,29 +124,35 @@ impl<S: Enclosure, const N: usize> Flow<S, N> {
             if h < SHORTEST_STEP || h.is_nan() {
                 return Err(failed(h));
             }
-            // The polynomial over all of the step, then room for the remainder, and for rounding the test itself.
+            // The polynomial over all of the step, then room for the remainder, and for rounding
+            // the test itself.
             let span = Interval::between(0.0, h);
-            let reach: IVector<N> = states
-                .iter()
-                .rev()
-                .fold(IVector::from_element(Interval::zero()), |s, c| IVector::from_fn(|i, _| s[i] * span + c.0[i]));
-            let stay: IVector<N> =
-                reach.map(|x: Interval| x + Interval::symmetric(tolerance + 4.0 * f64::EPSILON * x.magnitude()));
+            let reach: IVector<N> =
+                states.iter().rev().fold(IVector::from_element(Interval::zero()), |s, c| {
+                    IVector::from_fn(|i, _| s[i] * span + c.0[i])
+                });
+            let stay: IVector<N> = reach.map(|x: Interval| {
+                x + Interval::symmetric(tolerance + 4.0 * f64::EPSILON * x.magnitude())
+            });
             let ratio: f64 = if stay.iter().all(|x| x.is_bounded()) {
-                let (coefficient, derivative) = self.last_coefficient(&stay, h, set.has_derivative());
+                let (coefficient, derivative) =
+                    self.last_coefficient(&stay, h, set.has_derivative());
                 let span_power = (0..k).fold(span, |p, _| p * span);
-                let largest = coefficient
-                    .iter()
-                    .fold(0.0, |m: f64, c| m.max((*c * Interval::from_f64(span_power.upper())).magnitude()));
+                let largest = coefficient.iter().fold(0.0, |m: f64, c| {
+                    m.max((*c * Interval::from_f64(span_power.upper())).magnitude())
+                });
                 // The inclusion itself: polynomial plus remainder, in the interior of the box.
-                let inside = (0..N).all(|i| (reach[i] + span_power * coefficient[i]).interior(stay[i]));
+                let inside =
+                    (0..N).all(|i| (reach[i] + span_power * coefficient[i]).interior(stay[i]));
                 let ratio = elementary::pow(tolerance / largest, power);
                 if inside && largest <= tolerance {
                     let (speed, _) = self.right_side(&stay);
                     self.next_step = h * (0.9 * ratio).clamp(0.5, 2.0);
                     let centre = set.centre();
                     self.centre.expand(centre.as_slice());
-                    let centre = (0..=k).map(|n| SVector::from_fn(|i, _| self.centre.component(i)[n])).collect();
+                    let centre = (0..=k)
+                        .map(|n| SVector::from_fn(|i, _| self.centre.component(i)[n]))
+                        .collect();
                     return Ok(Proved {
                         stay,
                         speed,
@@ -163,16 +171,24 @@ impl<S: Enclosure, const N: usize> Flow<S, N> {
         }
     }
 
-    /// Coefficient K + 1 over a box, and of the derivative with respect to the state at the step's start.
-    fn last_coefficient(&mut self, stay: &IVector<N>, h: f64, derivative: bool) -> (IVector<N>, Option<IMatrix<N>>) {
+    /// Coefficient K + 1 over a box, and of the derivative with respect to the state at the step's
+    /// start.
+    fn last_coefficient(
+        &mut self,
+        stay: &IVector<N>,
+        h: f64,
+        derivative: bool,
+    ) -> (IVector<N>, Option<IMatrix<N>>) {
         let n = self.settings.order + 1;
         if !derivative {
             self.stay.expand(stay.as_slice());
             return (IVector::from_fn(|i, _| self.stay.component(i)[n]), None);
         }
-        // V' = Df V from 1 stays within exp(L h) - 1 of 1, with L the norm of Df over the box (Gronwall).
+        // V' = Df V from 1 stays within exp(L h) - 1 of 1, with L the norm of Df over the box
+        // (Gronwall).
         let (_, jacobian) = self.right_side(stay);
-        let growth = (Interval::from_f64(linear::norm(&jacobian)) * Interval::from_f64(h)).exp() - Interval::one();
+        let growth = (Interval::from_f64(linear::norm(&jacobian)) * Interval::from_f64(h)).exp()
+            - Interval::one();
         let off = Interval::symmetric(growth.upper());
         let x: Vec<Dual<Interval, N>> = (0..N)
             .map(|i| Dual {
@@ -186,20 +202,29 @@ impl<S: Enclosure, const N: usize> Flow<S, N> {
     }
 
     /// The set after `h`, at most the length proved.
-    pub(super) fn advance(&mut self, set: &Set<S, N>, proved: &Proved<S, N>, h: f64) -> Result<Set<S, N>, Error> {
+    pub(super) fn advance(
+        &mut self,
+        set: &Set<S, N>,
+        proved: &Proved<S, N>,
+        h: f64,
+    ) -> Result<Set<S, N>, Error> {
         debug_assert!(h <= proved.longest);
         self.steps += 1;
         let (t, step) = (S::from_f64(h), Interval::from_f64(h));
         let last = (0..self.settings.order).fold(step, |p, _| p * step);
-        let value: SVector<S, N> = proved
-            .centre
+        let value: SVector<S, N> =
+            proved.centre.iter().rev().fold(SVector::from_element(S::zero()), |s, c| {
+                SVector::from_fn(|i, _| s[i] * t + c[i])
+            });
+        // The series of the centre is exact but for its remainder, which is that of every solution
+        // in the set.
+        let value =
+            SVector::from_fn(|i, _| value[i] + S::from_interval(proved.remainder[i] * last));
+        let jacobian: IMatrix<N> = proved
+            .states
             .iter()
             .rev()
-            .fold(SVector::from_element(S::zero()), |s, c| SVector::from_fn(|i, _| s[i] * t + c[i]));
-        // The series of the centre is exact but for its remainder, which is that of every solution in the set.
-        let value = SVector::from_fn(|i, _| value[i] + S::from_interval(proved.remainder[i] * last));
-        let jacobian: IMatrix<N> =
-            proved.states.iter().rev().fold(SMatrix::from_element(Interval::zero()), |s: IMatrix<N>, c| {
+            .fold(SMatrix::from_element(Interval::zero()), |s: IMatrix<N>, c| {
                 IMatrix::from_fn(|i, j| s[(i, j)] * step + c.1[(i, j)])
             });
         let full = match &proved.remainder_derivative {
@@ -210,7 +235,12 @@ impl<S: Enclosure, const N: usize> Flow<S, N> {
     }
 
     /// A guess, not rigorous, at when within the step a coordinate of the centre takes a value.
-    pub(super) fn guess_crossing(&self, proved: &Proved<S, N>, axis: usize, value: f64) -> Option<f64> {
+    pub(super) fn guess_crossing(
+        &self,
+        proved: &Proved<S, N>,
+        axis: usize,
+        value: f64,
+    ) -> Option<f64> {
         let c: Vec<f64> = proved.centre.iter().map(|c| c[axis].interval().midpoint()).collect();
         let at = |t: f64| c.iter().rev().fold((0.0, 0.0), |(p, d), c| (p * t + c, d * t + p));
         let (mut low, mut high) = (0.0, proved.longest);
@@ -261,10 +291,12 @@ mod tests {
 
     #[test]
     fn a_rotation_does_not_wrap() {
-        // x'' = -x: the set only turns. After 100 units of time (16 turns) the box has its size, up to rounding.
+        // x'' = -x: the set only turns. After 100 units of time (16 turns) the box has its size, up
+        // to rounding.
         let tape = Tape::record(2, |x: &[Recorded]| vec![x[1], -x[0]]);
         let mut flow = Flow::<Interval, 2>::new(&tape, FlowOptions::PLAIN);
-        let start = SVector::from([Interval::between(1.0 - 1e-3, 1.0 + 1e-3), Interval::symmetric(1e-3)]);
+        let start =
+            SVector::from([Interval::between(1.0 - 1e-3, 1.0 + 1e-3), Interval::symmetric(1e-3)]);
         let set = to(&mut flow, Set::new(start, true), 100.0);
         let hull = set.hull();
         let (c, s) = (0.8623188722876839, -0.5063656411097588); // cos 100, sin 100
@@ -292,12 +324,18 @@ mod tests {
         }
         // The set of a shifted start, by the mean value theorem.
         let shifted = [start[0] + 1e-6, start[1]];
-        let c = to(&mut plain, Set::new(SVector::from(shifted.map(Interval::from_f64)), true), 10.0);
+        let c =
+            to(&mut plain, Set::new(SVector::from(shifted.map(Interval::from_f64)), true), 10.0);
         let hull = Interval::between(start[0], shifted[0]);
-        let over = to(&mut plain, Set::new(SVector::from([hull, Interval::from_f64(start[1])]), true), 10.0);
+        let over = to(
+            &mut plain,
+            Set::new(SVector::from([hull, Interval::from_f64(start[1])]), true),
+            10.0,
+        );
         let v = over.derivative().unwrap();
         for i in 0..2 {
-            let slope = (c.hull()[i] - wide[i]) / (Interval::from_f64(shifted[0]) - Interval::from_f64(start[0]));
+            let slope = (c.hull()[i] - wide[i])
+                / (Interval::from_f64(shifted[0]) - Interval::from_f64(start[0]));
             assert!(slope.intersection(v[(i, 0)]).is_ok(), "{slope:?} and {:?}", v[(i, 0)]);
             assert!(c.hull()[i].subset(over.hull()[i]) && wide[i].subset(over.hull()[i]));
         }

@@ -46,22 +46,29 @@ pub fn difference<const R: usize, const C: usize>(
 }
 
 /// The midpoints.
-pub fn midpoints<const R: usize, const C: usize>(a: &SMatrix<Interval, R, C>) -> SMatrix<f64, R, C> {
+pub fn midpoints<const R: usize, const C: usize>(
+    a: &SMatrix<Interval, R, C>,
+) -> SMatrix<f64, R, C> {
     a.map(Interval::midpoint)
 }
 
 /// A bound of the largest sum of a row's absolute values, which is a norm.
 pub fn norm<const R: usize, const C: usize>(a: &SMatrix<Interval, R, C>) -> f64 {
     (0..R).fold(0.0, |largest: f64, i| {
-        let row = (0..C).fold(Interval::zero(), |s, j| s + Interval::from_f64(a[(i, j)].magnitude()));
+        let row =
+            (0..C).fold(Interval::zero(), |s, j| s + Interval::from_f64(a[(i, j)].magnitude()));
         largest.max(row.upper())
     })
 }
 
-/// An orthogonal matrix (to rounding) whose first columns span what the first columns of `m` span, by falling weight: the
-/// columns are taken in the order of |column| times its weight (Lohner 1987), and orthogonalised twice (Kahan's "twice is
-/// enough"). A column that the others span is replaced by a unit vector.
-pub fn orthogonal<const N: usize>(m: &SMatrix<f64, N, N>, weights: &SVector<f64, N>) -> SMatrix<f64, N, N> {
+/// An orthogonal matrix (to rounding) whose first columns span what the first columns of `m` span,
+/// by falling weight: the columns are taken in the order of |column| times its weight (Lohner
+/// 1987), and orthogonalised twice (Kahan's "twice is enough"). A column that the others span is
+/// replaced by a unit vector.
+pub fn orthogonal<const N: usize>(
+    m: &SMatrix<f64, N, N>,
+    weights: &SVector<f64, N>,
+) -> SMatrix<f64, N, N> {
     let length = |v: &SVector<f64, N>| elementary::sqrt(v.iter().fold(0.0, |s, x| s + x * x));
     let dot = |a: &SVector<f64, N>, b: &SVector<f64, N>| (0..N).fold(0.0, |s, i| s + a[i] * b[i]);
     let mut columns: Vec<(f64, SVector<f64, N>)> = (0..N)
@@ -90,7 +97,8 @@ pub fn orthogonal<const N: usize>(m: &SMatrix<f64, N, N>, weights: &SVector<f64,
         }
         let after = length(&v);
         if after > 1e-10 * before && after.is_finite() && after > 0.0 {
-            // 1e-10: what is left of a nearly dependent column still has six good digits, and is orthogonal to the others.
+            // 1e-10: what is left of a nearly dependent column still has six good digits, and is
+            // orthogonal to the others.
             q.set_column(done, &(v / after));
             done += 1;
         }
@@ -101,7 +109,8 @@ pub fn orthogonal<const N: usize>(m: &SMatrix<f64, N, N>, weights: &SVector<f64,
 /// The inverse of a matrix that is orthogonal to rounding, as something to multiply with.
 pub struct Inverse<const N: usize> {
     transposed: IMatrix<N>,
-    /// With G = Q^T Q - 1 and |G| <= e < 1, the inverse is (1 + G)^-1 Q^T, and |(1 + G)^-1 - 1| <= e/(1 - e).
+    /// With G = Q^T Q - 1 and |G| <= e < 1, the inverse is (1 + G)^-1 Q^T, and |(1 + G)^-1 - 1| <=
+    /// e/(1 - e).
     excess: Interval,
 }
 

@@ -1,14 +1,16 @@
 //! Rigorous crossings of a coordinate plane.
 //!
-//! While the box W of a step meets the plane, the flow must cross the plane in one direction on all of W: then no solution
-//! crosses twice in the step, and none is missed. The step that crosses is repeated with the length after which the centre lies on the
-//! plane; from there, all states are projected along the flow by the map
+//! While the box W of a step meets the plane, the flow must cross the plane in one direction on all
+//! of W: then no solution crosses twice in the step, and none is missed. The step that crosses is
+//! repeated with the length after which the centre lies on the plane; from there, all states are
+//! projected along the flow by the map
 //!
 //! ```text
 //! pi(x) = phi(tau(x), x),   D pi = (1 - f(pi) n^T / (n^T f(pi))) D phi(tau, x),
 //! ```
 //!
-//! n being the plane's normal, in mean value form, so that the set keeps its shape and the crossing costs no width to first order.
+//! n being the plane's normal, in mean value form, so that the set keeps its shape and the crossing
+//! costs no width to first order.
 
 use nalgebra::SVector;
 
@@ -44,11 +46,17 @@ pub struct Crossing<S, const N: usize> {
 impl<S: Enclosure, const N: usize> Flow<S, N> {
     /// The next crossing of `plane` by all solutions from `set`, before t = `latest`.
     ///
-    /// `set` lies on one side of the plane, or on it (as after a crossing; that one does not count).
+    /// `set` lies on one side of the plane, or on it (as after a crossing; that one does not
+    /// count).
     ///
     /// # Errors
     /// See [`Error`]; nothing is returned that is not proved.
-    pub fn next_crossing(&mut self, set: &Set<S, N>, plane: AxisPlane, latest: f64) -> Result<Crossing<S, N>, Error> {
+    pub fn next_crossing(
+        &mut self,
+        set: &Set<S, N>,
+        plane: AxisPlane,
+        latest: f64,
+    ) -> Result<Crossing<S, N>, Error> {
         let mut set = set.clone();
         let value = Interval::from_f64(plane.value);
         let wide = |set: &Set<S, N>| Error::NotTransversal {
@@ -117,14 +125,22 @@ impl<S: Enclosure, const N: usize> Flow<S, N> {
     }
 
     /// Projects a set around the plane onto it, along the flow.
-    fn project(&mut self, set: &Set<S, N>, plane: AxisPlane, upward: bool) -> Result<Crossing<S, N>, Error> {
+    fn project(
+        &mut self,
+        set: &Set<S, N>,
+        plane: AxisPlane,
+        upward: bool,
+    ) -> Result<Crossing<S, N>, Error> {
         let axis = plane.axis;
         let hull = set.hull();
-        let wide =
-            || Error::NotTransversal { time: set.time().interval().midpoint(), near: hull.iter().copied().collect() };
+        let wide = || Error::NotTransversal {
+            time: set.time().interval().midpoint(),
+            near: hull.iter().copied().collect(),
+        };
         let height = hull[axis] - Interval::from_f64(plane.value);
-        // A box that all solutions from the hull stay in until they have met the plane, forward or backward in time: by the
-        // first-order inclusion hull + [-d, d] f(W) in W, with d long enough to reach the plane at the least speed on W.
+        // A box that all solutions from the hull stay in until they have met the plane, forward or
+        // backward in time: by the first-order inclusion hull + [-d, d] f(W) in W, with d long
+        // enough to reach the plane at the least speed on W.
         let (mut speed, _) = self.right_side(&hull);
         let mut stay = hull;
         let mut found = false;
@@ -133,7 +149,9 @@ impl<S: Enclosure, const N: usize> Flow<S, N> {
             if slowest == 0.0 || speed[axis].is_positive() != upward {
                 return Err(wide());
             }
-            let within = (Interval::from_f64(height.magnitude()) / Interval::from_f64(slowest)).upper() * 1.01;
+            let within = (Interval::from_f64(height.magnitude()) / Interval::from_f64(slowest))
+                .upper()
+                * 1.01;
             let span = Interval::symmetric(within);
             let reach: IVector<N> = IVector::from_fn(|i, _| hull[i] + span * speed[i]);
             if (0..N).all(|i| reach[i].interior(stay[i]))
@@ -143,7 +161,9 @@ impl<S: Enclosure, const N: usize> Flow<S, N> {
                 break;
             }
             stay = reach.map(|x: Interval| {
-                x + Interval::symmetric(0.01 * x.width() + 1e-16 * x.magnitude() + f64::MIN_POSITIVE)
+                x + Interval::symmetric(
+                    0.01 * x.width() + 1e-16 * x.magnitude() + f64::MIN_POSITIVE,
+                )
             });
             speed = self.right_side(&stay).0;
         }
@@ -157,20 +177,23 @@ impl<S: Enclosure, const N: usize> Flow<S, N> {
         let gap = centre[axis] - S::from_f64(plane.value);
         let own = -gap / S::from_interval(speed[axis]);
         let value = SVector::from_fn(|i, _| {
-            if i == axis { S::from_f64(plane.value) } else { centre[i] + own * S::from_interval(speed[i]) }
+            if i == axis {
+                S::from_f64(plane.value)
+            } else {
+                centre[i] + own * S::from_interval(speed[i])
+            }
         });
         // D phi(tau, .) is within exp(L |tau|) - 1 of 1.
-        let growth = (Interval::from_f64(linear::norm(&jacobian)) * Interval::from_f64(delay.magnitude())).exp()
+        let growth = (Interval::from_f64(linear::norm(&jacobian))
+            * Interval::from_f64(delay.magnitude()))
+        .exp()
             - Interval::one();
         let off = Interval::symmetric(growth.upper());
         let moved = linear::identity::<N>().map(|x| x + off);
         let slope: IVector<N> = IVector::from_fn(|i, _| speed[i] / speed[axis]);
-        let projection: IMatrix<N> =
-            IMatrix::from_fn(
-                |i, j| {
-                    if i == axis { Interval::zero() } else { moved[(i, j)] - slope[i] * moved[(axis, j)] }
-                },
-            );
+        let projection: IMatrix<N> = IMatrix::from_fn(|i, j| {
+            if i == axis { Interval::zero() } else { moved[(i, j)] - slope[i] * moved[(axis, j)] }
+        });
         let time = set.time() + S::from_interval(delay);
         let on = Some((axis, plane.value));
         let set = set.image(value, &projection, &projection, S::from_interval(delay), on)?;

@@ -1,12 +1,13 @@
 //! Sets of states, and of derivatives, in shapes that follow the flow.
 //!
-//! A [`Set`] is { c + C p + B r : p in P, r in R }: a point, the image of the initial box P under the linearised flow, and all
-//! errors made on the way, in an orthogonal frame B that is turned after every step so that its first axis lies along the longest side
-//! of what is enclosed (the doubleton of Mrozek & Zgliczynski 2000, after Lohner 1987). A box in fixed axes would be
-//! wrapped anew at each step and grow exponentially in a flow that merely rotates.
+//! A [`Set`] is { c + C p + B r : p in P, r in R }: a point, the image of the initial box P under
+//! the linearised flow, and all errors made on the way, in an orthogonal frame B that is turned
+//! after every step so that its first axis lies along the longest side of what is enclosed (the
+//! doubleton of Mrozek & Zgliczynski 2000, after Lohner 1987). A box in fixed axes would be wrapped
+//! anew at each step and grow exponentially in a flow that merely rotates.
 //!
-//! Beside it goes, if asked for, the derivative of the state with respect to the initial state, in the same form, column by column:
-//! V = D + B E (the C1 algorithm of Zgliczynski 2002).
+//! Beside it goes, if asked for, the derivative of the state with respect to the initial state, in
+//! the same form, column by column: V = D + B E (the C1 algorithm of Zgliczynski 2002).
 
 use nalgebra::{SMatrix, SVector};
 
@@ -36,7 +37,8 @@ struct Derivative<const N: usize> {
 }
 
 impl<S: Enclosure, const N: usize> Set<S, N> {
-    /// A box at t = 0. With `derivative`, the derivative with respect to the state is carried along.
+    /// A box at t = 0. With `derivative`, the derivative with respect to the state is carried
+    /// along.
     pub fn new(states: SVector<S, N>, derivative: bool) -> Self {
         let split = states.map(|x| x.split().0);
         let initial = IVector::from_fn(|i, _| states[i].split().1);
@@ -46,21 +48,25 @@ impl<S: Enclosure, const N: usize> Set<S, N> {
             initial,
             frame: SMatrix::identity(),
             errors: IVector::from_element(Interval::zero()),
-            derivative: derivative
-                .then(|| Derivative { centre: SMatrix::identity(), errors: IMatrix::from_element(Interval::zero()) }),
+            derivative: derivative.then(|| Derivative {
+                centre: SMatrix::identity(),
+                errors: IMatrix::from_element(Interval::zero()),
+            }),
             time: S::zero(),
             on: None,
         }
     }
 
-    /// A box in the plane where a coordinate has a value, at t = 0; that coordinate of `states` is replaced.
+    /// A box in the plane where a coordinate has a value, at t = 0; that coordinate of `states` is
+    /// replaced.
     pub fn on_plane(mut states: SVector<S, N>, axis: usize, value: f64, derivative: bool) -> Self {
         states[axis] = S::from_f64(value);
         Self { on: Some((axis, value)), ..Self::new(states, derivative) }
     }
 
-    /// A parallelepiped { centre + stretch w : w in `weights` } in the plane where a coordinate has a value, at t = 0; that
-    /// coordinate's weight is replaced by zero, the coordinate of `centre` by the value.
+    /// A parallelepiped { centre + stretch w : w in `weights` } in the plane where a coordinate has
+    /// a value, at t = 0; that coordinate's weight is replaced by zero, the coordinate of `centre`
+    /// by the value.
     pub fn parallelepiped(
         mut centre: SVector<S, N>,
         stretch: SMatrix<f64, N, N>,
@@ -112,7 +118,10 @@ impl<S: Enclosure, const N: usize> Set<S, N> {
         let middle = IVector::from_fn(|i, _| (self.centre[i] - S::from_f64(origin[i])).interval());
         let stretch = linear::product(m, &linear::exactly(&self.stretch));
         let frame = linear::product(m, &linear::exactly(&self.frame));
-        let spread = linear::sum(&linear::apply(&stretch, &self.initial), &linear::apply(&frame, &self.errors));
+        let spread = linear::sum(
+            &linear::apply(&stretch, &self.initial),
+            &linear::apply(&frame, &self.errors),
+        );
         linear::sum(&linear::apply(m, &middle), &spread)
     }
 
@@ -125,7 +134,10 @@ impl<S: Enclosure, const N: usize> Set<S, N> {
     /// The derivative of the state with respect to the initial state, if it is carried along.
     pub fn derivative(&self) -> Option<IMatrix<N>> {
         self.derivative.as_ref().map(|d| {
-            linear::sum(&linear::exactly(&d.centre), &linear::product(&linear::exactly(&self.frame), &d.errors))
+            linear::sum(
+                &linear::exactly(&d.centre),
+                &linear::product(&linear::exactly(&self.frame), &d.errors),
+            )
         })
     }
 
@@ -134,8 +146,9 @@ impl<S: Enclosure, const N: usize> Set<S, N> {
         self.derivative.is_some()
     }
 
-    /// The image under a map with the given value at the centre and derivative on the hull (`jacobian`); `full` is what the derivative of
-    /// states with respect to initial states is multiplied with (the same, unless `jacobian` is that of a truncated series).
+    /// The image under a map with the given value at the centre and derivative on the hull
+    /// (`jacobian`); `full` is what the derivative of states with respect to initial states is
+    /// multiplied with (the same, unless `jacobian` is that of a truncated series).
     pub(super) fn image(
         &self,
         value: SVector<S, N>,
@@ -148,7 +161,10 @@ impl<S: Enclosure, const N: usize> Set<S, N> {
         let rounding = IVector::from_fn(|i, _| value[i].split().1);
         let stretched = linear::product(jacobian, &linear::exactly(&self.stretch));
         let stretch = linear::midpoints(&stretched);
-        let residue = linear::apply(&linear::difference(&stretched, &linear::exactly(&stretch)), &self.initial);
+        let residue = linear::apply(
+            &linear::difference(&stretched, &linear::exactly(&stretch)),
+            &self.initial,
+        );
         let turned = linear::product(jacobian, &linear::exactly(&self.frame));
         let weights = self.errors.map(Interval::magnitude);
         let frame = linear::orthogonal(&linear::midpoints(&turned), &weights);
@@ -164,13 +180,16 @@ impl<S: Enclosure, const N: usize> Set<S, N> {
                 let centre = linear::midpoints(&moved);
                 let rest = linear::difference(&moved, &linear::exactly(&centre));
                 let turned = linear::product(full, &linear::exactly(&self.frame));
-                let errors =
-                    linear::sum(&linear::product(&inverse.product(&turned), &d.errors), &inverse.product(&rest));
+                let errors = linear::sum(
+                    &linear::product(&inverse.product(&turned), &d.errors),
+                    &inverse.product(&rest),
+                );
                 Some(Derivative { centre, errors })
             }
         };
         if let Some((axis, _)) = on {
-            // All else lying in the plane, a frame vector that is the plane's normal has no part in any state.
+            // All else lying in the plane, a frame vector that is the plane's normal has no part in
+            // any state.
             let leaning = (0..N).filter(|j| frame[(axis, *j)] != 0.0).count();
             for j in 0..N {
                 if leaning == 1 && (0..N).all(|i| (i == axis) == (frame[(i, j)] != 0.0)) {
@@ -181,6 +200,15 @@ impl<S: Enclosure, const N: usize> Set<S, N> {
                 }
             }
         }
-        Ok(Self { centre, stretch, initial: self.initial, frame, errors, derivative, time: self.time + elapsed, on })
+        Ok(Self {
+            centre,
+            stretch,
+            initial: self.initial,
+            frame,
+            errors,
+            derivative,
+            time: self.time + elapsed,
+            on,
+        })
     }
 }

@@ -13,7 +13,8 @@ pub trait BatchedField<const N: usize>: Sync {
     type One: VectorField<N>;
     /// That of run `run`, counted from 0.
     fn of(&self, run: usize) -> &Self::One;
-    /// The numbers in that of run `run`, as [`BatchedField::eval_in_registers`] wants them; none if all runs have the same.
+    /// The numbers in that of run `run`, as [`BatchedField::eval_in_registers`] wants them; none if
+    /// all runs have the same.
     #[doc(hidden)]
     fn numbers(&self, run: usize) -> &[f64];
     /// As [`VectorField::scratch_len`].
@@ -53,7 +54,8 @@ impl<F: VectorField<N>, const N: usize> BatchedField<N> for F {
     }
 }
 
-/// An equation for each run, that differ in numbers alone: in the values of parameters, in the width of a layer.
+/// An equation for each run, that differ in numbers alone: in the values of parameters, in the
+/// width of a layer.
 ///
 /// ```
 /// use twofold_integrate::ensemble::{EnsembleRun, ensemble};
@@ -61,7 +63,8 @@ impl<F: VectorField<N>, const N: usize> BatchedField<N> for F {
 /// use twofold_system::{ParameterBatch, Field, System, Transition};
 /// let caricature = System::builtin("caricature").expect("built in");
 /// let widths = [1e-2, 3e-3, 1e-3];
-/// let fields = widths.map(|eps| Field::smoothed(&caricature, Transition::Tanh, eps).bind::<3>().expect("three states"));
+/// let smoothed = |eps| Field::smoothed(&caricature, Transition::Tanh, eps);
+/// let fields = widths.map(|eps| smoothed(eps).bind::<3>().expect("three states"));
 /// let batch = ParameterBatch::new(fields.to_vec()).expect("one system");
 /// let run = EnsembleRun { start: [0.2, 0.0, -1.0].into(), options: DriveOptions::to(5.0) };
 /// let ends = ensemble(&batch, &[run; 3], Tolerance { rtol: 1e-8, atol: 1e-8 }, None, |_| Ignore);
@@ -74,7 +77,8 @@ pub struct ParameterBatch<const N: usize> {
 }
 
 impl<const N: usize> ParameterBatch<N> {
-    /// The runs' equations in the runs' order. `None` if there are none, or they differ in more than numbers.
+    /// The runs' equations in the runs' order. `None` if there are none, or they differ in more
+    /// than numbers.
     pub fn new(fields: Vec<BoundField<N>>) -> Option<Self> {
         let first = fields.first()?.program();
         fields.iter().all(|field| field.program().is_like(first)).then(|| {
@@ -117,10 +121,13 @@ mod tests {
     #[test]
     fn other_numbers_are_alike_and_other_operations_are_not() {
         let bound = |f: Field| f.bind::<3>().unwrap();
-        let with = |transition, eps| bound(Field::smoothed(&System::builtin("caricature").unwrap(), transition, eps));
+        let with = |transition, eps| {
+            bound(Field::smoothed(&System::builtin("caricature").unwrap(), transition, eps))
+        };
         let (a, b) = (with(Transition::Tanh, 1e-2), with(Transition::Tanh, 1e-3));
         let batch = ParameterBatch::new(vec![a.clone(), b.clone()]).unwrap();
-        let differing = batch.numbers(0).iter().zip(batch.numbers(1)).filter(|(a, b)| a != b).count();
+        let differing =
+            batch.numbers(0).iter().zip(batch.numbers(1)).filter(|(a, b)| a != b).count();
         assert_eq!(differing, 1, "eps stands in one place");
         assert!(ParameterBatch::new(vec![a.clone(), with(Transition::Arctan, 1e-2)]).is_none());
         let other = Field::smoothed(&System::builtin("two-fold").unwrap(), Transition::Tanh, 1e-2);

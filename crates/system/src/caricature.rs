@@ -13,9 +13,10 @@ use twofold_num::Elementary;
 /// f- = ( z, v-, 1 ) + (0, alpha - beta y, alpha - beta z) |x|^2     where x < 0
 /// ```
 ///
-/// Eq. (5) prints f- with first component -z, eq. (4) with +z. Only +z makes the origin the two-fold that the paper
-/// describes, invisible from both sides; [`Caricature::first_component_of_minus`] keeps the misprint available so
-/// that the difference can be shown.
+/// Eq. (5) prints f- with first component -z, eq. (4) with +z. Only +z makes the origin the
+/// two-fold that the paper describes, invisible from both sides;
+/// [`Caricature::first_component_of_minus`] keeps the misprint available so that the difference can
+/// be shown.
 ///
 /// ```
 /// use nalgebra::vector;
@@ -53,7 +54,13 @@ pub enum MinusSign {
 impl Caricature {
     /// The paper's v+ = -1.2 and v- = -1.4, with the given re-injection.
     pub fn with_reinjection(alpha: f64, beta: f64) -> Self {
-        Self { alpha, beta, v_plus: -1.2, v_minus: -1.4, first_component_of_minus: MinusSign::Equation4 }
+        Self {
+            alpha,
+            beta,
+            v_plus: -1.2,
+            v_minus: -1.4,
+            first_component_of_minus: MinusSign::Equation4,
+        }
     }
 
     /// The re-injection term's y and z components.
@@ -99,8 +106,12 @@ mod tests {
         let r2 = 0.04 + 0.25 + 1.0;
         assert_eq!(c.switching(&x), 0.2);
         let p = c.plus(&x);
-        assert!((p - vector![-0.5, 1.0 + (0.1 - 0.5e-5) * r2, -1.2 + (0.1 + 1e-5) * r2]).norm() < 1e-15);
+        assert!(
+            (p - vector![-0.5, 1.0 + (0.1 - 0.5e-5) * r2, -1.2 + (0.1 + 1e-5) * r2]).norm() < 1e-15
+        );
         let m = c.minus(&x);
-        assert!((m - vector![-1.0, -1.4 + (0.1 - 0.5e-5) * r2, 1.0 + (0.1 + 1e-5) * r2]).norm() < 1e-15);
+        assert!(
+            (m - vector![-1.0, -1.4 + (0.1 - 0.5e-5) * r2, 1.0 + (0.1 + 1e-5) * r2]).norm() < 1e-15
+        );
     }
 }

@@ -20,8 +20,8 @@
 //! push = "-x"
 //! ```
 //!
-//! A system may switch at a second surface: `plus` and `minus` above are then the fields where its h is positive, and the table `second` has those
-//! where it is negative.
+//! A system may switch at a second surface: `plus` and `minus` above are then the fields where its
+//! h is positive, and the table `second` has those where it is negative.
 //!
 //! ```toml
 //! [second]
@@ -30,10 +30,11 @@
 //! minus = ["v", "push + friction", "w", "pull + friction"]    # where the first h < 0
 //! ```
 //!
-//! Expressions are described in [`expression`](super::expression). Parameters are decimal numbers; digits beyond double precision, given
-//! as a string, are used by extended precision.
+//! Expressions are described in [`expression`](super::expression). Parameters are decimal numbers;
+//! digits beyond double precision, given as a string, are used by extended precision.
 
-// A diagnostic is made once, when a file is read; boxing it would show in every signature and save nothing.
+// A diagnostic is made once, when a file is read; boxing it would show in every signature and save
+// nothing.
 #![allow(clippy::result_large_err)]
 
 use std::collections::BTreeMap;
@@ -59,9 +60,11 @@ pub const MAX_FILE: usize = 100_000;
 /// Maximum number of operations in h, f+ and f- together.
 pub const MAX_OPERATIONS: usize = 10_000;
 
-/// A piecewise-smooth system x' = f+(x) where h(x) > 0, x' = f-(x) where h(x) < 0, as expressions. See the [module](self).
+/// A piecewise-smooth system x' = f+(x) where h(x) > 0, x' = f-(x) where h(x) < 0, as expressions.
+/// See the [module](self).
 ///
-/// A definition that exists is sound: names are known, counts fit, terms do not depend on themselves.
+/// A definition that exists is sound: names are known, counts fit, terms do not depend on
+/// themselves.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(into = "Document", try_from = "Document")]
 pub struct Definition {
@@ -121,7 +124,8 @@ impl Definition {
     ///
     /// ```
     /// use twofold_system::Definition;
-    /// let error = Definition::from_toml("states = ['x']\nh = 'x'\nplus = ['-1']\nminus = ['y']", "my.toml").unwrap_err();
+    /// let text = "states = ['x']\nh = 'x'\nplus = ['-1']\nminus = ['y']";
+    /// let error = Definition::from_toml(text, "my.toml").unwrap_err();
     /// assert_eq!(error.to_string().lines().nth(1), Some("  --> my.toml:4:11"));
     /// assert_eq!(error.help.as_deref(), Some("known here: x"));
     /// ```
@@ -130,7 +134,11 @@ impl Definition {
             Err(Diagnostic::new(message, origin, text, span, help))
         };
         if text.len() > MAX_FILE {
-            return error(format!("a file of {} bytes; the limit is {MAX_FILE}", text.len()), 0..0, None);
+            return error(
+                format!("a file of {} bytes; the limit is {MAX_FILE}", text.len()),
+                0..0,
+                None,
+            );
         }
         let document: Document = match toml::from_str(text) {
             Ok(document) => document,
@@ -141,9 +149,13 @@ impl Definition {
         };
         Self::from_document(document).map_err(|mut problem| {
             let mut span = span_of(text, &problem.place).unwrap_or(0..0);
-            if let Some((expression, part)) = problem.within.take().filter(|(text, _)| !text.is_empty()) {
+            if let Some((expression, part)) =
+                problem.within.take().filter(|(text, _)| !text.is_empty())
+            {
                 // The expression's own text, if it stands in the file as it is.
-                if let Some(at) = text.get(span.clone()).and_then(|literal| literal.rfind(&expression)) {
+                if let Some(at) =
+                    text.get(span.clone()).and_then(|literal| literal.rfind(&expression))
+                {
                     span = span.start + at + part.start..span.start + at + part.end;
                 }
             }
@@ -153,7 +165,8 @@ impl Definition {
 
     /// The definition in TOML, as [`Definition::from_toml`] reads it.
     pub fn to_toml(&self) -> String {
-        let quoted = |text: &str| serde_json::Value::from(text).to_string().replace('\u{7f}', "\\u007F");
+        let quoted =
+            |text: &str| serde_json::Value::from(text).to_string().replace('\u{7f}', "\\u007F");
         let list = |items: &mut dyn Iterator<Item = String>| items.collect::<Vec<_>>().join(", ");
         let about = |about: &About| {
             let mut text = String::new();
@@ -171,7 +184,10 @@ impl Definition {
             }
         }
         if !self.references.is_empty() {
-            text += &format!("references = [{}]\n", list(&mut self.references.iter().map(|r| quoted(r))));
+            text += &format!(
+                "references = [{}]\n",
+                list(&mut self.references.iter().map(|r| quoted(r)))
+            );
         }
         text += "states = [\n";
         for state in &self.states {
@@ -179,19 +195,29 @@ impl Definition {
         }
         text += "]\n";
         if let Some(start) = &self.start {
-            text += &format!("start = [{}]\n", list(&mut start.iter().map(|x| number(&Decimal::from(*x)))));
+            text += &format!(
+                "start = [{}]\n",
+                list(&mut start.iter().map(|x| number(&Decimal::from(*x))))
+            );
         }
         if !self.axes.is_empty() {
-            text += &format!("axes = [{}]\n", list(&mut self.axes.iter().map(|i| quoted(&self.states[*i].name))));
+            text += &format!(
+                "axes = [{}]\n",
+                list(&mut self.axes.iter().map(|i| quoted(&self.states[*i].name)))
+            );
         }
         text += &format!("h = {}\n", quoted(&self.switching.to_string()));
         for (key, field) in [("plus", &self.plus), ("minus", &self.minus)] {
-            text += &format!("{key} = [{}]\n", list(&mut field.iter().map(|e| quoted(&e.to_string()))));
+            text +=
+                &format!("{key} = [{}]\n", list(&mut field.iter().map(|e| quoted(&e.to_string()))));
         }
         if let Some(second) = &self.second {
             text += &format!("\n[second]\nh = {}\n", quoted(&second.switching.to_string()));
             for (key, field) in [("plus", &second.plus), ("minus", &second.minus)] {
-                text += &format!("{key} = [{}]\n", list(&mut field.iter().map(|e| quoted(&e.to_string()))));
+                text += &format!(
+                    "{key} = [{}]\n",
+                    list(&mut field.iter().map(|e| quoted(&e.to_string())))
+                );
             }
         }
         if !self.parameters.is_empty() {
@@ -203,7 +229,12 @@ impl Definition {
                         bounds += &format!(", {key} = {}", number(bound));
                     }
                 }
-                text += &format!("{} = {{ value = {}{bounds}{} }}\n", p.name, number(&p.value), about(&p.about));
+                text += &format!(
+                    "{} = {{ value = {}{bounds}{} }}\n",
+                    p.name,
+                    number(&p.value),
+                    about(&p.about)
+                );
             }
         }
         if !self.terms.is_empty() {
@@ -255,7 +286,8 @@ impl Definition {
         self.start.as_deref()
     }
 
-    /// Which states a picture shows, at most three: horizontal, depth (of three), vertical. Empty: the first ones.
+    /// Which states a picture shows, at most three: horizontal, depth (of three), vertical. Empty:
+    /// the first ones.
     pub fn axes(&self) -> &[usize] {
         &self.axes
     }
@@ -280,15 +312,17 @@ impl Definition {
         self.second.as_ref()
     }
 
-    /// The system near one of its two surfaces (0 or 1) and off the other: it switches at that one, and the other's function is positive, or `below`
-    /// zero. None for a system with one surface.
+    /// The system near one of its two surfaces (0 or 1) and off the other: it switches at that one,
+    /// and the other's function is positive, or `below` zero. None for a system with one surface.
     pub fn face(&self, surface: usize, below: bool) -> Option<Self> {
         let second = self.second.as_ref()?;
         let mut face = Self { second: None, ..self.clone() };
         match (surface, below) {
             (0, false) => {}
             (0, true) => (face.plus, face.minus) = (second.plus.clone(), second.minus.clone()),
-            (_, false) => (face.switching, face.minus) = (second.switching.clone(), second.plus.clone()),
+            (_, false) => {
+                (face.switching, face.minus) = (second.switching.clone(), second.plus.clone())
+            }
             (_, true) => {
                 (face.switching, face.plus) = (second.switching.clone(), self.minus.clone());
                 face.minus = second.minus.clone();
@@ -302,7 +336,12 @@ impl Definition {
         let printed = |e: &[Expression]| e.iter().map(Expression::to_string).collect();
         Canonical {
             states: self.states.iter().map(|s| s.name.clone()).collect(),
-            parameters: self.parameters.iter().zip(values).map(|(p, v)| (p.name.clone(), v.clone())).collect(),
+            parameters: self
+                .parameters
+                .iter()
+                .zip(values)
+                .map(|(p, v)| (p.name.clone(), v.clone()))
+                .collect(),
             terms: self.terms.iter().map(|(name, term)| (name.clone(), term.to_string())).collect(),
             h: self.switching.to_string(),
             plus: printed(&self.plus),
@@ -330,9 +369,14 @@ impl Definition {
 
     /// The same system with time running backwards: -f+ and -f-.
     pub fn reversed(&self) -> Self {
-        let negative = |e: &Vec<Expression>| e.iter().map(|e| Expression::Neg(Box::new(e.clone()))).collect();
+        let negative =
+            |e: &Vec<Expression>| e.iter().map(|e| Expression::Neg(Box::new(e.clone()))).collect();
         Self {
-            name: if self.name.is_empty() { String::new() } else { format!("{}-reversed", self.name) },
+            name: if self.name.is_empty() {
+                String::new()
+            } else {
+                format!("{}-reversed", self.name)
+            },
             title: format!("{}, time reversed", self.title()),
             plus: negative(&self.plus),
             minus: negative(&self.minus),
@@ -345,7 +389,8 @@ impl Definition {
         }
     }
 
-    /// The equations on a tape: h, then f+, then f-; of a system with two surfaces then the same three of the second. `values` are the parameters', in their order.
+    /// The equations on a tape: h, then f+, then f-; of a system with two surfaces then the same
+    /// three of the second. `values` are the parameters', in their order.
     pub(super) fn tape(&self, values: &[Decimal]) -> Tape {
         let tape = Tape::record(self.dimension(), |x| {
             let mut known: BTreeMap<&str, Recorded> = BTreeMap::new();
@@ -364,8 +409,12 @@ impl Definition {
                 let value = record(term, &known);
                 known.insert(name, value);
             }
-            let second = self.second.iter().flat_map(|s| std::iter::once(&s.switching).chain(&s.plus).chain(&s.minus));
-            let all = std::iter::once(&self.switching).chain(&self.plus).chain(&self.minus).chain(second);
+            let second = self
+                .second
+                .iter()
+                .flat_map(|s| std::iter::once(&s.switching).chain(&s.plus).chain(&s.minus));
+            let all =
+                std::iter::once(&self.switching).chain(&self.plus).chain(&self.minus).chain(second);
             all.map(|e| record(e, &known)).collect()
         });
         let tape = if self.second.is_none() { on_own_sides(tape) } else { tape };
@@ -377,7 +426,8 @@ impl Definition {
         let names = checked_names(&document)?;
         let dimension = states.len();
         let parse = |place: Place, text: &str| {
-            Expression::parse(text, &names).map_err(|error| Problem::in_expression(place, text, error))
+            Expression::parse(text, &names)
+                .map_err(|error| Problem::in_expression(place, text, error))
         };
         let field = |key: &'static str, texts: &[String]| -> Result<Vec<Expression>, Problem> {
             if texts.len() != dimension {
@@ -395,17 +445,22 @@ impl Definition {
         let second = match &document.second {
             None => None,
             Some(entry) => {
-                let part = |key: &'static str, texts: &[String]| -> Result<Vec<Expression>, Problem> {
-                    if texts.len() != dimension {
-                        let problem = wrong_count(key, texts.len(), &states);
-                        return Err(Problem {
-                            place: Place::part(key, None),
-                            message: format!("second.{}", problem.message),
-                            ..problem
-                        });
-                    }
-                    texts.iter().enumerate().map(|(i, text)| parse(Place::part(key, Some(i)), text)).collect()
-                };
+                let part =
+                    |key: &'static str, texts: &[String]| -> Result<Vec<Expression>, Problem> {
+                        if texts.len() != dimension {
+                            let problem = wrong_count(key, texts.len(), &states);
+                            return Err(Problem {
+                                place: Place::part(key, None),
+                                message: format!("second.{}", problem.message),
+                                ..problem
+                            });
+                        }
+                        texts
+                            .iter()
+                            .enumerate()
+                            .map(|(i, text)| parse(Place::part(key, Some(i)), text))
+                            .collect()
+                    };
                 Some(Second {
                     switching: parse(Place::part("h", None), &entry.h)?,
                     plus: part("plus", &entry.plus)?,
@@ -414,7 +469,9 @@ impl Definition {
             }
         };
         let start = match &document.start {
-            Some(start) if start.len() != dimension => return Err(wrong_count("start", start.len(), &states)),
+            Some(start) if start.len() != dimension => {
+                return Err(wrong_count("start", start.len(), &states));
+            }
             start => start.as_ref().map(|s| s.iter().map(Decimal::value).collect()),
         };
         let definition = Self {
@@ -451,22 +508,33 @@ impl Definition {
         let values: Vec<Decimal> = definition.parameters.iter().map(|p| p.value.clone()).collect();
         let operations = definition.tape(&values).operations().len();
         if operations > MAX_OPERATIONS {
-            let message = format!("the equations take {operations} operations; the limit is {MAX_OPERATIONS}");
+            let message = format!(
+                "the equations take {operations} operations; the limit is {MAX_OPERATIONS}"
+            );
             return Err(Problem::new(Place::key("plus"), message, None));
         }
         let depends = |e: &Expression| definition.depends_on_state(e);
         if !depends(&definition.switching) {
             let help = Some(format!("for example h = \"{}\"", definition.states[0].name));
-            return Err(Problem::new(Place::key("h"), "h depends on no state, so that nothing ever switches", help));
+            return Err(Problem::new(
+                Place::key("h"),
+                "h depends on no state, so that nothing ever switches",
+                help,
+            ));
         }
         if let Some(second) = &definition.second {
             if !depends(&second.switching) {
-                let message = "the second h depends on no state, so that nothing ever switches at it";
+                let message =
+                    "the second h depends on no state, so that nothing ever switches at it";
                 return Err(Problem::new(Place::part("h", None), message, None));
             }
             if second.switching == definition.switching {
                 let message = "both surfaces are the same: every point of one is a point of both";
-                return Err(Problem::new(Place::part("h", None), message, Some("leave [second] out".into())));
+                return Err(Problem::new(
+                    Place::part("h", None),
+                    message,
+                    Some("leave [second] out".into()),
+                ));
             }
         }
         Ok(definition)
@@ -475,12 +543,14 @@ impl Definition {
     /// The states on which h depends, by their numbers.
     pub fn switching_states(&self) -> Vec<usize> {
         fn reaches(d: &Definition, expression: &Expression, state: &str) -> bool {
-            expression
-                .names()
-                .into_iter()
-                .any(|name| name == state || d.terms.iter().any(|(n, term)| n == name && reaches(d, term, state)))
+            expression.names().into_iter().any(|name| {
+                name == state
+                    || d.terms.iter().any(|(n, term)| n == name && reaches(d, term, state))
+            })
         }
-        (0..self.dimension()).filter(|i| reaches(self, &self.switching, &self.states[*i].name)).collect()
+        (0..self.dimension())
+            .filter(|i| reaches(self, &self.switching, &self.states[*i].name))
+            .collect()
     }
 
     fn depends_on_state(&self, expression: &Expression) -> bool {
@@ -494,7 +564,11 @@ impl Definition {
 impl Second {
     fn entry(&self) -> SecondEntry {
         let printed = |e: &[Expression]| e.iter().map(Expression::to_string).collect();
-        SecondEntry { h: self.switching.to_string(), plus: printed(&self.plus), minus: printed(&self.minus) }
+        SecondEntry {
+            h: self.switching.to_string(),
+            plus: printed(&self.plus),
+            minus: printed(&self.minus),
+        }
     }
 }
 
@@ -517,7 +591,11 @@ impl From<Definition> for Document {
             plus: d.plus.iter().map(Expression::to_string).collect(),
             minus: d.minus.iter().map(Expression::to_string).collect(),
             second: d.second.as_ref().map(Second::entry),
-            states: d.states.into_iter().map(|State { name, about }| StateEntry { name, about }).collect(),
+            states: d
+                .states
+                .into_iter()
+                .map(|State { name, about }| StateEntry { name, about })
+                .collect(),
             parameters: Ordered(
                 d.parameters
                     .into_iter()
@@ -526,7 +604,9 @@ impl From<Definition> for Document {
                     })
                     .collect(),
             ),
-            terms: Ordered(d.terms.iter().map(|(name, term)| (name.clone(), term.to_string())).collect()),
+            terms: Ordered(
+                d.terms.iter().map(|(name, term)| (name.clone(), term.to_string())).collect(),
+            ),
         }
     }
 }
@@ -601,7 +681,12 @@ impl Problem {
     }
 
     fn in_expression(place: Place, text: &str, error: ExpressionError) -> Self {
-        Self { place, within: Some((text.into(), error.span)), message: error.message, help: error.help }
+        Self {
+            place,
+            within: Some((text.into(), error.span)),
+            message: error.message,
+            help: error.help,
+        }
     }
 }
 
@@ -666,27 +751,50 @@ fn checked_states(document: &Document) -> Result<Vec<State>, Problem> {
         let message = format!("{} states; a system has 1 to {MAX_STATES}", document.states.len());
         return Err(Problem::new(Place::key("states"), message, None));
     }
-    Ok(document.states.iter().map(|s| State { name: s.name.clone(), about: s.about.clone() }).collect())
+    Ok(document
+        .states
+        .iter()
+        .map(|s| State { name: s.name.clone(), about: s.about.clone() })
+        .collect())
 }
 
 /// All names, each sound and given once.
 fn checked_names(document: &Document) -> Result<Vec<&str>, Problem> {
-    for (key, count) in [("parameters", document.parameters.0.len()), ("let", document.terms.0.len())] {
+    for (key, count) in
+        [("parameters", document.parameters.0.len()), ("let", document.terms.0.len())]
+    {
         if count > MAX_NAMES {
-            return Err(Problem::new(Place::key(key), format!("{count} entries; the limit is {MAX_NAMES}"), None));
+            return Err(Problem::new(
+                Place::key(key),
+                format!("{count} entries; the limit is {MAX_NAMES}"),
+                None,
+            ));
         }
     }
-    let states = document.states.iter().enumerate().map(|(i, s)| (Place::item("states", i), s.name.as_str()));
-    let parameters = document.parameters.0.iter().map(|(n, _)| (Place::entry("parameters", n), n.as_str()));
+    let states = document
+        .states
+        .iter()
+        .enumerate()
+        .map(|(i, s)| (Place::item("states", i), s.name.as_str()));
+    let parameters =
+        document.parameters.0.iter().map(|(n, _)| (Place::entry("parameters", n), n.as_str()));
     let terms = document.terms.0.iter().map(|(n, _)| (Place::entry("let", n), n.as_str()));
     let mut names: Vec<(Place, &str)> = Vec::new();
     for (place, name) in states.chain(parameters).chain(terms) {
-        let problem = |message: String, help: &str| Err(Problem::new(place.clone(), message, Some(help.into())));
+        let problem = |message: String, help: &str| {
+            Err(Problem::new(place.clone(), message, Some(help.into())))
+        };
         if !is_name(name) || name.len() > 64 {
-            return problem(format!("{name:?} cannot be a name"), "a letter, then letters, digits and _, at most 64");
+            return problem(
+                format!("{name:?} cannot be a name"),
+                "a letter, then letters, digits and _, at most 64",
+            );
         }
         if is_reserved(name) {
-            return problem(format!("`{name}` has a meaning of its own in expressions"), "choose another name");
+            return problem(
+                format!("`{name}` has a meaning of its own in expressions"),
+                "choose another name",
+            );
         }
         if let Some((first, _)) = names.iter().find(|(_, n)| *n == name) {
             return problem(
@@ -707,7 +815,9 @@ fn checked_axes(document: &Document, states: &[State]) -> Result<Vec<usize>, Pro
     let index = |(i, axis): (usize, &String)| {
         names.iter().position(|n| n == axis).ok_or_else(|| {
             let help = nearest(axis, &names)
-                .map_or(format!("states are {}", names.join(", ")), |near| format!("did you mean `{near}`?"));
+                .map_or(format!("states are {}", names.join(", ")), |near| {
+                    format!("did you mean `{near}`?")
+                });
             Problem::new(Place::item("axes", i), format!("there is no state `{axis}`"), Some(help))
         })
     };
@@ -737,12 +847,16 @@ fn in_order(terms: Vec<(String, Expression)>) -> Result<Vec<(String, Expression)
     let mut left = terms;
     let mut ordered: Vec<(String, Expression)> = Vec::new();
     while !left.is_empty() {
-        let free =
-            |(_, term): &&(String, Expression)| !term.names().iter().any(|n| left.iter().any(|(other, _)| other == n));
+        let free = |(_, term): &&(String, Expression)| {
+            !term.names().iter().any(|n| left.iter().any(|(other, _)| other == n))
+        };
         let Some(at) = left.iter().position(|entry| free(&entry)) else {
             let (name, term) = &left[0];
-            let others =
-                term.names().into_iter().filter(|n| left.iter().any(|(other, _)| other == n)).collect::<Vec<_>>();
+            let others = term
+                .names()
+                .into_iter()
+                .filter(|n| left.iter().any(|(other, _)| other == n))
+                .collect::<Vec<_>>();
             let message = format!("`{name}` depends on itself, through `{}`", others.join("`, `"));
             return Err(Problem::new(
                 Place::entry("let", name),
@@ -760,12 +874,14 @@ mod tests {
     use super::*;
     use crate::System;
 
-    /// A file, the same in another order and with other texts, and what is kept of it are one system.
+    /// A file, the same in another order and with other texts, and what is kept of it are one
+    /// system.
     #[test]
     fn order_and_texts_of_a_file_make_no_other_system() {
         let read = |title: &str, [a, b, c, d]: [&str; 4]| {
             let text = format!(
-                "title = '{title}'\nstates = ['x', 'v']\nh = 'x'\nplus = ['p*v', 's + t']\nminus = ['v', 's + t + 1']\n\
+                "title = '{title}'\nstates = ['x', 'v']\nh = 'x'\nplus = ['p*v', 's + t']\nminus = \
+                    ['v', 's + t + 1']\n\
                  [let]\n{a}\n{b}\n[parameters]\n{c}\n{d}"
             );
             System::new(Definition::from_toml(&text, "").unwrap())
@@ -809,9 +925,14 @@ slip = "v - belt"
 
     #[test]
     fn toml_and_json_come_back() {
-        for text in [GOOD].into_iter().chain(crate::library::names().filter_map(crate::library::text)) {
+        for text in
+            [GOOD].into_iter().chain(crate::library::names().filter_map(crate::library::text))
+        {
             let d = Definition::from_toml(text, "f").unwrap();
-            assert_eq!(Definition::from_toml(&d.to_toml(), "f").unwrap_or_else(|e| panic!("{e}")), d);
+            assert_eq!(
+                Definition::from_toml(&d.to_toml(), "f").unwrap_or_else(|e| panic!("{e}")),
+                d
+            );
             let json = serde_json::to_string(&d).unwrap();
             assert_eq!(serde_json::from_str::<Definition>(&json).unwrap(), d);
         }
@@ -819,7 +940,8 @@ slip = "v - belt"
 
     #[test]
     fn the_canonical_form_leaves_texts_out_and_spaces() {
-        let canonical = |text: &str| System::new(Definition::from_toml(text, "f").unwrap()).canonical();
+        let canonical =
+            |text: &str| System::new(Definition::from_toml(text, "f").unwrap()).canonical();
         let other = GOOD
             .replace("block", "other")
             .replace(", meaning = \"speed\"", "")
@@ -866,7 +988,12 @@ a = 0
         assert_eq!(d.tape(&[0.0.into()]).outputs().len(), 10);
         for (from, to, place, message) in [
             ("8 + a", "8 + b", "9:20", "unknown name `b`"),
-            ("[\"5\", \"6\"]", "[\"5\"]", "8:8", "second.plus has 1 component, but there are 2 states"),
+            (
+                "[\"5\", \"6\"]",
+                "[\"5\"]",
+                "8:8",
+                "second.plus has 1 component, but there are 2 states",
+            ),
             ("h = \"y\"", "h = \"a\"", "7:5", "nothing ever switches at it"),
             ("h = \"y\"", "h = \"x\"", "7:5", "both surfaces are the same"),
             ("[second]\nh = \"y\"", "[second]", "6:1", "missing field `h`"),
@@ -884,8 +1011,20 @@ a = 0
         ("a*slip - x - 1", "a*slpi - x - 1", "6:17", "unknown name `slpi`", "did you mean `slip`?"),
         ("a*slip - x + 1", "a*slip - x + 1)", "7:30", "never opened", ""),
         ("h = \"slip\"", "h = \"\"", "5:5", "empty", ""),
-        ("\"v\", \"a*slip - x - 1\"", "\"v\"", "6:8", "plus has 1 component, but there are 2 states", "missing: v"),
-        ("\"v\", \"a*slip - x + 1\"", "\"v\", \"1\", \"2\"", "7:9", "minus has 3 components", "one for each of x, v"),
+        (
+            "\"v\", \"a*slip - x - 1\"",
+            "\"v\"",
+            "6:8",
+            "plus has 1 component, but there are 2 states",
+            "missing: v",
+        ),
+        (
+            "\"v\", \"a*slip - x + 1\"",
+            "\"v\", \"1\", \"2\"",
+            "7:9",
+            "minus has 3 components",
+            "one for each of x, v",
+        ),
         ("start = [0, 0.5]", "start = [0]", "3:9", "start has 1 component", "missing: v"),
         ("axes = [\"v\"]", "axes = [\"x\", \"w\"]", "4:14", "no state `w`", "states are x, v"),
         ("minus =", "mnius =", "7:1", "unknown field `mnius`", "did you mean `minus`?"),
@@ -905,7 +1044,13 @@ a = 0
         ("states = [\"x\", ", "states = [3, ", "2:11", "a state's name", ""),
         ("slip = \"v - belt\"", "slip = \"v - belt + v^a\"", "15:22", "whole number", ""),
         ("slip = \"v - belt\"", "slip = 'v - '", "15:13", "ends where", ""),
-        ("slip = \"v - belt\"", "slip = \"\"\"\n  v -\n  blet\"\"\"", "17:3", "unknown name `blet`", "`belt`"),
+        (
+            "slip = \"v - belt\"",
+            "slip = \"\"\"\n  v -\n  blet\"\"\"",
+            "17:3",
+            "unknown name `blet`",
+            "`belt`",
+        ),
     ];
 
     #[test]
@@ -927,7 +1072,9 @@ a = 0
     #[test]
     fn errors_in_json_name_the_place() {
         let json = serde_json::to_string(&Definition::from_toml(GOOD, "f").unwrap()).unwrap();
-        let error = serde_json::from_str::<Definition>(&json.replace("a*slip - x + 1", "a*slip - x + y")).unwrap_err();
+        let error =
+            serde_json::from_str::<Definition>(&json.replace("a*slip - x + 1", "a*slip - x + y"))
+                .unwrap_err();
         assert!(error.to_string().contains("minus[2]:1:14"), "{error}");
     }
 
@@ -936,9 +1083,15 @@ a = 0
         let long = format!("{GOOD}# {}", "x".repeat(MAX_FILE));
         assert!(Definition::from_toml(&long, "f").unwrap_err().message.contains("limit"));
         let many: String = (0..=MAX_NAMES).map(|i| format!("t{i} = \"x\"\n")).collect();
-        assert!(Definition::from_toml(&format!("{GOOD}{many}"), "f").unwrap_err().message.contains("limit"));
+        assert!(
+            Definition::from_toml(&format!("{GOOD}{many}"), "f")
+                .unwrap_err()
+                .message
+                .contains("limit")
+        );
         // Terms that double in size are shared, not multiplied out.
-        let doubling: String = (1..90).map(|i| format!("t{i} = \"t{} + t{}\"\n", i - 1, i - 1)).collect();
+        let doubling: String =
+            (1..90).map(|i| format!("t{i} = \"t{} + t{}\"\n", i - 1, i - 1)).collect();
         let text = GOOD.replace("a*slip - x - 1", "t89") + "t0 = \"x*v\"\n" + &doubling;
         let system = System::new(Definition::from_toml(&text, "f").unwrap());
         assert!(system.tape().operations().len() < 120);

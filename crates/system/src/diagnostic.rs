@@ -36,7 +36,13 @@ const EXCERPT: usize = 100;
 
 impl Diagnostic {
     /// An error at the bytes `span` of `text`.
-    pub fn new(message: impl Into<String>, origin: &str, text: &str, span: Range<usize>, help: Option<String>) -> Self {
+    pub fn new(
+        message: impl Into<String>,
+        origin: &str,
+        text: &str,
+        span: Range<usize>,
+        help: Option<String>,
+    ) -> Self {
         let boundary = |mut i: usize| {
             i = i.min(text.len());
             while !text.is_char_boundary(i) {
@@ -52,7 +58,12 @@ impl Diagnostic {
         // A window of a long line, with the mark in it.
         let skip = if before + width > EXCERPT { before.saturating_sub(EXCERPT / 3) } else { 0 };
         let printable = |c: char| if c.is_control() { ' ' } else { c };
-        let excerpt = text[line_start..line_end].chars().skip(skip).take(EXCERPT).map(printable).collect::<String>();
+        let excerpt = text[line_start..line_end]
+            .chars()
+            .skip(skip)
+            .take(EXCERPT)
+            .map(printable)
+            .collect::<String>();
         Self {
             message: message.into(),
             origin: origin.into(),
@@ -83,17 +94,20 @@ impl fmt::Display for Diagnostic {
 
 impl std::error::Error for Diagnostic {}
 
-/// The known word that `word` most likely stands for, if there is one: equal but for case, or at most a third of its letters
-/// changed, added, left out or swapped.
+/// The known word that `word` most likely stands for, if there is one: equal but for case, or at
+/// most a third of its letters changed, added, left out or swapped.
 pub fn nearest<'a>(word: &str, known: &[&'a str]) -> Option<&'a str> {
     let same = known.iter().find(|k| k.eq_ignore_ascii_case(word));
     let close = known.iter().map(|k| (distance(word, k), *k)).min_by_key(|(d, _)| *d);
-    same.copied().or(close.filter(|(d, k)| *d * 3 <= k.chars().count().max(word.chars().count())).map(|(_, k)| k))
+    same.copied().or(close
+        .filter(|(d, k)| *d * 3 <= k.chars().count().max(word.chars().count()))
+        .map(|(_, k)| k))
 }
 
 /// Optimal string alignment distance (Damerau-Levenshtein with adjacent swaps).
 fn distance(a: &str, b: &str) -> usize {
-    let (a, b): (Vec<char>, Vec<char>) = (a.chars().take(64).collect(), b.chars().take(64).collect());
+    let (a, b): (Vec<char>, Vec<char>) =
+        (a.chars().take(64).collect(), b.chars().take(64).collect());
     let mut rows = vec![vec![0; b.len() + 1]; a.len() + 1];
     for (i, row) in rows.iter_mut().enumerate() {
         row[0] = i;
@@ -125,7 +139,8 @@ mod tests {
         let start = text.find("alhpa").unwrap();
         let help = Some("did you mean `alpha`?".into());
         let d = Diagnostic::new("unknown name `alhpa`", "my.toml", text, start..start + 5, help);
-        let want = "unknown name `alhpa`\n  --> my.toml:2:14\n  |\n2 | plus = [\"1 + alhpa*x\", \"y\"]\n  |              ^^^^^\n  = help: did you mean `alpha`?";
+        let want = "unknown name `alhpa`\n  --> my.toml:2:14\n  |\n2 | plus = [\"1 + \
+            alhpa*x\", \"y\"]\n  |              ^^^^^\n  = help: did you mean `alpha`?";
         assert_eq!(d.to_string(), want);
     }
 

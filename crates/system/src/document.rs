@@ -80,8 +80,10 @@ pub struct Bounds {
 impl Bounds {
     /// What a value must be, if it is not: "above 0".
     pub fn refuse(&self, value: f64) -> Option<String> {
-        let above = self.above.as_ref().filter(|b| value <= b.value()).map(|b| format!("above {b}"));
-        let below = self.below.as_ref().filter(|b| value >= b.value()).map(|b| format!("below {b}"));
+        let above =
+            self.above.as_ref().filter(|b| value <= b.value()).map(|b| format!("above {b}"));
+        let below =
+            self.below.as_ref().filter(|b| value >= b.value()).map(|b| format!("below {b}"));
         above.or(below)
     }
 }
@@ -154,13 +156,16 @@ impl<'de> Deserialize<'de> for StateEntry {
         impl<'de> Visitor<'de> for Entry {
             type Value = StateEntry;
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a state's name, or { name = \"x\", meaning = \"...\", unit = \"...\" }")
+                f.write_str(
+                    "a state's name, or { name = \"x\", meaning = \"...\", unit = \"...\" }",
+                )
             }
             fn visit_str<E: de::Error>(self, name: &str) -> Result<StateEntry, E> {
                 Ok(StateEntry { name: name.into(), about: About::default() })
             }
             fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<StateEntry, A::Error> {
-                let StateTable { name, meaning, unit } = StateTable::deserialize(MapAccessDeserializer::new(map))?;
+                let StateTable { name, meaning, unit } =
+                    StateTable::deserialize(MapAccessDeserializer::new(map))?;
                 Ok(StateEntry { name, about: About { meaning, unit } })
             }
         }
@@ -185,7 +190,10 @@ impl<'de> Deserialize<'de> for ParameterEntry {
         impl<'de> Visitor<'de> for Entry {
             type Value = ParameterEntry;
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a number, its digits as a string, or { value = 0.1, meaning = \"...\", unit = \"...\" }")
+                f.write_str(
+                    "a number, its digits as a string, or { value = 0.1, meaning \
+                    = \"...\", unit = \"...\" }",
+                )
             }
             fn visit_f64<E: de::Error>(self, value: f64) -> Result<ParameterEntry, E> {
                 plain(de::value::F64Deserializer::new(value))
@@ -202,7 +210,11 @@ impl<'de> Deserialize<'de> for ParameterEntry {
             fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<ParameterEntry, A::Error> {
                 let ParameterTable { value, above, below, meaning, unit } =
                     ParameterTable::deserialize(MapAccessDeserializer::new(map))?;
-                Ok(ParameterEntry { value, about: About { meaning, unit }, bounds: Bounds { above, below } })
+                Ok(ParameterEntry {
+                    value,
+                    about: About { meaning, unit },
+                    bounds: Bounds { above, below },
+                })
             }
         }
         fn plain<'de, D: Deserializer<'de>>(deserializer: D) -> Result<ParameterEntry, D::Error> {
@@ -266,7 +278,8 @@ pub struct Document {
     pub terms: Ordered<String>,
 }
 
-/// What decides a system's numbers, and nothing else. Two systems with equal canonical forms compute the same bytes.
+/// What decides a system's numbers, and nothing else. Two systems with equal canonical forms
+/// compute the same bytes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Canonical {
     /// The states' names, in order.

@@ -4,23 +4,25 @@
 //! sum      = product { ("+" | "-") product }          from the left: a - b + c = (a - b) + c
 //! product  = unary { ("*" | "/") unary }              from the left: a/b*c = (a/b)*c
 //! unary    = ("-" | "+") unary | power                -x^2 = -(x^2),  -a*b = (-a)*b
-//! power    = atom [ "^" unary ]                       from the right: x^2^3 = x^(2^3); whole-number exponents only
+//! power    = atom [ "^" unary ]                       from the right: x^2^3 = x^(2^3);
+//!                                                     whole-number exponents only
 //! atom     = number | name | "pi" | function "(" sum ")" | "(" sum ")"
 //! ```
 //!
 //! The expressions of a [general system](Expression::parse_general) also compare, choose and round:
 //!
 //! ```text
-//! either   = both { "or" both }                       where a general expression begins, also in parentheses
+//! either   = both { "or" both }                       begins a general expression, also in ( )
 //! both     = negation { "and" negation }
 //! negation = "not" negation | compare
-//! compare  = sum [ ("<" | "<=" | ">" | ">=") sum ]    true is 1 and false is 0 where a number is wanted
+//! compare  = sum [ ("<" | "<=" | ">" | ">=") sum ]    as a number: true is 1, false is 0
 //! atom     = ... | function "(" either { "," either } ")"
 //! ```
 //!
-//! **Order of operations decides bits**, so it is part of the format: exactly the operations that are written are done, in this
-//! order, each rounded once. Powers are products in the order of [`Elementary::power`], `abs(a)` is
-//! a times its sign, `tan(a)` is sin(a)/cos(a). Terms without state variables are computed once, in double precision.
+//! **Order of operations decides bits**, so it is part of the format: exactly the operations that
+//! are written are done, in this order, each rounded once. Powers are products in the order of
+//! [`Elementary::power`], `abs(a)` is a times its sign, `tan(a)` is sin(a)/cos(a). Terms without
+//! state variables are computed once, in double precision.
 
 use std::fmt;
 use std::ops::Range;
@@ -213,8 +215,8 @@ const INSTEAD: [(&str, &str); 30] = [
     ("clip", "x between a and b: (a + b + abs(x - a) - abs(x - b))/2"),
 ];
 const BRANCH: &str = "expressions do not branch: f+ and f- are given apart, h says which one holds";
-const PHASE: &str =
-    "carry a phase as two states, its cosine c and sine s (c' = -w*s, s' = w*c); the angle is 2*atan(s/(1 + c))";
+const PHASE: &str = "carry a phase as two states, its cosine c and sine s (c' = -w*s, s' = w*c); \
+    the angle is 2*atan(s/(1 + c))";
 
 /// The same in general systems, which have most of them.
 const INSTEAD_IN_GENERAL: [(&str, &str); 14] = [
@@ -246,7 +248,8 @@ pub fn is_reserved_in_general(name: &str) -> bool {
 
 /// Whether `name` is a letter followed by letters, digits and underscores.
 pub fn is_name(name: &str) -> bool {
-    name.starts_with(|c: char| c.is_ascii_alphabetic()) && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+    name.starts_with(|c: char| c.is_ascii_alphabetic())
+        && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
 }
 
 /// An expression.
@@ -255,7 +258,8 @@ pub fn is_name(name: &str) -> bool {
 /// use twofold_num::Decimal;
 /// use twofold_system::Expression;
 /// let e = Expression::parse("a*x^2 - 1", &["a", "x"]).unwrap();
-/// let value = e.evaluate(&mut |name| if name == "a" { 2.0 } else { 3.0 }, &|n: &Decimal| n.value());
+/// let mut names = |name: &str| if name == "a" { 2.0 } else { 3.0 };
+/// let value = e.evaluate(&mut names, &|n: &Decimal| n.value());
 /// assert_eq!(value, 17.0);
 /// ```
 #[derive(Clone, Debug, PartialEq)]
@@ -310,19 +314,23 @@ impl Expression {
     /// Reads an expression in which the given names may appear.
     ///
     /// # Errors
-    /// If the text is no expression, names something unknown, or is beyond the bounds of this module.
+    /// If the text is no expression, names something unknown, or is beyond the bounds of this
+    /// module.
     pub fn parse(text: &str, names: &[&str]) -> Result<Self, ExpressionError> {
         Self::parse_in(text, names, &[], Dialect::Smooth)
     }
 
-    /// Reads an expression of a general system, in which names, `t`, [`General`] functions, comparisons and `and`, `or`, `not` may appear.
+    /// Reads an expression of a general system, in which names, `t`, [`General`] functions,
+    /// comparisons and `and`, `or`, `not` may appear.
     ///
     /// # Errors
-    /// As [`Expression::parse`]; also if a condition stands where a number is wanted by `and`, `or`, `not` or `if`, or the other way round.
+    /// As [`Expression::parse`]; also if a condition stands where a number is wanted by `and`,
+    /// `or`, `not` or `if`, or the other way round.
     ///
     /// ```
     /// use twofold_system::Expression;
-    /// let clamped = Expression::parse_general("if(x > 0 and t < 1, min(x, 1), -x^0.5)", &["x"]).unwrap();
+    /// let text = "if(x > 0 and t < 1, min(x, 1), -x^0.5)";
+    /// let clamped = Expression::parse_general(text, &["x"]).unwrap();
     /// assert_eq!(clamped.to_string(), "if(x > 0 and 1 > t, min(x, 1), -x^0.5)");
     /// ```
     pub fn parse_general(text: &str, names: &[&str]) -> Result<Self, ExpressionError> {
@@ -333,34 +341,63 @@ impl Expression {
     ///
     /// # Errors
     /// As [`Expression::parse_general`].
-    pub fn parse_general_with(text: &str, names: &[&str], conditions: &[&str]) -> Result<Self, ExpressionError> {
+    pub fn parse_general_with(
+        text: &str,
+        names: &[&str],
+        conditions: &[&str],
+    ) -> Result<Self, ExpressionError> {
         Self::parse_in(text, names, conditions, Dialect::General)
     }
 
-    fn parse_in(text: &str, names: &[&str], conditions: &[&str], dialect: Dialect) -> Result<Self, ExpressionError> {
+    fn parse_in(
+        text: &str,
+        names: &[&str],
+        conditions: &[&str],
+        dialect: Dialect,
+    ) -> Result<Self, ExpressionError> {
         if text.len() > MAX_LENGTH {
             return Err(ExpressionError {
-                message: format!("an expression of {} bytes; the limit is {MAX_LENGTH}", text.len()),
+                message: format!(
+                    "an expression of {} bytes; the limit is {MAX_LENGTH}",
+                    text.len()
+                ),
                 span: 0..1,
                 help: Some("name parts of it in [let]".into()),
             });
         }
-        let mut parser =
-            Parser { text, tokens: tokens(text, dialect)?, at: 0, depth: 0, terms: 0, names, conditions, dialect };
+        let mut parser = Parser {
+            text,
+            tokens: tokens(text, dialect)?,
+            at: 0,
+            depth: 0,
+            terms: 0,
+            names,
+            conditions,
+            dialect,
+        };
         if parser.peek() == &Token::End {
-            return Err(parser.error("an empty expression", Some("write 0 for a component that vanishes".into())));
+            return Err(parser.error(
+                "an empty expression",
+                Some("write 0 for a component that vanishes".into()),
+            ));
         }
         let expression = parser.whole_expression()?;
         match parser.peek() {
             Token::End => Ok(expression),
             Token::Close => Err(parser.error("this parenthesis was never opened", None)),
-            Token::Comma => Err(parser.error(COMMA, Some("the decimal sign is a point: 1.5".into()))),
+            Token::Comma => {
+                Err(parser.error(COMMA, Some("the decimal sign is a point: 1.5".into())))
+            }
             _ => Err(parser.error("an operator is missing here", Some(parser.missing_operator()))),
         }
     }
 
     /// The value, with `name` giving the value of each name and `number` that of each number.
-    pub fn evaluate<S: Elementary>(&self, name: &mut dyn FnMut(&str) -> S, number: &dyn Fn(&Decimal) -> S) -> S {
+    pub fn evaluate<S: Elementary>(
+        &self,
+        name: &mut dyn FnMut(&str) -> S,
+        number: &dyn Fn(&Decimal) -> S,
+    ) -> S {
         match self {
             Expression::Number(n) => number(n),
             Expression::Pi => S::pi(),
@@ -379,16 +416,28 @@ impl Expression {
 
     /// Whether it is a condition: true or false.
     pub fn is_condition(&self) -> bool {
-        matches!(self, Expression::Greater(..) | Expression::And(..) | Expression::Or(..) | Expression::Not(_))
+        matches!(
+            self,
+            Expression::Greater(..) | Expression::And(..) | Expression::Or(..) | Expression::Not(_)
+        )
     }
 
     /// Its parts, in order.
     pub fn parts(&self) -> Vec<&Expression> {
         match self {
             Expression::Number(_) | Expression::Pi | Expression::Name(_) => Vec::new(),
-            Expression::Neg(a) | Expression::Power(a, _) | Expression::Call(_, a) | Expression::Not(a) => vec![a],
-            Expression::Add(a, b) | Expression::Sub(a, b) | Expression::Mul(a, b) | Expression::Div(a, b) => vec![a, b],
-            Expression::RealPower(a, b) | Expression::Greater(a, b) | Expression::And(a, b) | Expression::Or(a, b) => {
+            Expression::Neg(a)
+            | Expression::Power(a, _)
+            | Expression::Call(_, a)
+            | Expression::Not(a) => vec![a],
+            Expression::Add(a, b)
+            | Expression::Sub(a, b)
+            | Expression::Mul(a, b)
+            | Expression::Div(a, b) => vec![a, b],
+            Expression::RealPower(a, b)
+            | Expression::Greater(a, b)
+            | Expression::And(a, b)
+            | Expression::Or(a, b) => {
                 vec![a, b]
             }
             Expression::Apply(_, list) => list.iter().collect(),
@@ -431,11 +480,12 @@ impl fmt::Display for Expression {
         let part = |f: &mut fmt::Formatter<'_>, e: &Expression, level: u8| {
             if e.level() < level { write!(f, "({e})") } else { write!(f, "{e}") }
         };
-        let pair = |f: &mut fmt::Formatter<'_>, a: &Expression, sign: &str, b: &Expression, level: u8| {
-            part(f, a, level)?;
-            f.write_str(sign)?;
-            part(f, b, level + 1)
-        };
+        let pair =
+            |f: &mut fmt::Formatter<'_>, a: &Expression, sign: &str, b: &Expression, level: u8| {
+                part(f, a, level)?;
+                f.write_str(sign)?;
+                part(f, b, level + 1)
+            };
         match self {
             Expression::Number(n) => write!(f, "{n}"),
             Expression::Pi => f.write_str("pi"),
@@ -497,8 +547,9 @@ enum Token {
 fn tokens(text: &str, dialect: Dialect) -> Result<Vec<(Token, Range<usize>)>, ExpressionError> {
     let mut tokens = Vec::new();
     let bytes = text.as_bytes();
-    let run =
-        |from: usize, in_run: &dyn Fn(u8) -> bool| from + bytes[from..].iter().take_while(|b| in_run(**b)).count();
+    let run = |from: usize, in_run: &dyn Fn(u8) -> bool| {
+        from + bytes[from..].iter().take_while(|b| in_run(**b)).count()
+    };
     let digits = |from: usize| run(from, &|b| b.is_ascii_digit());
     let mut at = 0;
     while at < bytes.len() {
@@ -531,7 +582,9 @@ fn tokens(text: &str, dialect: Dialect) -> Result<Vec<(Token, Range<usize>)>, Ex
                     message: "equality is met for a moment only and decides no motion".into(),
                     span: at..at + 1,
                     help: Some(
-                        "compare with < or >; for what happens where a number is met, write an [[event]]".into(),
+                        "compare with < or >; for what happens where a number is met, write an \
+                            [[event]]"
+                            .into(),
                     ),
                 });
             }
@@ -549,7 +602,10 @@ fn tokens(text: &str, dialect: Dialect) -> Result<Vec<(Token, Range<usize>)>, Ex
                         return Err(ExpressionError {
                             message: "a number without the digits of its exponent".into(),
                             span: at..end + 1 + sign,
-                            help: Some("write 1e-3 for one thousandth, 2*e for the product with a name e".into()),
+                            help: Some(
+                                "write 1e-3 for one thousandth, 2*e for the product with a name e"
+                                    .into(),
+                            ),
                         });
                     }
                 }
@@ -575,14 +631,18 @@ fn tokens(text: &str, dialect: Dialect) -> Result<Vec<(Token, Range<usize>)>, Ex
                     }
                     '?' if dialect == Dialect::General => Some("write if(condition, a, b)"),
                     '|' => Some("write abs(x) for |x|"),
-                    '\'' => Some("components are given in the order of the states; write no derivatives"),
+                    '\'' => Some(
+                        "components are given in the order of the states; write no derivatives",
+                    ),
                     '[' | ']' | '{' | '}' => Some("only round parentheses group"),
                     '<' | '>' | '=' | '?' => Some(BRANCH),
                     '·' | '×' => Some("products are written a*b"),
                     '−' => Some("this is a typographic minus; write -"),
                     'π' => Some("write pi"),
                     '²' | '³' => Some("write x^2, x^3"),
-                    c if c.is_alphabetic() => Some("names are made of the letters a-z and A-Z, digits and _"),
+                    c if c.is_alphabetic() => {
+                        Some("names are made of the letters a-z and A-Z, digits and _")
+                    }
                     _ => None,
                 };
                 return Err(ExpressionError {
@@ -630,7 +690,10 @@ impl Parser<'_> {
         ExpressionError { message: message.into(), span: self.span(), help }
     }
 
-    fn deeper<T>(&mut self, f: impl FnOnce(&mut Self) -> Result<T, ExpressionError>) -> Result<T, ExpressionError> {
+    fn deeper<T>(
+        &mut self,
+        f: impl FnOnce(&mut Self) -> Result<T, ExpressionError>,
+    ) -> Result<T, ExpressionError> {
         if self.depth == MAX_DEPTH {
             let help = Some("name parts of the expression in [let]".into());
             return Err(self.error(format!("more than {MAX_DEPTH} levels of nesting"), help));
@@ -703,7 +766,8 @@ impl Parser<'_> {
     }
 
     fn is_condition(&self, e: &Expression) -> bool {
-        e.is_condition() || matches!(e, Expression::Name(name) if self.conditions.contains(&name.as_str()))
+        e.is_condition()
+            || matches!(e, Expression::Name(name) if self.conditions.contains(&name.as_str()))
     }
 
     fn must_be_condition(&self, left: &Expression, start: usize) -> Result<(), ExpressionError> {
@@ -733,9 +797,12 @@ impl Parser<'_> {
         self.term()?;
         let right = self.sum()?;
         if matches!(self.peek(), Token::Compare { .. }) {
-            return Err(self.error("two comparisons in a row", Some("join them: 0 < x and x < 1".into())));
+            return Err(
+                self.error("two comparisons in a row", Some("join them: 0 < x and x < 1".into()))
+            );
         }
-        // a >= b is that b is not greater than a: the same where something moves, and what it says where all rests at equality.
+        // a >= b is that b is not greater than a: the same where something moves, and what it says
+        // where all rests at equality.
         let (left, right) = if less != equal { (right, left) } else { (left, right) };
         let greater = Expression::Greater(Box::new(left), Box::new(right));
         Ok(if equal { Expression::Not(Box::new(greater)) } else { greater })
@@ -804,7 +871,9 @@ impl Parser<'_> {
                 span: start..end,
                 help: None,
             }),
-            None if self.dialect == Dialect::General => Ok(Expression::RealPower(Box::new(base), Box::new(exponent))),
+            None if self.dialect == Dialect::General => {
+                Ok(Expression::RealPower(Box::new(base), Box::new(exponent)))
+            }
             None => Err(ExpressionError {
                 message: "an exponent must be a whole number".into(),
                 span: start..end,
@@ -822,16 +891,17 @@ impl Parser<'_> {
             }
             Token::Name => self.name(),
             Token::Open => self.parenthesis(),
-            Token::End => {
-                Err(self.error("the expression ends where a number, a name or a parenthesis should follow", None))
-            }
+            Token::End => Err(self.error(
+                "the expression ends where a number, a name or a parenthesis should follow",
+                None,
+            )),
             Token::Close | Token::Comma => {
                 Err(self.error("a number, a name or a parenthesis is missing before this", None))
             }
-            _ => {
-                Err(self
-                    .error("two operators in a row; a number, a name or a parenthesis is missing before this", None))
-            }
+            _ => Err(self.error(
+                "two operators in a row; a number, a name or a parenthesis is missing before this",
+                None,
+            )),
         }
     }
 
@@ -850,7 +920,10 @@ impl Parser<'_> {
                 help: Some("add a `)`".into()),
             }),
             Token::Comma => Err(self.error(COMMA, Some("the decimal sign is a point: 1.5".into()))),
-            _ => Err(self.error("an operator or a `)` is missing here", Some(self.missing_operator()))),
+            _ => {
+                Err(self
+                    .error("an operator or a `)` is missing here", Some(self.missing_operator())))
+            }
         }
     }
 
@@ -858,7 +931,9 @@ impl Parser<'_> {
         let span = self.span();
         let name = &self.text[span.clone()];
         self.advance();
-        let error = |message: String, help: Option<String>| Err(ExpressionError { message, span: span.clone(), help });
+        let error = |message: String, help: Option<String>| {
+            Err(ExpressionError { message, span: span.clone(), help })
+        };
         if name == "pi" {
             return Ok(Expression::Pi);
         }
@@ -896,7 +971,8 @@ impl Parser<'_> {
         let help = match nearest(name, self.names) {
             Some(near) => format!("did you mean `{near}`?"),
             None if name == "t" => {
-                "equations do not see the time; a forced system carries it as a state with derivative 1, or is written as f = [...]"
+                "equations do not see the time; a forced system carries it as a state with \
+                    derivative 1, or is written as f = [...]"
                     .into()
             }
             None if name == "e" => "write exp(1) for the base of natural logarithms".into(),
@@ -914,14 +990,20 @@ impl Parser<'_> {
         }
         let list = format!("supported functions are {}", functions.join(", "));
         let lower = name.to_ascii_lowercase();
-        let among = |table: &'static [(&str, &'static str)]| table.iter().find(|(n, _)| *n == lower).map(|(_, i)| *i);
+        let among = |table: &'static [(&str, &'static str)]| {
+            table.iter().find(|(n, _)| *n == lower).map(|(_, i)| *i)
+        };
         let instead = match general {
-            true => among(&INSTEAD_IN_GENERAL).or_else(|| among(&INSTEAD).filter(|_| General::entry(&lower).is_none())),
+            true => among(&INSTEAD_IN_GENERAL)
+                .or_else(|| among(&INSTEAD).filter(|_| General::entry(&lower).is_none())),
             false => among(&INSTEAD),
         };
         match (instead, nearest(name, &functions)) {
             (Some(instead), _) if !general && General::entry(&lower).is_some() => {
-                format!("{name} is not supported here: {instead}; a system written as f = [...] has {lower}; {list}")
+                format!(
+                    "{name} is not supported here: {instead}; a system written as f = [...] has \
+                        {lower}; {list}"
+                )
             }
             (Some(instead), _) => format!("{name} is not supported: {instead}; {list}"),
             (None, Some(near)) => format!("did you mean `{near}`? {list}"),
@@ -930,7 +1012,13 @@ impl Parser<'_> {
     }
 
     /// The arguments of a function of general systems.
-    fn apply(&mut self, name: &str, function: General, counts: &Range<usize>, span: Range<usize>) -> Parsed {
+    fn apply(
+        &mut self,
+        name: &str,
+        function: General,
+        counts: &Range<usize>,
+        span: Range<usize>,
+    ) -> Parsed {
         if self.peek() != &Token::Open {
             return Err(ExpressionError {
                 message: format!("the function `{name}` needs its arguments in parentheses"),
@@ -948,7 +1036,8 @@ impl Parser<'_> {
             return Err(ExpressionError {
                 message: format!("`{name}` has {wanted}; {given} given"),
                 span,
-                help: (function == General::If).then(|| "if(x > 0, a, b): a where x > 0, else b".into()),
+                help: (function == General::If)
+                    .then(|| "if(x > 0, a, b): a where x > 0, else b".into()),
             });
         }
         let open = self.span();
@@ -968,7 +1057,12 @@ impl Parser<'_> {
                         help: Some("add a `)`".into()),
                     });
                 }
-                _ => return Err(self.error("an operator or a `)` is missing here", Some(self.missing_operator()))),
+                _ => {
+                    return Err(self.error(
+                        "an operator or a `)` is missing here",
+                        Some(self.missing_operator()),
+                    ));
+                }
             }
         }
         self.advance();
@@ -1032,7 +1126,9 @@ mod tests {
 
     fn value(text: &str) -> f64 {
         let mut name = |n: &str| if n == "x" { 3.0 } else { 0.5 };
-        Expression::parse(text, &NAMES).unwrap_or_else(|e| panic!("{text}: {e}")).evaluate(&mut name, &Decimal::value)
+        Expression::parse(text, &NAMES)
+            .unwrap_or_else(|e| panic!("{text}: {e}"))
+            .evaluate(&mut name, &Decimal::value)
     }
 
     #[test]
@@ -1132,7 +1228,8 @@ mod tests {
     #[test]
     fn general_expressions_are_read_and_printed() {
         for (text, want) in GENERAL {
-            let parsed = Expression::parse_general(text, &NAMES).unwrap_or_else(|e| panic!("{text}: {e}"));
+            let parsed =
+                Expression::parse_general(text, &NAMES).unwrap_or_else(|e| panic!("{text}: {e}"));
             assert_eq!(parsed.to_string(), want);
             assert_eq!(Expression::parse_general(want, &NAMES), Ok(parsed));
         }
@@ -1206,7 +1303,8 @@ mod tests {
                 pair.clone().prop_map(|(a, b)| Expression::Mul(a, b)),
                 pair.prop_map(|(a, b)| Expression::Div(a, b)),
                 (inner.clone(), -5..6).prop_map(|(a, n)| Expression::Power(Box::new(a), n)),
-                (inner, 0..Function::ALL.len()).prop_map(|(a, i)| Expression::Call(Function::ALL[i].1, Box::new(a))),
+                (inner, 0..Function::ALL.len())
+                    .prop_map(|(a, i)| Expression::Call(Function::ALL[i].1, Box::new(a))),
             ]
         })
     }
@@ -1220,7 +1318,8 @@ mod tests {
         let leaf = prop_oneof![any_expression(), Just(Expression::Name("t".into()))];
         leaf.prop_recursive(4, 60, 4, move |inner| {
             let pair = (inner.clone(), inner.clone());
-            let function = (0..General::ALL.len(), prop::collection::vec(inner.clone(), 5), 0..3_usize);
+            let function =
+                (0..General::ALL.len(), prop::collection::vec(inner.clone(), 5), 0..3_usize);
             prop_oneof![
                 pair.clone().prop_map(|(a, b)| Expression::Greater(Box::new(a), Box::new(b))),
                 pair.clone().prop_map(move |(a, b)| Expression::And(condition(a), condition(b))),
@@ -1245,7 +1344,8 @@ mod tests {
 
     fn tape(expression: &Expression) -> Tape {
         Tape::record(1, |x| {
-            let mut name = |n: &str| if n == "x" { x[0] } else { Recorded::parameter(n, &0.5.into()) };
+            let mut name =
+                |n: &str| if n == "x" { x[0] } else { Recorded::parameter(n, &0.5.into()) };
             vec![expression.evaluate(&mut name, &Recorded::constant)]
         })
     }
@@ -1260,24 +1360,29 @@ mod tests {
         }
 
         #[test]
-        fn printing_and_parsing_give_the_general_expression_back(expression in any_general_expression()) {
+        fn printing_and_parsing_give_the_general_expression_back(
+            expression in any_general_expression()
+        ) {
             let text = expression.to_string();
             prop_assume!(text.len() <= MAX_LENGTH);
             prop_assert_eq!(Expression::parse_general(&text, &NAMES), Ok(expression), "{}", text);
         }
 
         #[test]
-        fn the_tape_gives_the_bits_of_plain_evaluation(expression in any_expression(), x in -3.0..3.0_f64) {
+        fn the_tape_gives_the_bits_of_plain_evaluation(expression in any_expression(),
+            x in -3.0..3.0_f64) {
             let mut name = |n: &str| if n == "x" { x } else { 0.5 };
             let want = expression.evaluate(&mut name, &Decimal::value);
             let mut out = [0.0];
             Program::new(&tape(&expression)).evaluate(&[x], &mut out);
-            prop_assert!(out[0].to_bits() == want.to_bits() || out[0].is_nan() && want.is_nan(), "{} {}", out[0], want);
+            prop_assert!(out[0].to_bits() == want.to_bits() || out[0].is_nan() && want.is_nan(),
+                "{} {}", out[0], want);
         }
 
         #[test]
         fn no_text_panics(text in "[-+*/^()x0-9.e|a-z ]{0,60}|\\PC{0,30}") {
-            for error in [Expression::parse(&text, &NAMES), Expression::parse_general(&text, &NAMES)].into_iter().filter_map(Result::err) {
+            for error in [Expression::parse(&text, &NAMES), Expression::parse_general(&text,
+                &NAMES)].into_iter().filter_map(Result::err) {
                 prop_assert!(text.get(error.span).is_some());
             }
         }

@@ -1,7 +1,7 @@
 //! Ordinary differential equations as data, and how they are made from piecewise-smooth systems.
 //!
-//! Each transform writes a new tape from an old one: in any dimension, with parameters kept by name, with exactly the operations of the
-//! compiled equation that it stands for.
+//! Each transform writes a new tape from an old one: in any dimension, with parameters kept by
+//! name, with exactly the operations of the compiled equation that it stands for.
 
 use std::fmt;
 use std::sync::Arc;
@@ -55,7 +55,8 @@ enum Half {
     Minus,
 }
 
-/// A system's functions at a point of another recording, each component written when it is asked for.
+/// A system's functions at a point of another recording, each component written when it is asked
+/// for.
 struct Parts<'a> {
     replay: Replay<'a>,
     dimension: usize,
@@ -107,7 +108,12 @@ fn blended(minus: Vec<Recorded>, plus: Vec<Recorded>, phi: Recorded) -> Vec<Reco
 impl Field {
     fn made(names: Vec<String>, tape: Tape) -> Self {
         let tape = tape.with_names(names.iter().cloned());
-        Self { names, program: Arc::new(Program::new(&tape)), tape: Arc::new(tape), of_one_surface: false }
+        Self {
+            names,
+            program: Arc::new(Program::new(&tape)),
+            tape: Arc::new(tape),
+            of_one_surface: false,
+        }
     }
 
     /// A transform that knows one surface, of this system.
@@ -119,8 +125,9 @@ impl Field {
         system.coordinates().into_iter().map(Into::into).collect()
     }
 
-    /// The smoothed system, eq. (8): x' = f- + (f+ - f-) phi(h, eps). Two switches are smoothed one inside the other, each by its own function: the
-    /// weights of the four fields are the products of phi and 1 - phi.
+    /// The smoothed system, eq. (8): x' = f- + (f+ - f-) phi(h, eps). Two switches are smoothed one
+    /// inside the other, each by its own function: the weights of the four fields are the products
+    /// of phi and 1 - phi.
     pub fn smoothed(system: &System, transition: Transition, eps: f64) -> Self {
         let tape = Tape::record(system.dimension(), |x| {
             let mut parts = Parts::new(system, x);
@@ -169,8 +176,9 @@ impl Field {
         Self::one_surface(system, Self::names_of(system), tape)
     }
 
-    /// The desingularised sliding flow with physical time as last state, (x, t)' = (L-h f+ - L+h f-, L-h - L+h): smooth everywhere,
-    /// zero at a two-fold. Time runs forward in the attracting region and backward in the repelling one.
+    /// The desingularised sliding flow with physical time as last state, (x, t)' = (L-h f+ - L+h
+    /// f-, L-h - L+h): smooth everywhere, zero at a two-fold. Time runs forward in the attracting
+    /// region and backward in the repelling one.
     pub fn sliding(system: &System) -> Self {
         let n = system.dimension();
         let tape = Tape::record(n + 1, |state| {
@@ -196,7 +204,8 @@ impl Field {
                 sum.unwrap_or(Recorded::zero())
             };
             let (p, q) = (along(&plus), along(&minus));
-            let mut flow: Vec<Recorded> = plus.iter().zip(&minus).map(|(a, b)| q * *a - p * *b).collect();
+            let mut flow: Vec<Recorded> =
+                plus.iter().zip(&minus).map(|(a, b)| q * *a - p * *b).collect();
             flow.push(q - p);
             flow
         });
@@ -214,8 +223,8 @@ impl Field {
         Self { of_one_surface: self.of_one_surface, ..Self::made(self.names.clone(), tape) }
     }
 
-    /// The equation together with its variational equation, (x, V)' = (f(x), Df(x) V), for `vectors` tangent vectors that stand
-    /// after x one after another.
+    /// The equation together with its variational equation, (x, V)' = (f(x), Df(x) V), for
+    /// `vectors` tangent vectors that stand after x one after another.
     pub fn variational(&self, vectors: usize) -> Self {
         let n = self.dimension();
         let tape = Tape::record(n * (vectors + 1), |state| {
@@ -223,7 +232,12 @@ impl Field {
             let mut all: Vec<Recorded> = (0..n).map(|i| field.output(i)).collect();
             for v in state[n..].chunks(n) {
                 let direction: Vec<Option<Recorded>> = v.iter().copied().map(Some).collect();
-                all.extend(field.derivatives(&direction).into_iter().map(|d| d.unwrap_or(Recorded::zero())));
+                all.extend(
+                    field
+                        .derivatives(&direction)
+                        .into_iter()
+                        .map(|d| d.unwrap_or(Recorded::zero())),
+                );
             }
             all
         });
@@ -237,7 +251,8 @@ impl Field {
         Self::made(names.map(Into::into).to_vec(), Tape::clone(&field.tape()))
     }
 
-    /// Whether the two equations differ in numbers alone: in the values of parameters, in the width of a layer.
+    /// Whether the two equations differ in numbers alone: in the values of parameters, in the width
+    /// of a layer.
     pub fn is_like(&self, other: &Self) -> bool {
         self.of_one_surface == other.of_one_surface && self.program.is_like(&other.program)
     }
@@ -268,7 +283,8 @@ impl Field {
     /// The equation as a [`VectorField`] in `N` dimensions.
     ///
     /// # Errors
-    /// If the equation has not `N` states, or was made by a transform for one switching surface from a system with two.
+    /// If the equation has not `N` states, or was made by a transform for one switching surface
+    /// from a system with two.
     pub fn bind<const N: usize>(&self) -> Result<BoundField<N>, BindError> {
         if self.of_one_surface {
             return Err(BindError::TwoSurfaces);

@@ -1,7 +1,8 @@
 //! Filippov's convention on the switching surface: regions, sliding motion, folds and two-folds.
 //!
-//! Notation: L±h = grad h . f± is the Lie derivative of h along f±; L±²h the second one. Sources: Filippov (1988), ch. 2;
-//! di Bernardo, Budd, Champneys & Kowalczyk (2008), ch. 2; Jeffrey & Colombo (2009) for the two-fold.
+//! Notation: L±h = grad h . f± is the Lie derivative of h along f±; L±²h the second one. Sources:
+//! Filippov (1988), ch. 2; di Bernardo, Budd, Champneys & Kowalczyk (2008), ch. 2; Jeffrey &
+//! Colombo (2009) for the two-fold.
 
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
@@ -27,20 +28,29 @@ pub enum Region {
 }
 
 /// The first Lie derivatives (L+h, L-h) at `x`.
-pub fn lie_derivatives<P: PiecewiseSmooth<N>, S: Elementary, const N: usize>(system: &P, x: &SVector<S, N>) -> (S, S) {
+pub fn lie_derivatives<P: PiecewiseSmooth<N>, S: Elementary, const N: usize>(
+    system: &P,
+    x: &SVector<S, N>,
+) -> (S, S) {
     let gradient = gradient(system, x);
     (dot(&gradient, &system.plus(x)), dot(&gradient, &system.minus(x)))
 }
 
 /// The second Lie derivatives (L+²h, L-²h) at `x`.
-pub fn second_lie_derivatives<P: PiecewiseSmooth<N>, const N: usize>(system: &P, x: &SVector<f64, N>) -> (f64, f64) {
+pub fn second_lie_derivatives<P: PiecewiseSmooth<N>, const N: usize>(
+    system: &P,
+    x: &SVector<f64, N>,
+) -> (f64, f64) {
     let (plus, minus) = lie_derivatives::<P, Dual<f64, N>, N>(system, &variables(x));
     let along = |d: Dual<f64, N>, f: SVector<f64, N>| (0..N).map(|i| d.partials[i] * f[i]).sum();
     (along(plus, system.plus(x)), along(minus, system.minus(x)))
 }
 
 /// grad h at `x`.
-pub fn gradient<P: PiecewiseSmooth<N>, S: Elementary, const N: usize>(system: &P, x: &SVector<S, N>) -> SVector<S, N> {
+pub fn gradient<P: PiecewiseSmooth<N>, S: Elementary, const N: usize>(
+    system: &P,
+    x: &SVector<S, N>,
+) -> SVector<S, N> {
     let h = system.switching(&variables(x));
     SVector::from_fn(|i, _| h.partials[i])
 }
@@ -51,15 +61,20 @@ pub fn region<P: PiecewiseSmooth<N>, const N: usize>(system: &P, x: &SVector<f64
     match (plus.partial_cmp(&0.0), minus.partial_cmp(&0.0)) {
         (Some(std::cmp::Ordering::Less), Some(std::cmp::Ordering::Greater)) => Region::Attracting,
         (Some(std::cmp::Ordering::Greater), Some(std::cmp::Ordering::Less)) => Region::Repelling,
-        (Some(std::cmp::Ordering::Greater), Some(std::cmp::Ordering::Greater)) => Region::CrossingUp,
+        (Some(std::cmp::Ordering::Greater), Some(std::cmp::Ordering::Greater)) => {
+            Region::CrossingUp
+        }
         (Some(std::cmp::Ordering::Less), Some(std::cmp::Ordering::Less)) => Region::CrossingDown,
         _ => Region::Boundary,
     }
 }
 
-/// Filippov's weight lambda of f+, chosen so that lambda f+ + (1 - lambda) f- is tangent to the surface:
-/// lambda = L-h/(L-h - L+h). In (0, 1) exactly in the sliding regions.
-pub fn sliding_weight<P: PiecewiseSmooth<N>, S: Elementary, const N: usize>(system: &P, x: &SVector<S, N>) -> S {
+/// Filippov's weight lambda of f+, chosen so that lambda f+ + (1 - lambda) f- is tangent to the
+/// surface: lambda = L-h/(L-h - L+h). In (0, 1) exactly in the sliding regions.
+pub fn sliding_weight<P: PiecewiseSmooth<N>, S: Elementary, const N: usize>(
+    system: &P,
+    x: &SVector<S, N>,
+) -> S {
     let (plus, minus) = lie_derivatives(system, x);
     minus / (minus - plus)
 }
@@ -106,7 +121,8 @@ pub struct TwoFold<const N: usize> {
 }
 
 impl<const N: usize> TwoFold<N> {
-    /// (of f+, of f-). f+ holds where h > 0, so its tangency is visible if h is at a minimum: L+²h > 0.
+    /// (of f+, of f-). f+ holds where h > 0, so its tangency is visible if h is at a minimum: L+²h
+    /// > 0.
     pub fn visibility(&self) -> (Visibility, Visibility) {
         let of = |visible| if visible { Visibility::Visible } else { Visibility::Invisible };
         (of(self.second_plus > 0.0), of(self.second_minus < 0.0))
@@ -120,15 +136,19 @@ pub enum TwoFoldError {
     #[error("a system of {0} states has no isolated two-fold: it takes three")]
     TooFewStates(usize),
     /// The Newton iteration met a singular or non-finite system.
-    #[error("the two-fold's equations h = L+h = L-h = 0 are singular near this guess; start closer to the two-fold")]
+    #[error(
+        "the two-fold's equations h = L+h = L-h = 0 are singular near this guess; start closer to \
+            the two-fold"
+    )]
     Singular,
     /// The Newton iteration did not settle.
     #[error("Newton's method for the two-fold did not converge; start closer to the two-fold")]
     NotConverged,
 }
 
-/// The two-fold near `guess`: a solution of h = L+h = L-h = 0 by Newton's method, each step the shortest that solves the linearised
-/// equations. In three dimensions that is the solution; in more the two-folds form a set, of which one near the guess is found.
+/// The two-fold near `guess`: a solution of h = L+h = L-h = 0 by Newton's method, each step the
+/// shortest that solves the linearised equations. In three dimensions that is the solution; in more
+/// the two-folds form a set, of which one near the guess is found.
 ///
 /// ```
 /// use nalgebra::vector;
@@ -168,19 +188,26 @@ pub fn two_fold<P: PiecewiseSmooth<N>, const N: usize>(
 }
 
 /// h, L+h, L-h at `x`, each with its gradient: the conditions for a two-fold.
-pub fn fold_conditions<P: PiecewiseSmooth<N>, const N: usize>(system: &P, x: &SVector<f64, N>) -> [Dual<f64, N>; 3] {
+pub fn fold_conditions<P: PiecewiseSmooth<N>, const N: usize>(
+    system: &P,
+    x: &SVector<f64, N>,
+) -> [Dual<f64, N>; 3] {
     let at = variables(x);
     let (p, q) = lie_derivatives::<P, Dual<f64, N>, N>(system, &at);
     [system.switching(&at), p, q]
 }
 
 /// The shortest u with (gradient of row i) . u = `right[i]`; `None` if the gradients are dependent.
-pub fn shortest<const N: usize>(rows: &[Dual<f64, N>; 3], right: [f64; 3]) -> Option<SVector<f64, N>> {
+pub fn shortest<const N: usize>(
+    rows: &[Dual<f64, N>; 3],
+    right: [f64; 3],
+) -> Option<SVector<f64, N>> {
     let row = |i: usize| SVector::<f64, N>::from(rows[i].partials);
     let gram = SMatrix::<f64, 3, 3>::from_fn(|i, j| row(i).dot(&row(j)));
     let inverse_scale = SVector::<f64, 3>::from_fn(|i, _| 1.0 / sqrt(gram[(i, i)]));
     // Scaled by rows, so that the test for dependence does not depend on units.
-    let scaled = SMatrix::<f64, 3, 3>::from_fn(|i, j| gram[(i, j)] * inverse_scale[i] * inverse_scale[j]);
+    let scaled =
+        SMatrix::<f64, 3, 3>::from_fn(|i, j| gram[(i, j)] * inverse_scale[i] * inverse_scale[j]);
     if scaled.determinant().is_nan() || scaled.determinant() < 1e-12 {
         return None;
     }
@@ -194,13 +221,19 @@ pub fn shortest<const N: usize>(rows: &[Dual<f64, N>; 3], right: [f64; 3]) -> Op
 }
 
 /// The constants of the two-fold normal form (4), f+ = (-y, 1, v), f- = (z, w, 1), after rescaling:
-/// v = L+L-h / |L+²h| and w = L-L+h / |L-²h| up to the sign conventions of eq. (4), for an invisible two-fold.
-pub fn normal_form_constants<P: PiecewiseSmooth<N>, const N: usize>(system: &P, fold: &TwoFold<N>) -> (f64, f64) {
+/// v = L+L-h / |L+²h| and w = L-L+h / |L-²h| up to the sign conventions of eq. (4), for an
+/// invisible two-fold.
+pub fn normal_form_constants<P: PiecewiseSmooth<N>, const N: usize>(
+    system: &P,
+    fold: &TwoFold<N>,
+) -> (f64, f64) {
     let x = &fold.point;
     let (plus, minus) = lie_derivatives::<P, Dual<f64, N>, N>(system, &variables(x));
-    let along = |d: Dual<f64, N>, f: SVector<f64, N>| (0..N).map(|i| d.partials[i] * f[i]).sum::<f64>();
-    // In the normal form y = -L+h, z = L-h; along f+: y' = -L+²h, z' = L+L-h; along f-: y' = -L-L+h, z' = L-²h.
-    // Time and length scales leave the ratios v = z'/y' (on f+) and w = y'/z' (on f-) scaled by sqrt(-L+²h / L-²h).
+    let along =
+        |d: Dual<f64, N>, f: SVector<f64, N>| (0..N).map(|i| d.partials[i] * f[i]).sum::<f64>();
+    // In the normal form y = -L+h, z = L-h; along f+: y' = -L+²h, z' = L+L-h; along f-: y' =
+    // -L-L+h, z' = L-²h. Time and length scales leave the ratios v = z'/y' (on f+) and w = y'/z'
+    // (on f-) scaled by sqrt(-L+²h / L-²h).
     let scale = Elementary::sqrt(-fold.second_minus / fold.second_plus);
     let v = along(minus, system.plus(x)) / -fold.second_plus / scale;
     let w = -along(plus, system.minus(x)) / fold.second_minus * scale;
@@ -238,7 +271,9 @@ mod tests {
         let x = vector![0.0, 0.3, 0.8];
         assert!((sliding_weight(&c, &x) - 0.8 / 1.1).abs() < 1e-15);
         let f = sliding_field(&c, &x);
-        assert!((f - vector![0.0, (0.8 - 1.4 * 0.3) / 1.1, (0.3 - 1.2 * 0.8) / 1.1]).norm() < 1e-15);
+        assert!(
+            (f - vector![0.0, (0.8 - 1.4 * 0.3) / 1.1, (0.3 - 1.2 * 0.8) / 1.1]).norm() < 1e-15
+        );
     }
 
     #[test]
@@ -256,7 +291,11 @@ mod tests {
         // SCIENCE.md section 7.
         let w = Wheel::default();
         let t = two_fold(&w, &vector![0.69, -0.57, -0.87]).unwrap();
-        assert!((t.point - vector![0.6926698897, -0.5736729677, -0.8666344383]).amax() < 1e-10, "{:?}", t.point);
+        assert!(
+            (t.point - vector![0.6926698897, -0.5736729677, -0.8666344383]).amax() < 1e-10,
+            "{:?}",
+            t.point
+        );
         assert!((w.rolling_speed(&t.point) - 1.8285).abs() < 5e-5);
         assert!((t.second_plus + 39.777).abs() < 5e-4 && (t.second_minus - 45.546).abs() < 5e-4);
         assert_eq!(t.visibility(), (Visibility::Invisible, Visibility::Invisible));

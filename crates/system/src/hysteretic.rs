@@ -12,8 +12,9 @@ use twofold_num::{Arithmetic, Elementary};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Relaxation {
-    /// Literally: psi's argument is already divided by eps', and psi(w) = (1 + tanh(w/eps'))/2 divides once more. phi
-    /// relaxes to (1 + tanh((h + eps (2 phi - 1))/eps'^2))/2. This gives the intricate attractor that the text reports.
+    /// Literally: psi's argument is already divided by eps', and psi(w) = (1 + tanh(w/eps'))/2
+    /// divides once more. phi relaxes to (1 + tanh((h + eps (2 phi - 1))/eps'^2))/2. This gives the
+    /// intricate attractor that the text reports.
     #[default]
     Literal,
     /// One division: phi relaxes to (1 + tanh((h + eps (2 phi - 1))/eps'))/2.
@@ -22,7 +23,13 @@ pub enum Relaxation {
 
 impl Relaxation {
     /// phi' as operations.
-    pub(super) fn record(self, h: Recorded, phi: Recorded, eps: Recorded, eps_prime: Recorded) -> Recorded {
+    pub(super) fn record(
+        self,
+        h: Recorded,
+        phi: Recorded,
+        eps: Recorded,
+        eps_prime: Recorded,
+    ) -> Recorded {
         let width = match self {
             Relaxation::Literal => eps_prime * eps_prime,
             Relaxation::Single => eps_prime,
@@ -56,7 +63,8 @@ pub struct Hysteretic<P> {
     pub relaxation: Relaxation,
 }
 
-/// Implemented for each dimension, because `N + 1` cannot yet be written in stable Rust's const generics.
+/// Implemented for each dimension, because `N + 1` cannot yet be written in stable Rust's const
+/// generics.
 macro_rules! hysteretic_in_dimension {
     ($n:literal, $m:literal) => {
         impl<P: PiecewiseSmooth<$n>> VectorField<$m> for Hysteretic<P> {

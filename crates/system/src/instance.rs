@@ -28,13 +28,15 @@ use twofold_num::{Decimal, Elementary};
 ///     friction = 1
 /// "#;
 /// let system = System::new(Definition::from_toml(text, "block.toml")?).with("friction", 0.5)?;
-/// let block = system.bind::<2>()?; // evaluated over any number type; the dimension is checked here, once
+/// // Evaluated over any number type; the dimension is checked here, once.
+/// let block = system.bind::<2>()?;
 /// assert_eq!(block.switching(&vector![0.0, 1.3]), 1.0);
 /// assert_eq!(block.plus(&vector![0.25, 1.3]), vector![1.3, -0.75]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
-/// As JSON, a system is its [canonical form](System::canonical) and its name; read back, a built-in one has its texts again.
+/// As JSON, a system is its [canonical form](System::canonical) and its name; read back, a built-in
+/// one has its texts again.
 #[derive(Clone)]
 pub struct System {
     definition: Arc<Definition>,
@@ -98,7 +100,8 @@ pub enum BindError {
     },
     /// As a system with one switching surface.
     #[error(
-        "this system has two switching surfaces, and this is computed for one; smooth the switches, or leave the table [second] out"
+        "this system has two switching surfaces, and this is computed for one; smooth the \
+            switches, or leave the table [second] out"
     )]
     TwoSurfaces,
 }
@@ -148,11 +151,15 @@ impl System {
     ///
     /// # Errors
     /// If there is no such parameter, or a value is not finite.
-    pub fn with_all<'a>(self, changes: impl IntoIterator<Item = (&'a str, Decimal)>) -> Result<Self, ParameterError> {
+    pub fn with_all<'a>(
+        self,
+        changes: impl IntoIterator<Item = (&'a str, Decimal)>,
+    ) -> Result<Self, ParameterError> {
         let mut values = self.values;
         for (name, value) in changes {
             let Some(i) = self.definition.parameters().iter().position(|p| p.name == name) else {
-                let names: Vec<&str> = self.definition.parameters().iter().map(|p| p.name.as_str()).collect();
+                let names: Vec<&str> =
+                    self.definition.parameters().iter().map(|p| p.name.as_str()).collect();
                 let help = match nearest(name, &names) {
                     Some(near) => format!("did you mean `{near}`?"),
                     None if names.is_empty() => "it has none at all".into(),
@@ -166,12 +173,17 @@ impl System {
         Ok(Self::made(self.definition, values))
     }
 
-    /// Whether every parameter has a value that the definition allows: those given in Rust are not looked at before.
+    /// Whether every parameter has a value that the definition allows: those given in Rust are not
+    /// looked at before.
     ///
     /// # Errors
     /// The first that is not finite, or out of its bounds.
     pub fn check(&self) -> Result<(), ParameterError> {
-        self.definition.parameters().iter().zip(&self.values).try_for_each(|(p, value)| checked(p, value))
+        self.definition
+            .parameters()
+            .iter()
+            .zip(&self.values)
+            .try_for_each(|(p, value)| checked(p, value))
     }
 
     /// The same system with these values, in the definition's order, whatever they are.
@@ -209,7 +221,8 @@ impl System {
         self.definition.parameters().iter().map(|p| p.name.as_str()).zip(&self.values)
     }
 
-    /// The equations as operations: h, then f+, then f-; of a system with two surfaces then the same three of the second.
+    /// The equations as operations: h, then f+, then f-; of a system with two surfaces then the
+    /// same three of the second.
     pub fn tape(&self) -> &Tape {
         &self.functions.tape
     }
@@ -238,15 +251,18 @@ impl System {
         }
     }
 
-    /// A system with two switching surfaces near one of them: for the first and the second surface, where the other's function is positive
-    /// and where it is negative. None for a system with one surface.
+    /// A system with two switching surfaces near one of them: for the first and the second surface,
+    /// where the other's function is positive and where it is negative. None for a system with one
+    /// surface.
     pub fn faces(&self) -> Option<[[System; 2]; 2]> {
-        let face =
-            |surface, below| Some(Self::made(Arc::new(self.definition.face(surface, below)?), self.values.clone()));
+        let face = |surface, below| {
+            Some(Self::made(Arc::new(self.definition.face(surface, below)?), self.values.clone()))
+        };
         Some([[face(0, false)?, face(0, true)?], [face(1, false)?, face(1, true)?]])
     }
 
-    /// The compiled system that does the same operations, if there is one: a fast path, tested to give the same bits.
+    /// The compiled system that does the same operations, if there is one: a fast path, tested to
+    /// give the same bits.
     pub fn compiled(&self) -> Option<Compiled> {
         let builtin = library::definitions().iter().find(|d| d.same_equations(&self.definition))?;
         let value = |name| self.parameter(name);
@@ -291,7 +307,9 @@ fn checked(parameter: &ParameterDefinition, value: &Decimal) -> Result<(), Param
     let meaning = if meaning.is_empty() { String::new() } else { format!(" ({meaning})") };
     match parameter.bounds.refuse(number) {
         None => Ok(()),
-        Some(rule) => Err(ParameterError::OutOfBounds { name, value: number.to_string(), rule, meaning }),
+        Some(rule) => {
+            Err(ParameterError::OutOfBounds { name, value: number.to_string(), rule, meaning })
+        }
     }
 }
 
@@ -310,7 +328,8 @@ impl From<Caricature> for System {
             MinusSign::Equation4 => "caricature",
             MinusSign::PrintedInEquation5 => "caricature-as-printed",
         };
-        let values = [("alpha", c.alpha), ("beta", c.beta), ("v_plus", c.v_plus), ("v_minus", c.v_minus)];
+        let values =
+            [("alpha", c.alpha), ("beta", c.beta), ("v_plus", c.v_plus), ("v_minus", c.v_minus)];
         library::with_values(name, &values)
     }
 }
@@ -337,17 +356,23 @@ impl From<Wheel> for System {
 
 impl fmt::Debug for System {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("System").field("name", &self.name()).field("canonical", &self.canonical()).finish()
+        f.debug_struct("System")
+            .field("name", &self.name())
+            .field("canonical", &self.canonical())
+            .finish()
     }
 }
 
 impl PartialEq for System {
-    /// Same name, equations and values, whatever texts and order they stand in: what is left of a system in JSON is equal to it.
+    /// Same name, equations and values, whatever texts and order they stand in: what is left of a
+    /// system in JSON is equal to it.
     fn eq(&self, other: &Self) -> bool {
         if Arc::ptr_eq(&self.definition, &other.definition) {
             return self.values == other.values;
         }
-        let values = |system: &Self, name: &str| system.parameters().find(|(n, _)| *n == name).map(|(_, v)| v.clone());
+        let values = |system: &Self, name: &str| {
+            system.parameters().find(|(n, _)| *n == name).map(|(_, v)| v.clone())
+        };
         self.name() == other.name()
             && self.definition.same_equations(&other.definition)
             && self.parameters().all(|(name, value)| values(other, name).as_ref() == Some(value))
@@ -373,7 +398,8 @@ impl<'de> Deserialize<'de> for System {
     /// Reads a canonical form, or a whole definition.
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let definition = Definition::deserialize(deserializer)?;
-        let builtin = library::definition(definition.name()).filter(|b| b.same_equations(&definition));
+        let builtin =
+            library::definition(definition.name()).filter(|b| b.same_equations(&definition));
         let Some(builtin) = builtin else { return Ok(Self::new(definition)) };
         let values = definition.parameters().iter().map(|p| (p.name.as_str(), p.value.clone()));
         Self::new(builtin.clone()).with_all(values).map_err(de::Error::custom)

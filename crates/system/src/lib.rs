@@ -1,9 +1,9 @@
 //! The equations, and no time stepping.
 //!
-//! Two nouns carry everything. A [`VectorField`] is an ordinary autonomous differential equation x' = f(x). A
-//! [`PiecewiseSmooth`] system is two of them and a switching function h: f+ where h > 0, f- where h < 0. It is not a
-//! vector field: on h = 0 its motion is defined by Filippov's convention ([`filippov`]) and at a two-fold it is
-//! set-valued.
+//! Two nouns carry everything. A [`VectorField`] is an ordinary autonomous differential equation x'
+//! = f(x). A [`PiecewiseSmooth`] system is two of them and a switching function h: f+ where h > 0,
+//! f- where h < 0. It is not a vector field: on h = 0 its motion is defined by Filippov's
+//! convention ([`filippov`]) and at a two-fold it is set-valued.
 //!
 //! Both exist as data of any dimension: a [`Definition`] is read from a file, a [`System`] is a
 //! definition with values for its parameters, and a [`Field`] is an equation made from a system by
@@ -11,10 +11,12 @@
 //! holds the built-in ones. Bound to a dimension ([`System::bind`], [`Field::bind`]) they are
 //! evaluated over any number type.
 //!
-//! The paper's own two, [`Caricature`] and [`Wheel`], exist as Rust too, with [`Smoothed`] and [`Hysteretic`] on top: fast paths, tested to
-//! give the bits of the files. Equations in Rust are generic over [`Elementary`], so that each is written once.
+//! The paper's own two, [`Caricature`] and [`Wheel`], exist as Rust too, with [`Smoothed`] and
+//! [`Hysteretic`] on top: fast paths, tested to give the bits of the files. Equations in Rust are
+//! generic over [`Elementary`], so that each is written once.
 #![forbid(unsafe_code)]
-#![cfg_attr(test, allow(clippy::disallowed_methods))] // tests compare with tolerances, not with hashes
+// tests compare with tolerances, not with hashes
+#![cfg_attr(test, allow(clippy::disallowed_methods))]
 
 mod batched;
 pub mod caricature;
@@ -74,8 +76,9 @@ pub use wheel::Wheel;
 /// # use twofold_num::Arithmetic;
 /// ```
 pub trait VectorField<const N: usize>: Sync {
-    /// Whether [`VectorField::eval`] interprets a program. A method then calls it through a pointer,
-    /// which costs nothing beside the interpreter, and is compiled once for all such equations.
+    /// Whether [`VectorField::eval`] interprets a program. A method then calls it through a
+    /// pointer, which costs nothing beside the interpreter, and is compiled once for all such
+    /// equations.
     #[doc(hidden)]
     const INTERPRETED: bool = false;
     /// The right-hand side f(x).
@@ -86,7 +89,8 @@ pub trait VectorField<const N: usize>: Sync {
     fn scratch_len(&self) -> usize {
         0
     }
-    /// The right-hand side at several states side by side, in the registers of an instruction set: in every lane the bits of [`VectorField::eval`].
+    /// The right-hand side at several states side by side, in the registers of an instruction set:
+    /// in every lane the bits of [`VectorField::eval`].
     #[doc(hidden)]
     #[inline(always)]
     fn eval_in_registers<S: Simd, const K: usize>(
@@ -107,14 +111,17 @@ pub trait VectorField<const N: usize>: Sync {
         }
         parts
     }
-    /// The right-hand side as data. Made by recording [`VectorField::eval`], unless the equation is data already.
+    /// The right-hand side as data. Made by recording [`VectorField::eval`], unless the equation is
+    /// data already.
     fn tape(&self) -> Arc<Tape> {
-        let record = |x: &[Recorded]| self.eval(&SVector::<_, N>::from_column_slice(x)).as_slice().to_vec();
+        let record =
+            |x: &[Recorded]| self.eval(&SVector::<_, N>::from_column_slice(x)).as_slice().to_vec();
         Arc::new(Tape::record(N, record))
     }
 }
 
-/// A system that switches between two smooth vector fields on the surface h = 0 (the paper's eq. 3).
+/// A system that switches between two smooth vector fields on the surface h = 0 (the paper's eq.
+/// 3).
 ///
 /// ```
 /// use nalgebra::{SVector, vector};
@@ -159,8 +166,12 @@ pub fn variables<S: Elementary, const N: usize>(x: &SVector<S, N>) -> SVector<Du
     SVector::from_fn(|i, _| Dual::variable(x[i], i))
 }
 
-/// The Jacobian matrix df_i/dx_j, exact to rounding (forward differentiation of the equation itself).
-pub fn jacobian<F: VectorField<N>, const N: usize>(field: &F, x: &SVector<f64, N>) -> SMatrix<f64, N, N> {
+/// The Jacobian matrix df_i/dx_j, exact to rounding (forward differentiation of the equation
+/// itself).
+pub fn jacobian<F: VectorField<N>, const N: usize>(
+    field: &F,
+    x: &SVector<f64, N>,
+) -> SMatrix<f64, N, N> {
     let f = field.eval(&variables(x));
     SMatrix::from_fn(|i, j| f[i].partials[j])
 }

@@ -46,7 +46,9 @@ pub fn definitions() -> &'static [Definition] {
         // A file that could not be read would fail the test below.
         FILES
             .iter()
-            .filter_map(|(name, text)| Definition::from_toml(text, &format!("systems/{name}.toml")).ok())
+            .filter_map(|(name, text)| {
+                Definition::from_toml(text, &format!("systems/{name}.toml")).ok()
+            })
             .collect()
     })
 }
@@ -59,12 +61,15 @@ pub fn definition(name: &str) -> Option<&'static Definition> {
 /// A built-in system with these values.
 ///
 /// # Panics
-/// If there is no such system or parameter, which the tests of this crate exclude for every call in it.
+/// If there is no such system or parameter, which the tests of this crate exclude for every call in
+/// it.
 pub(super) fn with_values(name: &str, values: &[(&str, f64)]) -> System {
     let system = System::builtin(name).unwrap_or_else(|| panic!("no built-in system {name}"));
     let parameters: Vec<_> = system.definition().parameters().to_vec();
     // A value that is not finite is kept for the caller's own check to refuse.
-    let value = |p: &str, default| values.iter().find(|(n, _)| *n == p).map_or(default, |(_, v)| (*v).into());
+    let value = |p: &str, default| {
+        values.iter().find(|(n, _)| *n == p).map_or(default, |(_, v)| (*v).into())
+    };
     let values = parameters.into_iter().map(|p| value(&p.name, p.value)).collect();
     system.with_raw_values(values)
 }

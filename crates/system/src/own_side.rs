@@ -1,18 +1,23 @@
 //! Replaces sign(h) by 1 in f+ and by -1 in f-.
 //!
-//! Friction is often written with `sign(v)` in both fields though h = v is the switching function itself. Taken literally, the jump would stay in the smoothed
-//! system, and sliding on it would be steps of no length; and at h = 0 neither field would have its limit. So in f+ the sign of h is 1, and in f- it is -1.
-//! An absolute value has no jump, and stays.
+//! Friction is often written with `sign(v)` in both fields though h = v is the switching function
+//! itself. Taken literally, the jump would stay in the smoothed system, and sliding on it would be
+//! steps of no length; and at h = 0 neither field would have its limit. So in f+ the sign of h is
+//! 1, and in f- it is -1. An absolute value has no jump, and stays.
 
 use twofold_num::Decimal;
 use twofold_num::tape::{Node, Operation, Recorded, Replay, Tape};
 
-/// The tape of h, f+ and f- in which the sign of h, or of a constant times it, is that of the field's own side.
+/// The tape of h, f+ and f- in which the sign of h, or of a constant times it, is that of the
+/// field's own side.
 pub(super) fn on_own_sides(tape: Tape) -> Tape {
     let (needed, h, operations) = (tape.needed(), tape.outputs()[0], tape.operations());
-    let is_absolute =
-        |node: Node| matches!(operations[node], Operation::Mul(a, b) if operations[b] == Operation::Sign(a));
-    let absolutes: Vec<Node> = (0..operations.len()).filter(|node| needed[*node] && is_absolute(*node)).collect();
+    let is_absolute = |node: Node| {
+        matches!(operations[node], Operation::Mul(a,
+        b) if operations[b] == Operation::Sign(a))
+    };
+    let absolutes: Vec<Node> =
+        (0..operations.len()).filter(|node| needed[*node] && is_absolute(*node)).collect();
     // Uses of a sign outside of absolute values.
     let mut used = vec![false; operations.len()];
     tape.outputs().iter().for_each(|output| used[*output] = true);
@@ -65,7 +70,9 @@ fn multiple(tape: &Tape, node: Node, h: Node) -> Option<f64> {
         _ => None,
     };
     match (tape.operations()[node], tape.operations()[h]) {
-        (Operation::Sub(a, b), Operation::Sub(c, d)) if equal(tape, a, d) && equal(tape, b, c) => Some(-1.0),
+        (Operation::Sub(a, b), Operation::Sub(c, d)) if equal(tape, a, d) && equal(tape, b, c) => {
+            Some(-1.0)
+        }
         (one, other) => {
             if let Some((inner, sign)) = of_constant(one) {
                 return Some(sign * multiple(tape, inner, h)?);
@@ -88,8 +95,12 @@ fn same(tape: &Tape, a: Node, b: Node, left: &mut u32) -> bool {
     *left -= 1;
     let (one, other) = (tape.operations()[a], tape.operations()[b]);
     match (one, other) {
-        (Operation::Constant(i), Operation::Constant(j)) => tape.constants()[i] == tape.constants()[j],
-        (Operation::Parameter(i), Operation::Parameter(j)) => tape.parameters()[i].name == tape.parameters()[j].name,
+        (Operation::Constant(i), Operation::Constant(j)) => {
+            tape.constants()[i] == tape.constants()[j]
+        }
+        (Operation::Parameter(i), Operation::Parameter(j)) => {
+            tape.parameters()[i].name == tape.parameters()[j].name
+        }
         (Operation::Variable(i), Operation::Variable(j)) => i == j,
         _ => {
             std::mem::discriminant(&one) == std::mem::discriminant(&other)
@@ -105,7 +116,8 @@ mod tests {
 
     fn fields(h: &str, term: &str, v: f64) -> [f64; 2] {
         let text = format!(
-            "name = \"case\"\nstates = [\"x\", \"v\"]\nh = {h:?}\nplus = [\"v\", {term:?}]\nminus = [\"v\", {term:?}]\n\
+            "name = \"case\"\nstates = [\"x\", \"v\"]\nh = {h:?}\nplus = [\"v\", {term:?}]\nminus \
+                = [\"v\", {term:?}]\n\
              [parameters]\nbelt = 0.5\n"
         );
         let values = System::new(Definition::from_toml(&text, "case").unwrap()).tape().clone();

@@ -5,8 +5,8 @@ use nalgebra::SVector;
 use super::PiecewiseSmooth;
 use twofold_num::Elementary;
 
-/// The same system with time running backwards: -f+ and -f-. Attracting and repelling regions change places, and the
-/// future of a reversed orbit is the past of the original.
+/// The same system with time running backwards: -f+ and -f-. Attracting and repelling regions
+/// change places, and the future of a reversed orbit is the past of the original.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reversed<P>(pub P);
 

@@ -38,7 +38,9 @@ fn expression(tape: &Tape, node: Node, left: &mut usize) -> Expression {
         Operation::Pi => Expression::Pi,
         Operation::Add(a, b) => Expression::Add(of(a), of(b)),
         Operation::Sub(a, b) => Expression::Sub(of(a), of(b)),
-        Operation::Mul(a, b) if tape.operations()[b] == Operation::Sign(a) => call(Function::Abs, of(a)),
+        Operation::Mul(a, b) if tape.operations()[b] == Operation::Sign(a) => {
+            call(Function::Abs, of(a))
+        }
         Operation::Mul(a, b) => product(*of(a), *of(b)),
         Operation::Div(a, b) => match (tape.operations()[a], tape.operations()[b]) {
             (Operation::Sin(c), Operation::Cos(d)) if c == d => call(Function::Tan, of(c)),
@@ -85,7 +87,9 @@ pub fn undefined(tape: &Tape, x: &[f64]) -> Option<String> {
     let (values, needed) = (tape.values(x), tape.needed());
     let sound = |node: &Node| values[*node].is_finite();
     let culprit = (0..values.len()).find(|node| {
-        needed[*node] && !sound(node) && tape.operations()[*node].arguments().all(|argument| sound(&argument))
+        needed[*node]
+            && !sound(node)
+            && tape.operations()[*node].arguments().all(|argument| sound(&argument))
     })?;
     match tape.operations()[culprit] {
         Operation::Variable(_) => None,
@@ -103,14 +107,18 @@ fn without_value(tape: &Tape, node: Node) -> String {
     let text = |node| written(tape, node);
     match tape.operations()[node] {
         Operation::Sqrt(a) => format!("{} has no value where {} is negative", text(node), text(a)),
-        Operation::Ln(a) => format!("{} has no value where {} is not positive", text(node), text(a)),
-        Operation::Div(_, b) => format!("{} has no value: division by zero, {} being 0", text(node), text(b)),
+        Operation::Ln(a) => {
+            format!("{} has no value where {} is not positive", text(node), text(a))
+        }
+        Operation::Div(_, b) => {
+            format!("{} has no value: division by zero, {} being 0", text(node), text(b))
+        }
         _ => too_large(tape, node),
     }
 }
 
-/// The operations that have no value beyond a zero of some number: a root's or a logarithm's argument, and of a quotient the divisor or what it is a
-/// power of.
+/// The operations that have no value beyond a zero of some number: a root's or a logarithm's
+/// argument, and of a quotient the divisor or what it is a power of.
 #[derive(Clone, Debug)]
 pub struct Ends {
     tape: Arc<Tape>,
@@ -134,14 +142,17 @@ impl Ends {
             Operation::Div(_, b) => Some((node, powers[b].0)),
             _ => None,
         };
-        let fixed = |node: Node| matches!(tape.operations()[node], Operation::Constant(_) | Operation::Parameter(_));
+        let fixed = |node: Node| {
+            matches!(tape.operations()[node], Operation::Constant(_) | Operation::Parameter(_))
+        };
         let nodes = (0..tape.operations().len()).filter(|node| needed[*node]);
         let ends: Vec<_> = nodes.filter_map(number).filter(|(_, a)| !fixed(*a)).collect();
         (!ends.is_empty()).then_some(Self { tape, ends })
     }
 
-    /// Where the domain ends first on a path of states, between neighbouring `places`, and which operation has no value there, in words. A
-    /// zero of a divisor is no end where the equation is bounded about it.
+    /// Where the domain ends first on a path of states, between neighbouring `places`, and which
+    /// operation has no value there, in words. A zero of a divisor is no end where the equation is
+    /// bounded about it.
     pub fn first(&self, path: &dyn Fn(f64) -> Vec<f64>, places: &[f64]) -> Option<(f64, String)> {
         let at = |place: f64| self.tape.values(&path(place));
         let mut before = at(*places.first()?);
@@ -149,10 +160,13 @@ impl Ends {
             let after = at(pair[1]);
             let changes = |(node, a): &&(Node, Node)| {
                 let sides = [before[*a], after[*a]];
-                !sides.iter().any(|v| v.is_nan()) && self.inside(*node, sides[0]) != self.inside(*node, sides[1])
+                !sides.iter().any(|v| v.is_nan())
+                    && self.inside(*node, sides[0]) != self.inside(*node, sides[1])
             };
             let ends = self.ends.iter().filter(changes);
-            let ends = ends.filter_map(|(node, a)| Some((self.end((*node, *a), &at, pair[0], pair[1])?, *node)));
+            let ends = ends.filter_map(|(node, a)| {
+                Some((self.end((*node, *a), &at, pair[0], pair[1])?, *node))
+            });
             if let Some((place, node)) = ends.min_by(|(a, _), (b, _)| a.total_cmp(b)) {
                 return Some((place, without_value(&self.tape, node)));
             }
@@ -161,13 +175,20 @@ impl Ends {
         None
     }
 
-    /// Whether an operation has a value where the number is `v`; of a quotient, on which side of the pole it is.
+    /// Whether an operation has a value where the number is `v`; of a quotient, on which side of
+    /// the pole it is.
     fn inside(&self, node: Node, v: f64) -> bool {
         v > 0.0 || v == 0.0 && matches!(self.tape.operations()[node], Operation::Sqrt(_))
     }
 
     /// The last place before the number `a` leaves its side, if the operation's domain ends there.
-    fn end(&self, (node, a): (Node, Node), at: &dyn Fn(f64) -> Vec<f64>, from: f64, to: f64) -> Option<f64> {
+    fn end(
+        &self,
+        (node, a): (Node, Node),
+        at: &dyn Fn(f64) -> Vec<f64>,
+        from: f64,
+        to: f64,
+    ) -> Option<f64> {
         let side = self.inside(node, at(from)[a]);
         let (mut low, mut high) = (from, to);
         for _ in 0..HALVINGS {
@@ -178,16 +199,25 @@ impl Ends {
                 high = middle;
             }
         }
-        let sizes = |values: &[f64]| -> Vec<f64> { self.tape.outputs().iter().map(|o| values[*o].abs()).collect() };
+        let sizes = |values: &[f64]| -> Vec<f64> {
+            self.tape.outputs().iter().map(|o| values[*o].abs()).collect()
+        };
         let beyond = at(high);
         if !matches!(self.tape.operations()[node], Operation::Div(..)) {
-            return sizes(&at(to)).iter().chain(&sizes(&beyond)).any(|size| size.is_nan()).then_some(low);
+            return sizes(&at(to))
+                .iter()
+                .chain(&sizes(&beyond))
+                .any(|size| size.is_nan())
+                .then_some(low);
         }
-        let is_pole = |values: &[f64]| values[node].is_infinite() && sizes(values).iter().any(|size| !size.is_finite());
+        let is_pole = |values: &[f64]| {
+            values[node].is_infinite() && sizes(values).iter().any(|size| !size.is_finite())
+        };
         if is_pole(&at(low)) || is_pole(&beyond) {
             return Some(low);
         }
-        // Two places before the zero, one well nearer than the other, as far as numbers tell them apart.
+        // Two places before the zero, one well nearer than the other, as far as numbers tell them
+        // apart.
         let mut back = high - low;
         let mut near = at(low);
         loop {
@@ -196,7 +226,11 @@ impl Ends {
             if near[a] == 0.0 && place > from {
                 near = far;
             } else if far[a].abs() >= NEARER * near[a].abs() || place <= from {
-                return sizes(&near).iter().zip(&sizes(&far)).any(|(near, far)| *near > LARGER * far).then_some(low);
+                return sizes(&near)
+                    .iter()
+                    .zip(&sizes(&far))
+                    .any(|(near, far)| *near > LARGER * far)
+                    .then_some(low);
             }
             back *= 2.0;
         }

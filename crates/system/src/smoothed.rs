@@ -34,8 +34,10 @@ impl<P: PiecewiseSmooth<N>, const N: usize> VectorField<N> for Smoothed<P> {
     }
 }
 
-/// f- + (f+ - f-) phi, eq. (8), for a given phi. (1 - phi, phi) weights would not be the paper's formula in rounding.
-// Always inlined, like the equations: a run in lanes must have them compiled for its own instruction set.
+/// f- + (f+ - f-) phi, eq. (8), for a given phi. (1 - phi, phi) weights would not be the paper's
+/// formula in rounding.
+// Always inlined, like the equations: a run in lanes must have them compiled for its own
+// instruction set.
 #[inline(always)]
 pub(super) fn blend<P: PiecewiseSmooth<N>, S: Elementary, const N: usize>(
     system: &P,

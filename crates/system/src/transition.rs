@@ -17,8 +17,8 @@ use twofold_num::{Arithmetic, Elementary};
 pub enum Transition {
     /// phi = (1 + tanh(h/eps))/2, sec. 4.1.
     Tanh,
-    /// phi = (1 + tanh(h/eps))/2 + sigma sqrt(eps) exp(-h^2), fig. 8. Note that the perturbation is of size sqrt(eps),
-    /// not eps, and has width 1 in h, not eps: it reaches far outside the layer.
+    /// phi = (1 + tanh(h/eps))/2 + sigma sqrt(eps) exp(-h^2), fig. 8. Note that the perturbation is
+    /// of size sqrt(eps), not eps, and has width 1 in h, not eps: it reaches far outside the layer.
     PerturbedTanh {
         /// Size of the perturbation.
         sigma: f64,
@@ -43,7 +43,9 @@ impl Transition {
             Transition::PerturbedTanh { sigma } => {
                 half((h / width).tanh()) + (-(h * h)).exp().scale(sigma * Elementary::sqrt(eps))
             }
-            Transition::Arctan => (h / width).atan() / S::from_f64(std::f64::consts::PI) + S::from_f64(0.5),
+            Transition::Arctan => {
+                (h / width).atan() / S::from_f64(std::f64::consts::PI) + S::from_f64(0.5)
+            }
             Transition::Algebraic => {
                 let u = h / width;
                 half(u / (S::one() + u * u).sqrt())

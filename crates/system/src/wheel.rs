@@ -1,20 +1,21 @@
 //! The wheel of figs 1 and 2, eqs (1)-(2): a reconstruction.
 //!
-//! The paper gives the form of eq. (1) and refers to another article for a_i, b_i and the parameters, which could not
-//! be obtained. The coefficients below were derived from the paper's own description of the machine, so everything
-//! made with them is labelled "reconstruction".
+//! The paper gives the form of eq. (1) and refers to another article for a_i, b_i and the
+//! parameters, which could not be obtained. The coefficients below were derived from the paper's
+//! own description of the machine, so everything made with them is labelled "reconstruction".
 //!
-//! A wheel of mass m rolls along a line at distance d from the axle of a disc that turns at omega0, with its axle at
-//! the angle gamma to the line. The housing that carries the line turns at omega; O = omega - omega0 is its speed
-//! relative to the disc. The Lagrangian is
+//! A wheel of mass m rolls along a line at distance d from the axle of a disc that turns at omega0,
+//! with its axle at the angle gamma to the line. The housing that carries the line turns at omega;
+//! O = omega - omega0 is its speed relative to the disc. The Lagrangian is
 //!
 //! ```text
 //! T = m [(v - d omega)^2 + r^2 omega^2]/2 + J omega^2/2,     spring k_w (r - r0)^2/2,
 //! ```
 //!
-//! with dampers c_w v and c_h O, and a side force F against the slip h along the wheel's axle, acting a pneumatic
-//! trail q behind the wheel's centre, p = -q tanh(V/V_c) (the tyre's self-aligning torque). Without that torque no
-//! repelling sticking and hence no singularity can exist.
+//! with dampers c_w v and c_h O, and a side force F against the slip h along the wheel's axle,
+//! acting a pneumatic trail q behind the wheel's centre, p = -q tanh(V/V_c) (the tyre's
+//! self-aligning torque). Without that torque no repelling sticking and hence no singularity can
+//! exist.
 
 use nalgebra::{SVector, vector};
 use serde::{Deserialize, Serialize};
@@ -104,7 +105,9 @@ impl Wheel {
         let (r, v, omega) = (x[0], x[1], x[2]);
         let o = omega - S::from_f64(self.omega0);
         let inertia = S::from_f64(self.j) + r.squared().scale(self.m);
-        let p1 = (r * omega.squared()).scale(self.m) - (r - S::from_f64(self.r0)).scale(self.k_w) - v.scale(self.c_w);
+        let p1 = (r * omega.squared()).scale(self.m)
+            - (r - S::from_f64(self.r0)).scale(self.k_w)
+            - v.scale(self.c_w);
         let p2 = -o.scale(self.c_h) - (r * v * omega).scale(2.0 * self.m);
         let a2 = (p1.scale(self.d) + p2) / inertia;
         let a1 = p1.scale(1.0 / self.m) + a2.scale(self.d);
@@ -119,14 +122,18 @@ impl Wheel {
         let (r, v) = (x[0], x[1]);
         let o = x[2] - self.omega0;
         let u = v - self.d * o;
-        0.5 * self.m * (u * u + r * o * r * o) + 0.5 * self.j * o * o + 0.5 * self.k_w * (r - self.r0) * (r - self.r0)
+        0.5 * self.m * (u * u + r * o * r * o)
+            + 0.5 * self.j * o * o
+            + 0.5 * self.k_w * (r - self.r0) * (r - self.r0)
             - 0.5 * self.m * self.omega0 * self.omega0 * (r * r + self.d * self.d)
     }
 
     /// The power dE/dt = -c_w v^2 - c_h O^2 - F s (h + p O), for sign(h) replaced by `s`.
     pub fn power(&self, x: &SVector<f64, 3>, s: f64) -> f64 {
         let o = x[2] - self.omega0;
-        -self.c_w * x[1] * x[1] - self.c_h * o * o - self.side_force * s * (self.switching(x) + self.lever(x) * o)
+        -self.c_w * x[1] * x[1]
+            - self.c_h * o * o
+            - self.side_force * s * (self.switching(x) + self.lever(x) * o)
     }
 
     /// The wheel's speed at which wheel and disc stick, h = 0: v = O (d - r cot gamma).
@@ -181,8 +188,14 @@ mod tests {
                     -59.856168,
                 ],
             ),
-            ([0.3, -2.0, 0.5], [-1.1667262, -0.95459415, 5.3568182, 5.6818182, 293.16222, 275.48455]),
-            ([0.8, 0.1, 2.0], [-0.070710678, -1.2020815, 2.4536364, 0.86363636, 76.983936, 59.306266]),
+            (
+                [0.3, -2.0, 0.5],
+                [-1.1667262, -0.95459415, 5.3568182, 5.6818182, 293.16222, 275.48455],
+            ),
+            (
+                [0.8, 0.1, 2.0],
+                [-0.070710678, -1.2020815, 2.4536364, 0.86363636, 76.983936, 59.306266],
+            ),
         ];
         for (x, want) in facts {
             let x = SVector::from(x);
@@ -204,8 +217,10 @@ mod tests {
 
     proptest! {
         #[test]
-        fn energy_balance(r in 0.1..1.0_f64, v in -5.0..5.0_f64, omega in -6.0..4.0_f64, s in -1.0..1.0_f64) {
-            // dE/dt along the field with sign(h) -> s must equal the power of dampers and side force.
+        fn energy_balance(r in 0.1..1.0_f64, v in -5.0..5.0_f64, omega in -6.0..4.0_f64,
+            s in -1.0..1.0_f64) {
+            // dE/dt along the field with sign(h) -> s must equal the power of dampers and side
+            // force.
             let w = Wheel::default();
             let x = vector![r, v, omega];
             let f = (w.plus(&x) * (1.0 + s) + w.minus(&x) * (1.0 - s)) * 0.5;
@@ -217,7 +232,8 @@ mod tests {
             });
             let rate = grad.dot(&f);
             let power = w.power(&x, s);
-            prop_assert!((rate - power).abs() < 1e-5 * (1.0 + power.abs()) + 1e-6 * f.norm(), "{rate} {power}");
+            prop_assert!((rate - power).abs() < 1e-5 * (1.0 + power.abs()) + 1e-6 * f.norm(),
+                "{rate} {power}");
         }
     }
 }

@@ -1,13 +1,16 @@
-//! Numbers with a bound on their error (midpoint and radius: Rump 1999), in two precisions, and with derivatives.
+//! Numbers with a bound on their error (midpoint and radius: Rump 1999), in two precisions, and
+//! with derivatives.
 //!
-//! Sums of products are the only operation that matters for a Taylor series. Their rounding errors are bounded once a sum, after
-//! Higham 2002, sec. 3.1: |fl(sum of n products) - sum| <= n u/(1 - n u) times the sum of absolute values.
+//! Sums of products are the only operation that matters for a Taylor series. Their rounding errors
+//! are bounded once a sum, after Higham 2002, sec. 3.1: |fl(sum of n products) - sum| <= n u/(1 - n
+//! u) times the sum of absolute values.
 
 use num_bigint::{BigInt, Sign};
 
 use super::rational::{Range, Rational};
 
-/// Twice the unit roundoff of `f64`, so that bounds made of a few rounded operations hold without care for their own rounding.
+/// Twice the unit roundoff of `f64`, so that bounds made of a few rounded operations hold without
+/// care for their own rounding.
 const U: f64 = f64::EPSILON;
 /// Above the rounding error of any operation whose result is subnormal.
 const TINY: f64 = 1e-300;
@@ -105,8 +108,10 @@ impl Ball {
             return Self { m: 0.0, r: f64::INFINITY };
         }
         let k = (t / (LN2[0] + LN2[1])).round();
-        // k has ten bits: its product with the first part is exact, and so is the difference, both being multiples of a bit that is small enough.
-        let r = Self::exactly(t - k * LN2[0]).minus(&Self::exactly(k).times(&Self { m: LN2[1], r: 1e-25 }));
+        // k has ten bits: its product with the first part is exact, and so is the difference, both
+        // being multiples of a bit that is small enough.
+        let r = Self::exactly(t - k * LN2[0])
+            .minus(&Self::exactly(k).times(&Self { m: LN2[1], r: 1e-25 }));
         let mut sum = Self::ONE;
         for n in (1..=18).rev() {
             sum = Self::ONE.plus(&sum.times(&r).over(n));
@@ -169,11 +174,13 @@ impl Number for Ball {
 
     fn logistic(&self) -> (Self, Self) {
         let [low, high] = self.ends();
-        let ((phi_low, at_low), (phi_high, at_high)) = (Self::logistic_at(low), Self::logistic_at(high));
+        let ((phi_low, at_low), (phi_high, at_high)) =
+            (Self::logistic_at(low), Self::logistic_at(high));
         let phi = Self::between(phi_low.ends()[0].max(0.0), phi_high.ends()[1].min(1.0));
         // The derivative has its largest value, a quarter, at 0, and falls on both sides.
         let least = at_low.ends()[0].min(at_high.ends()[0]).max(0.0);
-        let largest = if low < 0.0 && high > 0.0 { 0.25 } else { at_low.ends()[1].max(at_high.ends()[1]) };
+        let largest =
+            if low < 0.0 && high > 0.0 { 0.25 } else { at_low.ends()[1].max(at_high.ends()[1]) };
         (phi, Self::between(least, largest))
     }
 }
@@ -199,7 +206,8 @@ impl Fixed {
 
     /// Exactly a number whose last bit is not below 2^-192; others are rounded.
     pub fn exactly(x: f64) -> Self {
-        Rational::exactly(x).map_or(Self::new(BigInt::from(0), f64::INFINITY), |x| Self::of(&Range::point(&x)))
+        Rational::exactly(x)
+            .map_or(Self::new(BigInt::from(0), f64::INFINITY), |x| Self::of(&Range::point(&x)))
     }
 
     /// The midpoint, rounded.
@@ -297,8 +305,10 @@ impl Number for Fixed {
         };
         // 1/(1 + e): the error of the quotient is that of the divisor, which is above 1 - r.
         let sum = one.plus(&e);
-        let inverse =
-            Self::new((Self::one() << PLACES) / &sum.m, sum.r / (1.0 - sum.r).max(TINY) * (1.0 + 8.0 * U) + UNIT);
+        let inverse = Self::new(
+            (Self::one() << PLACES) / &sum.m,
+            sum.r / (1.0 - sum.r).max(TINY) * (1.0 + 8.0 * U) + UNIT,
+        );
         let other = e.times(&inverse);
         let slope = other.times(&inverse);
         (if negative { other } else { inverse }, slope)
@@ -330,7 +340,10 @@ impl Number for Dual {
                 let (p, q) = (da.m * b.value.m, a.value.m * db.m);
                 m[j] += p + q;
                 size[j] += p.abs() + q.abs();
-                r[j] += da.m.abs() * b.value.r + da.r * (bm + b.value.r) + am * db.r + a.value.r * (db.m.abs() + db.r);
+                r[j] += da.m.abs() * b.value.r
+                    + da.r * (bm + b.value.r)
+                    + am * db.r
+                    + a.value.r * (db.m.abs() + db.r);
             }
         }
         let n = (2 * a.len() + 6) as f64;
@@ -339,11 +352,17 @@ impl Number for Dual {
     }
 
     fn plus(&self, o: &Self) -> Self {
-        Self { value: self.value.plus(&o.value), by: std::array::from_fn(|j| self.by[j].plus(&o.by[j])) }
+        Self {
+            value: self.value.plus(&o.value),
+            by: std::array::from_fn(|j| self.by[j].plus(&o.by[j])),
+        }
     }
 
     fn minus(&self, o: &Self) -> Self {
-        Self { value: self.value.minus(&o.value), by: std::array::from_fn(|j| self.by[j].minus(&o.by[j])) }
+        Self {
+            value: self.value.minus(&o.value),
+            by: std::array::from_fn(|j| self.by[j].minus(&o.by[j])),
+        }
     }
 
     fn over(&self, n: usize) -> Self {

@@ -228,46 +228,62 @@ struct Horseshoe {
 const STATEMENTS: [(&str, &str); 8] = [
     (
         "printed-cycle",
-        "For alpha = 1e-3, beta = 1e-5, eps = 1e-3 and the tanh transition, the smoothed caricature has exactly one closed orbit that crosses y = 0 upwards in the \
+        "For alpha = 1e-3, beta = 1e-5, eps = 1e-3 and the tanh transition, the smoothed \
+            caricature has exactly one closed orbit that crosses y = 0 upwards in the \
          candidate box and returns to it at its first upward crossing. It attracts.",
     ),
     (
         "coexistence",
-        "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the smoothed caricature has two different closed orbits that both attract: one crosses \
+        "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the smoothed caricature \
+            has two different closed orbits that both attract: one crosses \
          y = 0 upwards once a turn, the other three times.",
     ),
     (
         "saddles",
-        "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the smoothed caricature has four different closed orbits of saddle type, one multiplier of \
-         each inside the unit circle and one outside: they cross y = 0 upwards three, four, four and five times a turn.",
+        "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the smoothed caricature \
+            has four different closed orbits of saddle type, one multiplier of \
+         each inside the unit circle and one outside: they cross y = 0 upwards three, four, four \
+         and five times a turn.",
     ),
     (
         "sensitivity",
-        "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the orbits of the smoothed caricature from the two states, which are less than 1e-12 apart \
+        "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the orbits of the \
+            smoothed caricature from the two states, which are less than 1e-12 apart \
          at the two-fold singularity, are more than 0.3 apart at their second crossing of y = 0.",
     ),
     (
         "contraction",
-        "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the orbits of the smoothed caricature from (0.2, 0, -1), (0.21, 0, -1) and (0.2, 0, -0.99) pass \
-         the two-fold singularity at their third crossing of y = 0, and the fourth crossings of the second and third are less than 0.0005 from that of the first.",
+        "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the orbits of the \
+            smoothed caricature from (0.2, 0, -1), (0.21, 0, -1) and (0.2, 0, -0.99) pass \
+         the two-fold singularity at their third crossing of y = 0, and the fourth crossings of \
+         the second and third are less than 0.0005 from that of the first.",
     ),
     (
         "horseshoe",
-        "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the return map of the smoothed caricature from a downward crossing of y = 0 to the fourth \
-         next has a horseshoe: two loops of covering relations between parallelograms, of 2 and of 14 sets, that have one set in common and go on from it to disjoint \
-         ones. Each return passes the two-fold singularity, at a crossing with |x| and |z| below 1e-4. So for every sequence of the two loops there is an orbit that \
-         runs through them in this order, for every periodic sequence a periodic one, and the topological entropy of the return map is more than log(1.12).",
+        "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the return map of the \
+            smoothed caricature from a downward crossing of y = 0 to the fourth \
+         next has a horseshoe: two loops of covering relations between parallelograms, of 2 and of \
+         14 sets, that have one set in common and go on from it to disjoint \
+         ones. Each return passes the two-fold singularity, at a crossing with |x| and |z| below \
+         1e-4. So for every sequence of the two loops there is an orbit that \
+         runs through them in this order, for every periodic sequence a periodic one, and the \
+         topological entropy of the return map is more than log(1.12).",
     ),
     (
         "inner-law",
-        "In the inner problem of the two-fold with v+ = -1.2, v- = -1.4 and the tanh transition, let p = phi - phi* and q = (1 - phi*) Z - phi* Y, phi* being \
-         the value of phi on the canard. Every orbit that comes in along the sliding surface at s = Y + Z = S, beyond a bound S0, with 0 < |p| <= 0.05 and q/p \
-         between S - c1/S and S, first leaves |p| <= 0.05 at an s = -x with f x^2/2 - ln(x)/mu = (1/mu - 1) ln S - ln|p| + C, and the derivatives of x by p and \
-         by q at s = 0 are exp(K) S^(1/mu - 1)/(|p| x) in absolute value, with C and both K in given intervals that do not depend on the orbit or on S.",
+        "In the inner problem of the two-fold with v+ = -1.2, v- = -1.4 and the tanh transition, \
+            let p = phi - phi* and q = (1 - phi*) Z - phi* Y, phi* being \
+         the value of phi on the canard. Every orbit that comes in along the sliding surface at s \
+         = Y + Z = S, beyond a bound S0, with 0 < |p| <= 0.05 and q/p \
+         between S - c1/S and S, first leaves |p| <= 0.05 at an s = -x with f x^2/2 - ln(x)/mu = \
+         (1/mu - 1) ln S - ln|p| + C, and the derivatives of x by p and \
+         by q at s = 0 are exp(K) S^(1/mu - 1)/(|p| x) in absolute value, with C and both K in \
+         given intervals that do not depend on the orbit or on S.",
     ),
     (
         "crossings",
-        "For beta = 1e-5, eps = 1e-3, the tanh transition and alpha = 1e-3 or 0.1, the first crossings of y = 0 by the orbit of the smoothed caricature from (0.2, 0, \
+        "For beta = 1e-5, eps = 1e-3, the tanh transition and alpha = 1e-3 or 0.1, the first \
+            crossings of y = 0 by the orbit of the smoothed caricature from (0.2, 0, \
          -1) are those listed, each within its radius; there are no others between them.",
     ),
 ];
@@ -279,7 +295,8 @@ pub struct Checker {
 }
 
 impl Checker {
-    /// One that looks at all that needs no orbit and then refuses: for those who try readers with a great many texts.
+    /// One that looks at all that needs no orbit and then refuses: for those who try readers with a
+    /// great many texts.
     pub fn of_reader() -> Self {
         Self { known: Known::of_reader() }
     }
@@ -287,7 +304,8 @@ impl Checker {
     /// Verifies a certificate.
     ///
     /// # Errors
-    /// [`Refused::Unreadable`] if the text is not a certificate of a theorem known here, [`Refused::Wrong`] with what does not hold.
+    /// [`Refused::Unreadable`] if the text is not a certificate of a theorem known here,
+    /// [`Refused::Wrong`] with what does not hold.
     pub fn verify(&self, text: &str) -> Result<Verified, Refused> {
         let unreadable = |e: serde_json::Error| Refused::Unreadable(e.to_string());
         without_repeats(text).map_err(unreadable)?;
@@ -328,7 +346,9 @@ pub fn verify(text: &str) -> Result<Verified, Refused> {
 
 /// A certificate's data; errors say the line.
 fn data<T: DeserializeOwned>(text: &str) -> Result<T, Refused> {
-    serde_json::from_str::<Certificate<T>>(text).map(|c| c.data).map_err(|e| Refused::Unreadable(e.to_string()))
+    serde_json::from_str::<Certificate<T>>(text)
+        .map(|c| c.data)
+        .map_err(|e| Refused::Unreadable(e.to_string()))
 }
 
 pub(super) fn exactly(x: f64) -> Check<Rational> {
@@ -353,14 +373,20 @@ fn ranges<const N: usize>(bounds: [Bounds; N]) -> Check<[Range; N]> {
 fn ball(b: &Ball, name: &str) -> Check<Range> {
     need(b.radius > 0.0, format!("{name}: the radius is above 0"))?;
     // A number of two parts: the second is below the last digit of the first.
-    need(b.low.abs() <= 2.3e-16 * b.high.abs(), format!("{name}: the second part of a number is small"))?;
+    need(
+        b.low.abs() <= 2.3e-16 * b.high.abs(),
+        format!("{name}: the second part of a number is small"),
+    )?;
     let (centre, radius) = (&exactly(b.high)? + &exactly(b.low)?, exactly(b.radius)?);
     Ok(Range::point(&centre).widened(&radius))
 }
 
 /// The equation, which must be the one that the statement names.
 fn equation(p: &Parameters, alpha: &str) -> Check<Caricature> {
-    need(p.system == "caricature" && p.transition == "tanh", "the equation is the caricature with tanh")?;
+    need(
+        p.system == "caricature" && p.transition == "tanh",
+        "the equation is the caricature with tanh",
+    )?;
     let is = |text: &str, want: &str, name: &str| -> Check<Rational> {
         let wanted = decimal(want)?;
         need(decimal(text)? == wanted, format!("{name} = {want}"))?;
@@ -377,10 +403,14 @@ fn equation(p: &Parameters, alpha: &str) -> Check<Caricature> {
 
 /// Whether a claimed enclosure holds what was computed here.
 pub(super) fn holds(claimed: &Range, ours: &Range, what: &str) -> Check {
-    need(ours.within(claimed), format!("{what}: the enclosure {claimed} holds what the checker computes, {ours}"))
+    need(
+        ours.within(claimed),
+        format!("{what}: the enclosure {claimed} holds what the checker computes, {ours}"),
+    )
 }
 
-/// Whether `claimed` holds `exact`, and is wider by rounding alone: some units in the last place of the numbers that it was made of.
+/// Whether `claimed` holds `exact`, and is wider by rounding alone: some units in the last place of
+/// the numbers that it was made of.
 pub(super) fn tight(claimed: &Range, exact: &Range, scale: &Rational, what: &str) -> Check {
     need(exact.within(claimed), format!("{what} holds what its parts give"))?;
     let room = &(scale + &exact.magnitude()) * &Rational::tenth_to(14);
@@ -415,15 +445,22 @@ fn cycle(
     let y = c.preconditioner.map(|row| row.map(|x| exactly(x).map(|x| Range::point(&x))));
     let [[a, b], [d, e]] = y;
     let y = [[a?, b?], [d?, e?]];
-    need(&y[0][0].low * &y[1][1].low != &y[0][1].low * &y[1][0].low, named("the preconditioner is regular"))?;
+    need(
+        &y[0][0].low * &y[1][1].low != &y[0][1].low * &y[1][0].low,
+        named("the preconditioner is regular"),
+    )?;
     let (image, point) = (ranges(c.image)?, ranges(c.point)?);
     let k = krawczyk(&centre, &value, &slope, &y, &candidate)?;
     for i in 0..2 {
         need(k[i].inside(&candidate[i]), named("Krawczyk's inclusion"))?;
         tight(&image[i], &k[i], &Rational::whole(0), &named("the image"))?;
-        need(point[i].within(&image[i]) && image[i].inside(&candidate[i]), named("the boxes are nested"))?;
+        need(
+            point[i].within(&image[i]) && image[i].inside(&candidate[i]),
+            named("the boxes are nested"),
+        )?;
     }
-    // The preconditioner is near the inverse of D - 1: that is what makes the inclusion sharp. (A saddle's derivative is known less well.)
+    // The preconditioner is near the inverse of D - 1: that is what makes the inclusion sharp. (A
+    // saddle's derivative is known less well.)
     let near = match kind {
         CycleStability::Attracts => Rational::tenth_to(2),
         CycleStability::Saddle => decimal("0.05")?,
@@ -437,10 +474,14 @@ fn cycle(
     let d = [ranges(c.derivative_at_point[0])?, ranges(c.derivative_at_point[1])?];
     for i in 0..2 {
         for j in 0..2 {
-            need(d[i][j].within(&slope[i][j]), named("the derivative at the point is one on the candidate"))?;
+            need(
+                d[i][j].within(&slope[i][j]),
+                named("the derivative at the point is one on the candidate"),
+            )?;
         }
     }
-    let (trace, determinant) = (&d[0][0] + &d[1][1], &(&d[0][0] * &d[1][1]) - &(&d[0][1] * &d[1][0]));
+    let (trace, determinant) =
+        (&d[0][0] + &d[1][1], &(&d[0][0] * &d[1][1]) - &(&d[0][1] * &d[1][0]));
     // What was rounded were these products.
     let products = &(&d[0][0] * &d[1][1]).magnitude() + &(&d[0][1] * &d[1][0]).magnitude();
     let scale = &Rational::whole(4) + &products;
@@ -469,9 +510,15 @@ fn cycle(
         holds(&range(crossing.time)?, &ours.time, &at("time"))?;
         for (claimed, axis) in ranges(crossing.point)?.iter().zip(PLANE) {
             holds(claimed, &ours.states[axis], &at("point"))?;
-            need(claimed.width() < Rational::tenth_to(7), at("the enclosure is narrower than 1e-7"))?;
+            need(
+                claimed.width() < Rational::tenth_to(7),
+                at("the enclosure is narrower than 1e-7"),
+            )?;
         }
-        need(range(crossing.time)?.width() < Rational::tenth_to(7), at("the time is known to 1e-7"))?;
+        need(
+            range(crossing.time)?.width() < Rational::tenth_to(7),
+            at("the time is known to 1e-7"),
+        )?;
     }
     need(
         c.crossings.last().is_some_and(|last| last.time == c.period),
@@ -480,7 +527,8 @@ fn cycle(
 
     // Stability, from the checker's own derivative.
     let d = &ours.derivative;
-    let (trace, determinant) = (&d[0][0] + &d[1][1], &(&d[0][0] * &d[1][1]) - &(&d[0][1] * &d[1][0]));
+    let (trace, determinant) =
+        (&d[0][0] + &d[1][1], &(&d[0][0] * &d[1][1]) - &(&d[0][1] * &d[1][0]));
     let one = Range::point(&Rational::whole(1));
     // The characteristic polynomial l^2 - trace l + determinant at 1 and -1.
     let (above, below) = (&(&one + &determinant) - &trace, &(&one + &determinant) + &trace);
@@ -531,7 +579,11 @@ fn printed_cycle(known: &Known, c: &Cycle) -> Check<Vec<String>> {
 }
 
 /// Several closed orbits at alpha = 0.1, which must all be different, with their crossings a turn.
-fn cycles(known: &Known, orbits: &[(&Cycle, usize, &str)], kind: CycleStability) -> Check<Vec<String>> {
+fn cycles(
+    known: &Known,
+    orbits: &[(&Cycle, usize, &str)],
+    kind: CycleStability,
+) -> Check<Vec<String>> {
     let (mut said, mut points) = (Vec::new(), Vec::<[Range; 2]>::new());
     for (orbit, crossings, name) in orbits {
         let (findings, rows) = cycle(known, orbit, "0.1", *crossings, kind, name)?;
@@ -540,7 +592,10 @@ fn cycles(known: &Known, orbits: &[(&Cycle, usize, &str)], kind: CycleStability)
     }
     for (i, a) in points.iter().enumerate() {
         for b in &points[i + 1..] {
-            need(!(a[0].meets(&b[0]) && a[1].meets(&b[1])), "the upward crossings of the orbits are all different")?;
+            need(
+                !(a[0].meets(&b[0]) && a[1].meets(&b[1])),
+                "the upward crossings of the orbits are all different",
+            )?;
         }
     }
     said.push(format!(
@@ -552,7 +607,11 @@ fn cycles(known: &Known, orbits: &[(&Cycle, usize, &str)], kind: CycleStability)
 }
 
 fn coexistence(known: &Known, c: &Coexistence) -> Check<Vec<String>> {
-    cycles(known, &[(&c.one, 2, "period one"), (&c.three, 6, "period three")], CycleStability::Attracts)
+    cycles(
+        known,
+        &[(&c.one, 2, "period one"), (&c.three, 6, "period three")],
+        CycleStability::Attracts,
+    )
 }
 
 fn saddles(known: &Known, c: &Saddles) -> Check<Vec<String>> {
@@ -565,7 +624,8 @@ fn saddles(known: &Known, c: &Saddles) -> Check<Vec<String>> {
     cycles(known, &orbits, CycleStability::Saddle)
 }
 
-/// Compares claimed crossings of the orbit from (x, 0, z) with the checker's own, and returns these.
+/// Compares claimed crossings of the orbit from (x, 0, z) with the checker's own, and returns
+/// these.
 fn orbit(
     known: &Known,
     equation: &Caricature,
@@ -577,9 +637,14 @@ fn orbit(
     // What can be refused without an orbit comes first.
     let mut claimed = Vec::new();
     for (n, row) in rows.iter().enumerate() {
-        for (b, axis, what) in [(&row.time, None, "time"), (&row.x, Some(0), "x"), (&row.z, Some(2), "z")] {
+        for (b, axis, what) in
+            [(&row.time, None, "time"), (&row.x, Some(0), "x"), (&row.z, Some(2), "z")]
+        {
             let b = ball(b, &at(n, what))?;
-            need(b.width() < Rational::tenth_to(7), at(n, &format!("{what}: the enclosure is narrower than 1e-7")))?;
+            need(
+                b.width() < Rational::tenth_to(7),
+                at(n, &format!("{what}: the enclosure is narrower than 1e-7")),
+            )?;
             claimed.push((n, b, axis, what));
         }
     }
@@ -604,25 +669,37 @@ fn distance(claimed: Bounds, squared: &Range, widest: &Rational, name: &str) -> 
     let claimed = range(claimed)?;
     need(!claimed.low.is_negative(), format!("{name}: a distance is not negative"))?;
     holds(&claimed.squared(), squared, &format!("{name} (squared)"))?;
-    need(claimed.width() < *widest, format!("{name}: the enclosure is narrower than {:.0e}", widest.approximately()))?;
+    need(
+        claimed.width() < *widest,
+        format!("{name}: the enclosure is narrower than {:.0e}", widest.approximately()),
+    )?;
     squared.sqrt().ok_or_else(|| format!("{name}: a distance is known"))
 }
 
 fn sensitivity(known: &Known, c: &Sensitivity) -> Check<Vec<String>> {
-    /// Half the distances in x and z of states whose quotients are the growth: 2^-72 and 2^-66, so that neither the third derivative nor the radii are seen.
-    const APART: [f64; 2] = [1.0 / 4_722_366_482_869_645_213_696.0, 1.0 / 73_786_976_294_838_206_464.0];
+    /// Half the distances in x and z of states whose quotients are the growth: 2^-72 and 2^-66, so
+    /// that neither the third derivative nor the radii are seen.
+    const APART: [f64; 2] =
+        [1.0 / 4_722_366_482_869_645_213_696.0, 1.0 / 73_786_976_294_838_206_464.0];
     let equation = equation(&c.equation, "0.1")?;
     let (a, b, z) = (decimal(&c.states.x[0])?, decimal(&c.states.x[1])?, decimal(&c.states.z)?);
     let apart = (&a - &b).abs();
-    need(apart > Rational::whole(0) && apart < Rational::tenth_to(12), "the states differ by less than 1e-12")?;
+    need(
+        apart > Rational::whole(0) && apart < Rational::tenth_to(12),
+        "the states differ by less than 1e-12",
+    )?;
     need(decimal(&c.states.y)? == Rational::whole(0), "the states lie on y = 0")?;
     // At the singularity: within a few eps across, and on it along the layer.
     need(z.abs() < Rational::tenth_to(12), "the states lie at the singularity (z)")?;
-    need(a.abs() < Rational::tenth_to(4) && b.abs() < Rational::tenth_to(4), "the states lie at the singularity (x)")?;
+    need(
+        a.abs() < Rational::tenth_to(4) && b.abs() < Rational::tenth_to(4),
+        "the states lie at the singularity (x)",
+    )?;
     need(c.crossings.len() == 3, "three crossings")?;
     let mut orbits = Vec::new();
     for (k, x) in [&a, &b].into_iter().enumerate() {
-        let rows: Vec<TableRow> = c.crossings.iter().map(|row| row.orbits[k].row(row.upward)).collect();
+        let rows: Vec<TableRow> =
+            c.crossings.iter().map(|row| row.orbits[k].row(row.upward)).collect();
         let name = format!("orbit {}", k + 1);
         orbits.push(orbit(known, &equation, [x, &z], &rows.iter().collect::<Vec<_>>(), &name)?);
     }
@@ -640,11 +717,17 @@ fn sensitivity(known: &Known, c: &Sensitivity) -> Check<Vec<String>> {
     for (i, row) in c.growth_until_first_crossing.into_iter().enumerate() {
         for (j, claimed) in ranges(row)?.iter().enumerate() {
             holds(claimed, &quotients[j][i], "growth_until_first_crossing")?;
-            need(claimed.width() < &claimed.magnitude() * &Rational::tenth_to(4), "the growth factors are narrow")?;
+            need(
+                claimed.width() < &claimed.magnitude() * &Rational::tenth_to(4),
+                "the growth factors are narrow",
+            )?;
         }
     }
     let d = orbits[0][0].set.derivative()[2][0];
-    said.push(format!("the derivative of the first crossing's z by x is enclosed: {:.9e} +- {:.0e}", d.m, d.r));
+    said.push(format!(
+        "the derivative of the first crossing's z by x is enclosed: {:.9e} +- {:.0e}",
+        d.m, d.r
+    ));
     Ok(said)
 }
 
@@ -656,11 +739,15 @@ fn crossings(known: &Known, c: &Crossings) -> Check<Vec<String>> {
     {
         let equation = equation(&table.equation, alpha)?;
         need(table.crossings.len() == count, format!("{name}: {count} rows"))?;
-        let ours = orbit(known, &equation, start, &table.crossings.iter().collect::<Vec<_>>(), name)?;
-        let widest =
-            ours.iter().flat_map(|r| PLANE.map(|i| r.states[i].width())).fold(Rational::whole(0), Rational::max);
+        let ours =
+            orbit(known, &equation, start, &table.crossings.iter().collect::<Vec<_>>(), name)?;
+        let widest = ours
+            .iter()
+            .flat_map(|r| PLANE.map(|i| r.states[i].width()))
+            .fold(Rational::whole(0), Rational::max);
         said.push(format!(
-            "{name}: the orbit's first {count} crossings are enclosed anew (widest {:.1e}), each within the radius claimed; no others between",
+            "{name}: the orbit's first {count} crossings are enclosed anew (widest {:.1e}), each \
+                within the radius claimed; no others between",
             widest.approximately()
         ));
     }
@@ -670,13 +757,25 @@ fn crossings(known: &Known, c: &Crossings) -> Check<Vec<String>> {
 fn contraction(known: &Known, c: &Contraction) -> Check<Vec<String>> {
     let equation = equation(&c.equation, "0.1")?;
     let mut ours = Vec::new();
-    for (orbit_from, [x, z]) in c.orbits.iter().zip([["0.2", "-1"], ["0.21", "-1"], ["0.2", "-0.99"]]) {
+    for (orbit_from, [x, z]) in
+        c.orbits.iter().zip([["0.2", "-1"], ["0.21", "-1"], ["0.2", "-0.99"]])
+    {
         let name = format!("the orbit from ({x}, 0, {z})");
         let (x, z) = (decimal(x)?, decimal(z)?);
-        let start = [decimal(&orbit_from.start.x)?, decimal(&orbit_from.start.y)?, decimal(&orbit_from.start.z)?];
+        let start = [
+            decimal(&orbit_from.start.x)?,
+            decimal(&orbit_from.start.y)?,
+            decimal(&orbit_from.start.z)?,
+        ];
         need(start == [x.clone(), Rational::whole(0), z.clone()], format!("{name} starts there"))?;
         need(orbit_from.crossings.len() == 4, format!("{name}: four crossings"))?;
-        let rows = orbit(known, &equation, [&x, &z], &orbit_from.crossings.iter().collect::<Vec<_>>(), &name)?;
+        let rows = orbit(
+            known,
+            &equation,
+            [&x, &z],
+            &orbit_from.crossings.iter().collect::<Vec<_>>(),
+            &name,
+        )?;
         for i in PLANE {
             let near = rows[2].states[i].magnitude() < Rational::tenth_to(4);
             need(near, format!("{name} passes the singularity within 1e-4"))?;
@@ -704,21 +803,33 @@ impl Parallelogram {
     /// The part with u in [low, high] and all v.
     fn part(&self, low: f64, high: f64) -> Check<Patch> {
         let middle = 0.5 * low + 0.5 * high;
-        let along =
-            |i: usize| Ok::<_, String>(&exactly(self.centre[i])? + &(&exactly(self.unstable[i])? * &exactly(middle)?));
+        let along = |i: usize| {
+            Ok::<_, String>(
+                &exactly(self.centre[i])? + &(&exactly(self.unstable[i])? * &exactly(middle)?),
+            )
+        };
         let centre = [along(0)?, along(1)?];
-        Ok(Patch { centre, first: self.unstable, second: self.stable, radii: [0.5 * high - 0.5 * low, 1.0] })
+        Ok(Patch {
+            centre,
+            first: self.unstable,
+            second: self.stable,
+            radii: [0.5 * high - 0.5 * low, 1.0],
+        })
     }
 
-    /// The images of a crossing's set in the coordinates (u, v); of its middle alone unless `whole`.
+    /// The images of a crossing's set in the coordinates (u, v); of its middle alone unless
+    /// `whole`.
     fn see(&self, crossing: &Crossing, whole: bool) -> Check<[Range; 2]> {
         let exact = |x: f64| exactly(x).map(|x| Range::point(&x));
-        let [[a, b], [c, d]] =
-            [[exact(self.unstable[0])?, exact(self.stable[0])?], [exact(self.unstable[1])?, exact(self.stable[1])?]];
+        let [[a, b], [c, d]] = [
+            [exact(self.unstable[0])?, exact(self.stable[0])?],
+            [exact(self.unstable[1])?, exact(self.stable[1])?],
+        ];
         let determinant = &(&a * &d) - &(&b * &c);
         let inverse = determinant.inverse().ok_or("the parallelograms have an area")?;
         let zero = Range::point(&Rational::whole(0));
-        let m = [[&d * &inverse, &(&zero - &b) * &inverse], [&(&zero - &c) * &inverse, &a * &inverse]];
+        let m =
+            [[&d * &inverse, &(&zero - &b) * &inverse], [&(&zero - &c) * &inverse, &a * &inverse]];
         let origin = [&exactly(self.centre[0])?, &exactly(self.centre[1])?];
         crossing.set.seen(&m, origin, PLANE, whole).ok_or_else(|| "an image is bounded".to_owned())
     }
@@ -727,15 +838,22 @@ impl Parallelogram {
 /// Crossings of y = 0 in a return: four downward ones.
 const RETURN: usize = 8;
 
-/// One covering relation (Zgliczynski & Gidea 2004, Definition 2): the ends come to either side of the sets that are covered, no part meets their edges v = -1, 1.
-/// Whether the certificate's numbers hold what is found comes first: the parts take longest.
-fn covering(known: &Known, equation: &Caricature, sets: &[Parallelogram], c: &Covering) -> Check<Rational> {
+/// One covering relation (Zgliczynski & Gidea 2004, Definition 2): the ends come to either side of
+/// the sets that are covered, no part meets their edges v = -1, 1. Whether the certificate's
+/// numbers hold what is found comes first: the parts take longest.
+fn covering(
+    known: &Known,
+    equation: &Caricature,
+    sets: &[Parallelogram],
+    c: &Covering,
+) -> Check<Rational> {
     /// Parts shorter than this are not tried.
     const SHORTEST: f64 = 1.0 / 64.0;
     let from = &sets[c.from];
     let to: Vec<&Parallelogram> = c.to.iter().map(|k| &sets[*k]).collect();
     let image = |low: f64, high: f64| -> Check<Rc<Vec<Crossing>>> {
-        let rows = known.crossings(equation, &from.part(low, high)?, RETURN, FlowSettings::NARROW)?;
+        let rows =
+            known.crossings(equation, &from.part(low, high)?, RETURN, FlowSettings::NARROW)?;
         let alternate = rows.iter().enumerate().all(|(n, r)| r.upward == (n % 2 == 0));
         need(alternate, "directions alternate, the first is upward")?;
         Ok(rows)
@@ -753,7 +871,10 @@ fn covering(known: &Known, equation: &Caricature, sets: &[Parallelogram], c: &Co
     let claimed: Vec<(&ImageOfPart, bool)> =
         c.pieces.iter().map(|p| (p, false)).chain(c.ends.iter().map(|e| (e, true))).collect();
     for (image, is_end) in &claimed {
-        need(image.seen.len() == c.to.len(), "an image is seen from every set that is to be covered")?;
+        need(
+            image.seen.len() == c.to.len(),
+            "an image is seen from every set that is to be covered",
+        )?;
         for (seen, k) in image.seen.iter().zip(&c.to) {
             let [u, v] = ranges(*seen)?;
             let fine = side(&u) != 0 || !is_end && v.magnitude() < Rational::whole(1);
@@ -771,7 +892,8 @@ fn covering(known: &Known, equation: &Caricature, sets: &[Parallelogram], c: &Co
         for u in claimed.part {
             let rows = image(u, u)?;
             for (seen, to) in claimed.seen.iter().zip(&to) {
-                for (claimed, ours) in ranges(*seen)?.iter().zip(to.see(&rows[RETURN - 1], false)?) {
+                for (claimed, ours) in ranges(*seen)?.iter().zip(to.see(&rows[RETURN - 1], false)?)
+                {
                     holds(claimed, &ours, &format!("the image of u = {u}"))?;
                 }
             }
@@ -789,7 +911,9 @@ fn covering(known: &Known, equation: &Caricature, sets: &[Parallelogram], c: &Co
         }
         Ok(())
     };
-    let last = |rows: &[Crossing], to: &Parallelogram| -> Check<[Range; 2]> { to.see(&rows[RETURN - 1], true) };
+    let last = |rows: &[Crossing], to: &Parallelogram| -> Check<[Range; 2]> {
+        to.see(&rows[RETURN - 1], true)
+    };
     let ends = [image(-1.0, -1.0)?, image(1.0, 1.0)?];
     for to in &to {
         let sides = side(&last(&ends[0], to)?[0]) * side(&last(&ends[1], to)?[0]);
@@ -830,14 +954,23 @@ fn horseshoe(known: &Known, c: &Horseshoe) -> Check<Vec<String>> {
     /// Sets of the longer loop.
     const LONG: usize = 14;
     let equation = equation(&c.equation, "0.1")?;
-    need(c.sets.len() == LONG + 1 && c.coverings.len() == c.sets.len(), "fifteen sets, each of which covers others")?;
+    need(
+        c.sets.len() == LONG + 1 && c.coverings.len() == c.sets.len(),
+        "fifteen sets, each of which covers others",
+    )?;
     for set in &c.sets {
         for side in extent(set)? {
-            need(side.width() < Rational::tenth_to(12), "the parallelograms are smaller than 1e-12")?;
+            need(
+                side.width() < Rational::tenth_to(12),
+                "the parallelograms are smaller than 1e-12",
+            )?;
         }
     }
     let (one, two) = (extent(&c.sets[1])?, extent(&c.sets[2])?);
-    need(!(one[0].meets(&two[0]) && one[1].meets(&two[1])), "the sets that follow the common one are disjoint")?;
+    need(
+        !(one[0].meets(&two[0]) && one[1].meets(&two[1])),
+        "the sets that follow the common one are disjoint",
+    )?;
     // 0, 1, 0, ... and 0, 2, 3, ..., 14, 0, ...
     let follows = |i: usize| match i {
         0 => vec![1, 2],
@@ -846,16 +979,32 @@ fn horseshoe(known: &Known, c: &Horseshoe) -> Check<Vec<String>> {
     };
     let mut nearest = Rational::whole(0);
     for (i, relation) in c.coverings.iter().enumerate() {
-        need(relation.from == i && relation.to == follows(i), "the sets make two loops through the first")?;
-        nearest = nearest.max(covering(known, &equation, &c.sets, relation).map_err(|e| format!("set {i}: {e}"))?);
+        need(
+            relation.from == i && relation.to == follows(i),
+            "the sets make two loops through the first",
+        )?;
+        nearest = nearest.max(
+            covering(known, &equation, &c.sets, relation).map_err(|e| format!("set {i}: {e}"))?,
+        );
     }
-    // lambda^-2 + lambda^-14 falls with lambda: it is above 1 at 1.12, so that the growth rate of chains is beyond 1.12.
+    // lambda^-2 + lambda^-14 falls with lambda: it is above 1 at 1.12, so that the growth rate of
+    // chains is beyond 1.12.
     let base = decimal("1.12")?;
     let power = |n: u32| (0..n).fold(Rational::whole(1), |p, _| &p * &base);
-    need(power(14) < &power(12) + &Rational::whole(1), "chains of sets grow by more than 1.12 a return")?;
+    need(
+        power(14) < &power(12) + &Rational::whole(1),
+        "chains of sets grow by more than 1.12 a return",
+    )?;
     Ok(vec![
-        format!("{} covering relations, proved anew: loops of 2 and {LONG} sets through the first", c.sets.len() + 1),
-        "the two sets that can follow the first are disjoint: entropy more than log(1.12) a return".to_owned(),
-        format!("every return passes the singularity, within {:.1e} in x and z", nearest.approximately()),
+        format!(
+            "{} covering relations, proved anew: loops of 2 and {LONG} sets through the first",
+            c.sets.len() + 1
+        ),
+        "the two sets that can follow the first are disjoint: entropy more than log(1.12) a return"
+            .to_owned(),
+        format!(
+            "every return passes the singularity, within {:.1e} in x and z",
+            nearest.approximately()
+        ),
     ])
 }

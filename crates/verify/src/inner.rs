@@ -1,4 +1,5 @@
-//! The law of the passage in the inner problem: what follows from one passage near the canard, again in exact arithmetic (`proofs/inner_law.rs` derives it).
+//! The law of the passage in the inner problem: what follows from one passage near the canard,
+//! again in exact arithmetic (`proofs/inner_law.rs` derives it).
 
 use serde::Deserialize;
 
@@ -34,7 +35,8 @@ pub(super) struct InnerLaw {
     growth: [Bounds; 2],
 }
 
-/// An interval whose bounds are rounded outward to a grid far below what matters, so that they stay short.
+/// An interval whose bounds are rounded outward to a grid far below what matters, so that they stay
+/// short.
 #[derive(Clone)]
 struct X(Range);
 
@@ -101,7 +103,8 @@ pub(super) fn inner_law(known: &Known, c: &InnerLaw) -> Check<Vec<String>> {
         X::of(want)
     };
     let v = [is(&c.problem.v_plus, "-1.2", "v+")?, is(&c.problem.v_minus, "-1.4", "v-")?];
-    let (p1, p2) = (is(&c.p1, "0.05", "the largest |p| coming in")?, is(&c.p2, "0.05", "the exit's |p|")?);
+    let (p1, p2) =
+        (is(&c.p1, "0.05", "the largest |p| coming in")?, is(&c.p2, "0.05", "the exit's |p|")?);
     let (s0, x0, least) = (X::of(&c.s0)?, X::of(&c.x0)?, X::of(&c.least_s)?);
     let q0 = X::of(&c.largest_q)?;
     let [c1, c2, k] = [X::of(&c.cones[0])?, X::of(&c.cones[1])?, X::of(&c.cones[2])?];
@@ -109,7 +112,8 @@ pub(super) fn inner_law(known: &Known, c: &InnerLaw) -> Check<Vec<String>> {
         need(x.0.low > Rational::whole(0), "the certificate's lengths are positive")?;
     }
     need(least.at_least(&s0), "orbits come in before the passage near the canard begins")?;
-    // Eigenvalues -w, -l and phi on the canard: the roots of e^2 - (v+ + v-) e + v+ v- - 1, and y/z = e - v-.
+    // Eigenvalues -w, -l and phi on the canard: the roots of e^2 - (v+ + v-) e + v+ v- - 1, and y/z
+    // = e - v-.
     let (mean, apart) = (v[0].plus(&v[1]).times(&half), v[0].less(&v[1]).times(&half));
     let root = X(apart.times(&apart).plus(&one).0.sqrt().ok_or("the eigenvalues are real")?);
     let (w, l) = (mean.negative().less(&root), mean.negative().plus(&root));
@@ -142,8 +146,11 @@ pub(super) fn inner_law(known: &Known, c: &InnerLaw) -> Check<Vec<String>> {
     let tilted = tilt.over(&power.less(&one).times(&rest_1))?;
     let excess = tilted.negative().hull(&lean.plus(&tilted).over(&rest_1.times(&one.less(&tilt)))?);
     let entrance = rest_1.ln()?.hull(&zero).less(&inverse_mu.times(&excess));
-    let largest =
-        p1.ln()?.less(&inverse_mu.less(&one).times(&least.ln()?)).plus(&inverse_mu.times(&s0.ln()?)).plus(&entrance);
+    let largest = p1
+        .ln()?
+        .less(&inverse_mu.less(&one).times(&least.ln()?))
+        .plus(&inverse_mu.times(&s0.ln()?))
+        .plus(&entrance);
     need(
         q0.ln()?.at_least(&X(Range::point(&largest.0.high))),
         "orbits from the least S on pass near enough to the canard",
@@ -169,7 +176,8 @@ pub(super) fn inner_law(known: &Known, c: &InnerLaw) -> Check<Vec<String>> {
     };
     // p/q coming in: 1/E with E between s0 - c1/s0 and s0.
     let incoming = one.over(&s0)?.hull(&one.over(&s0.less(&c1.over(&s0)?))?);
-    let (state, derivative) = known.passage(&field, &incoming.0, [&s0.0.low, &x0.0.low], &q0.0.low)?;
+    let (state, derivative) =
+        known.passage(&field, &incoming.0, [&s0.0.low, &x0.0.low], &q0.0.low)?;
     for i in 0..2 {
         holds(&at_zero[i].0, &state[i], "state_at_zero")?;
         for j in 0..2 {
@@ -182,7 +190,10 @@ pub(super) fn inner_law(known: &Known, c: &InnerLaw) -> Check<Vec<String>> {
     let share = m[0][1].times(&at_zero[1]).over(&ratio)?;
     let slope = columns[0].plus(&columns[1].less(&columns[0]).times(&share));
     let d = slope.negative();
-    need(d.0.low >= Rational::whole(0) && c2.over(&x0)?.at_least(&d), "orbits enter the outgoing cone")?;
+    need(
+        d.0.low >= Rational::whole(0) && c2.over(&x0)?.at_least(&d),
+        "orbits enter the outgoing cone",
+    )?;
     let least_2 = slope_at(&away(&p2));
     let (slow, fast) = (w.less(&g.times(&p2)), w.plus(&g.times(&p2)));
     need(slow.0.low > Rational::whole(0), "s falls")?;
@@ -194,11 +205,16 @@ pub(super) fn inner_law(known: &Known, c: &InnerLaw) -> Check<Vec<String>> {
     let f = slope_at(&phi.less(&half)).over(&w)?;
     tight(&range(c.f)?, &f.0, &scale, "f")?;
     let weight = p2.times(&fast).over(&least_2.times(&rest_2))?;
-    let steep = two.times(&one.less(&two.times(&phi)).magnitude().plus(&p2)).times(&w).plus(&f.times(&w).times(&g));
+    let steep = two
+        .times(&one.less(&two.times(&phi)).magnitude().plus(&p2))
+        .times(&w)
+        .plus(&f.times(&w).times(&g));
     let bend = steep.over(&w.times(&slow))?.times(&weight).symmetric();
     let twice = two.times(&x0s);
     let tilted = g.times(&weight).over(&w.times(&x0s))?;
-    let excess = tilted.negative().hull(&c2.over(&twice)?.plus(&tilted).over(&rest_2.times(&one.less(&tilt)))?);
+    let excess = tilted
+        .negative()
+        .hull(&c2.over(&twice)?.plus(&tilted).over(&rest_2.times(&one.less(&tilt)))?);
     let last = rest_2.ln()?.symmetric().plus(&zero.hull(&c2.over(&twice.times(&rest_2))?));
     let exit = bend.less(&inverse_mu.times(&excess)).plus(&last);
     let constant = p2
@@ -218,7 +234,10 @@ pub(super) fn inner_law(known: &Known, c: &InnerLaw) -> Check<Vec<String>> {
     let shrink = two.times(&k).times(&fast).over(&least_2.times(&rest_2).times(&x0s))?;
     let side = k.less(&one.plus(&turned).times(&h1.plus(&k.times(&g1).over(&x0s)?))).less(&shrink);
     need(
-        side.0.low > Rational::whole(0) && k.at_least(&shrink) && turned.0.high < one.0.low && l.at_least(&fast),
+        side.0.low > Rational::whole(0)
+            && k.at_least(&shrink)
+            && turned.0.high < one.0.low
+            && l.at_least(&fast),
         "the cone of disturbances is not left",
     )?;
     let f_out = slope_at(&phi.plus(&p_out).less(&half));
@@ -231,10 +250,18 @@ pub(super) fn inner_law(known: &Known, c: &InnerLaw) -> Check<Vec<String>> {
         let y = columns[j].less(&slope).plus(&move_d).over(&move_x)?;
         need(y.0.magnitude() <= turned.0.low, format!("disturbances {name} enter their cone"))?;
         let size = m[0][j].over(&ratio)?.sizes();
-        let growth =
-            size.times(&move_x).times(&x0).ln()?.less(&inverse_mu.times(&s0.ln()?)).less(&entrance).plus(&spread);
+        let growth = size
+            .times(&move_x)
+            .times(&x0)
+            .ln()?
+            .less(&inverse_mu.times(&s0.ln()?))
+            .less(&entrance)
+            .plus(&spread);
         tight(&range(c.growth[j])?, &growth.0, &scale, &format!("the constant of growth {name}"))?;
-        said.push(format!("growth {name}: (1/mu - 1) ln S - ln|p| - ln x + K, K in {}", range(c.growth[j])?));
+        said.push(format!(
+            "growth {name}: (1/mu - 1) ln S - ln|p| - ln x + K, K in {}",
+            range(c.growth[j])?
+        ));
     }
     said.insert(
         0,
@@ -244,8 +271,13 @@ pub(super) fn inner_law(known: &Known, c: &InnerLaw) -> Check<Vec<String>> {
             least.0.high.approximately() * 1e-3_f64.sqrt()
         ),
     );
-    said.insert(0, format!("exit: f x^2/2 - ln(x)/mu = (1/mu - 1) ln S - ln|p| + C, C in {}", range(c.exit)?));
+    said.insert(
+        0,
+        format!("exit: f x^2/2 - ln(x)/mu = (1/mu - 1) ln S - ln|p| + C, C in {}", range(c.exit)?),
+    );
     said.insert(0, format!("the three cones are not left; 1/mu in {}", range(c.mu_inverse)?));
-    said.push("the passage from s0 to -x0 is enclosed anew, within the enclosures claimed".to_owned());
+    said.push(
+        "the passage from s0 to -x0 is enclosed anew, within the enclosures claimed".to_owned(),
+    );
     Ok(said)
 }

@@ -1,19 +1,24 @@
 //! Checks certificates of theorems by computing what they claim anew.
 //!
-//! A proof (`proofs/`) encloses orbits and writes down the boxes and numbers on which its statement rests. From a certificate this crate takes the starting points
-//! alone, follows the orbits with a validated integrator of its own (`orbit`, in an arithmetic of its own, `ball`) and refuses every claimed enclosure that does
-//! not hold what it finds. What follows from the enclosures is decided in fractions of whole numbers (`rational`). Nothing is shared with the
-//! prover: neither its intervals nor its integrator nor the equation.
+//! A proof (`proofs/`) encloses orbits and writes down the boxes and numbers on which its statement
+//! rests. From a certificate this crate takes the starting points alone, follows the orbits with a
+//! validated integrator of its own (`orbit`, in an arithmetic of its own, `ball`) and refuses every
+//! claimed enclosure that does not hold what it finds. What follows from the enclosures is decided
+//! in fractions of whole numbers (`rational`). Nothing is shared with the prover: neither its
+//! intervals nor its integrator nor the equation.
 //!
-//! Everything on which a statement rests is rigorous. Two kinds of claimed numbers that no statement rests on, derivatives and images of whole sets, are wider than they need be;
-//! they are compared with quotients of differences and with images of points, to more digits than are claimed. See proofs/README.md.
+//! Everything on which a statement rests is rigorous. Two kinds of claimed numbers that no
+//! statement rests on, derivatives and images of whole sets, are wider than they need be; they are
+//! compared with quotients of differences and with images of points, to more digits than are
+//! claimed. See proofs/README.md.
 //!
 //! ```
 //! use twofold_verify::{Refused, verify};
 //! assert!(matches!(verify("{}"), Err(Refused::Unreadable(_))));
 //! ```
 #![forbid(unsafe_code)]
-#![cfg_attr(test, allow(clippy::disallowed_methods))] // tests compare with tolerances, not with hashes
+// tests compare with tolerances, not with hashes
+#![cfg_attr(test, allow(clippy::disallowed_methods))]
 
 mod ball;
 mod certificate;

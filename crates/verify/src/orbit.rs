@@ -1,17 +1,20 @@
 //! Orbits and return maps, enclosed: the checker's own validated integrator.
 //!
-//! A set is { c + B r : |r_i| <= R_i }: a centre in fixed point with 192 binary places, an orthogonal frame B turned after every step so
-//! that its first axis lies along the longest side of the image (Lohner 1987), and radii. A step of length h is a Taylor
-//! polynomial of degree K of the centre, with its derivative over the set (mean value form). Its remainder is that of a box W
-//! proved to hold every solution by the high-order enclosure (Nedialkov & Jackson 1999): if T(X, [0, h]) + [0, h]^(K+1) x_(K+1)(W) lies in W,
-//! every solution from X stays in W until h. The derivative V with V(0) = 1 is enclosed in the same way, as part of the equation.
+//! A set is { c + B r : |r_i| <= R_i }: a centre in fixed point with 192 binary places, an
+//! orthogonal frame B turned after every step so that its first axis lies along the longest side of
+//! the image (Lohner 1987), and radii. A step of length h is a Taylor polynomial of degree K of the
+//! centre, with its derivative over the set (mean value form). Its remainder is that of a box W
+//! proved to hold every solution by the high-order enclosure (Nedialkov & Jackson 1999): if T(X,
+//! [0, h]) + [0, h]^(K+1) x_(K+1)(W) lies in W, every solution from X stays in W until h. The
+//! derivative V with V(0) = 1 is enclosed in the same way, as part of the equation.
 
 use super::ball::{Ball, Dual, Fixed, Number};
 use super::rational::{Range, Rational};
 
 /// An equation x' = f(x) in three variables with its constants in one arithmetic.
 pub(super) trait Field {
-    /// Taylor coefficients 0 to `order` of the solution from `start`, that of degree k multiplied by h^k.
+    /// Taylor coefficients 0 to `order` of the solution from `start`, that of degree k multiplied
+    /// by h^k.
     fn series<T: Number>(&self, start: &[T; 3], h: f64, order: usize) -> [Vec<T>; 3];
 
     /// Powers of two by which the states near a point are multiplied where directions are compared.
@@ -36,7 +39,8 @@ pub(super) struct Caricature {
 }
 
 impl Field for Caricature {
-    /// x in units of its distance from the layer's middle, or of about eps within: there a change of x by eps changes the others by their own size.
+    /// x in units of its distance from the layer's middle, or of about eps within: there a change
+    /// of x by eps changes the others by their own size.
     fn scale(&self, near: &[Fixed; 3]) -> [f64; 3] {
         let mut scale = 1024.0;
         while scale > 1.0 && scale * near[0].midpoint().abs() > 2.0 {
@@ -61,7 +65,8 @@ impl Field for Caricature {
         let (phi, psi) = steep.times(&x[0]).logistic();
         let (mut phi, mut psi) = (vec![phi], vec![psi]);
         // 1 - 2 phi; y + z; |x|^2; x'; psi x'.
-        let (mut odd, mut sum, mut square, mut speed, mut rate) = (vec![], vec![], vec![], vec![], vec![]);
+        let (mut odd, mut sum, mut square, mut speed, mut rate) =
+            (vec![], vec![], vec![], vec![], vec![]);
         for k in 0..order {
             let twice = phi[k].plus(&phi[k]);
             odd.push(if k == 0 { first.minus(&twice) } else { twice.minus(&twice).minus(&twice) });
@@ -69,8 +74,10 @@ impl Field for Caricature {
             square.push(T::convolve(&x, &x).plus(&T::convolve(&y, &y)).plus(&T::convolve(&z, &z)));
             let pull = alpha.times(&square[k]);
             speed.push(z[k].minus(&T::convolve(&sum, &phi)));
-            let mut dy = jump_y.times(&phi[k]).plus(&pull).minus(&beta.times(&T::convolve(&y, &square)));
-            let mut dz = jump_z.times(&phi[k]).plus(&pull).minus(&beta.times(&T::convolve(&z, &square)));
+            let mut dy =
+                jump_y.times(&phi[k]).plus(&pull).minus(&beta.times(&T::convolve(&y, &square)));
+            let mut dz =
+                jump_z.times(&phi[k]).plus(&pull).minus(&beta.times(&T::convolve(&z, &square)));
             if k == 0 {
                 (dy, dz) = (dy.plus(&v_minus), dz.plus(&first));
             }
@@ -87,7 +94,8 @@ impl Field for Caricature {
     }
 }
 
-/// The inner problem about its canard (docs/law.md) in (p, q, s - `offset`): p' = F(p) (q - s p), q' = -L p, s' = -w + g p, F(p) = 2 (phi* + p)(1 - phi* - p).
+/// The inner problem about its canard (docs/law.md) in (p, q, s - `offset`): p' = F(p) (q - s p),
+/// q' = -L p, s' = -w + g p, F(p) = 2 (phi* + p)(1 - phi* - p).
 #[derive(Clone)]
 pub(super) struct Inner {
     pub weak: Range,
@@ -99,10 +107,13 @@ pub(super) struct Inner {
 
 impl Field for Inner {
     fn series<T: Number>(&self, start: &[T; 3], h: f64, order: usize) -> [Vec<T>; 3] {
-        let (weak, strong, phi, g) = (T::of(&self.weak), T::of(&self.strong), T::of(&self.phi), T::of(&self.g));
-        let (offset, one, h) = (T::of(&Range::point(&self.offset)), number::<T>(1.0), number::<T>(h));
+        let (weak, strong, phi, g) =
+            (T::of(&self.weak), T::of(&self.strong), T::of(&self.phi), T::of(&self.g));
+        let (offset, one, h) =
+            (T::of(&Range::point(&self.offset)), number::<T>(1.0), number::<T>(h));
         let [mut p, mut q, mut s] = start.clone().map(|s| vec![s]);
-        let (mut on, mut off, mut slope, mut full, mut lag) = (vec![], vec![], vec![], vec![], vec![]);
+        let (mut on, mut off, mut slope, mut full, mut lag) =
+            (vec![], vec![], vec![], vec![], vec![]);
         for k in 0..order {
             let constant = k == 0;
             on.push(if constant { phi.plus(&p[0]) } else { p[k].clone() });
@@ -125,7 +136,8 @@ impl Field for Inner {
     }
 }
 
-/// Degree of the series and the largest remainders of a step: of the states, and of their derivative.
+/// Degree of the series and the largest remainders of a step: of the states, and of their
+/// derivative.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FlowSettings {
     pub order: usize,
@@ -184,7 +196,8 @@ pub(super) struct Crossing {
 }
 
 impl Set {
-    /// { centre + frame r : |r_i| <= radii_i } for an exact centre, and the derivative 1 if the frame is.
+    /// { centre + frame r : |r_i| <= radii_i } for an exact centre, and the derivative 1 if the
+    /// frame is.
     pub fn new(centre: [Fixed; 3], frame: [[f64; 3]; 3], radii: [f64; 3]) -> Self {
         let derivative = unit().map(|row| row.map(Ball::exactly));
         Self { centre, frame, radii, derivative, time: Fixed::zero(), on_plane: false }
@@ -207,7 +220,9 @@ impl Set {
 
     /// How far its points are from its centre.
     fn reach(&self) -> [f64; 3] {
-        self.frame().map(|row| (0..3).map(|j| row[j].magnitude() * self.radii[j]).sum::<f64>() * (1.0 + 1e-14))
+        self.frame().map(|row| {
+            (0..3).map(|j| row[j].magnitude() * self.radii[j]).sum::<f64>() * (1.0 + 1e-14)
+        })
     }
 
     pub fn hull(&self) -> [Ball; 3] {
@@ -250,19 +265,31 @@ impl Set {
         seen.try_into().ok()
     }
 
-    /// Its image by a map that takes the centre to within `error` of `centre` and has a derivative in `jacobian`.
-    fn image(&self, scale: [f64; 3], centre: [Fixed; 3], error: [f64; 3], jacobian: &Matrix) -> Option<Self> {
+    /// Its image by a map that takes the centre to within `error` of `centre` and has a derivative
+    /// in `jacobian`.
+    fn image(
+        &self,
+        scale: [f64; 3],
+        centre: [Fixed; 3],
+        error: [f64; 3],
+        jacobian: &Matrix,
+    ) -> Option<Self> {
         let moved = product(jacobian, &self.frame());
         let longest = self.radii.iter().fold(1e-290_f64, |a, b| a.max(*b));
         let mut columns: Vec<[f64; 3]> = (0..3)
-            .map(|j| std::array::from_fn(|i| scale[i] * moved[i][j].m * (self.radii[j] / longest).max(1e-30)))
+            .map(|j| {
+                std::array::from_fn(|i| {
+                    scale[i] * moved[i][j].m * (self.radii[j] / longest).max(1e-30)
+                })
+            })
             .collect();
         let size = |v: &[f64; 3]| v.iter().map(|x| x * x).sum::<f64>();
         columns.sort_by(|a, b| size(b).total_cmp(&size(a)));
         let orthogonal = orthogonal(&columns);
         let frame = std::array::from_fn(|i| orthogonal[i].map(|b| b / scale[i]));
         let exact = |i: usize| Ball::exactly(scale[i]);
-        let inverse = inverse(&orthogonal)?.map(|row| std::array::from_fn(|i| row[i].times(&exact(i))));
+        let inverse =
+            inverse(&orthogonal)?.map(|row| std::array::from_fn(|i| row[i].times(&exact(i))));
         let turned = product(&inverse, &moved);
         let radii = std::array::from_fn(|i| {
             let of_set: f64 = (0..3).map(|j| turned[i][j].magnitude() * self.radii[j]).sum();
@@ -277,7 +304,8 @@ impl Set {
     }
 }
 
-/// Orthonormal columns, as nearly as rounding allows, the first along the first column (Gram and Schmidt, twice).
+/// Orthonormal columns, as nearly as rounding allows, the first along the first column (Gram and
+/// Schmidt, twice).
 fn orthogonal(columns: &[[f64; 3]]) -> [[f64; 3]; 3] {
     let dot = |a: &[f64; 3], b: &[f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let mut found: Vec<[f64; 3]> = Vec::new();
@@ -299,7 +327,9 @@ fn orthogonal(columns: &[[f64; 3]]) -> [[f64; 3]; 3] {
             // Nearly dependent: any direction across the others.
             let unit = |k: usize| std::array::from_fn(|i| f64::from(u8::from(i == k)));
             let all = [0, 1, 2].map(|k| rest(&unit(k), &found));
-            v = all.into_iter().fold([0.0; 3], |a, b| if dot(&b, &b) > dot(&a, &a) { b } else { a });
+            v = all
+                .into_iter()
+                .fold([0.0; 3], |a, b| if dot(&b, &b) > dot(&a, &a) { b } else { a });
         }
         // Once more, at full length: what is left of a short one is mostly rounding.
         let length = dot(&v, &v).sqrt();
@@ -310,13 +340,20 @@ fn orthogonal(columns: &[[f64; 3]]) -> [[f64; 3]; 3] {
     std::array::from_fn(|i| std::array::from_fn(|j| found[j][i]))
 }
 
-/// The inverse of a nearly orthogonal matrix: (B^T B)^-1 B^T, and (1 - E)^-1 is within |E|/(1 - |E|) of 1.
+/// The inverse of a nearly orthogonal matrix: (B^T B)^-1 B^T, and (1 - E)^-1 is within |E|/(1 -
+/// |E|) of 1.
 fn inverse(frame: &[[f64; 3]; 3]) -> Option<Matrix> {
     let b: Matrix = frame.map(|row| row.map(Ball::exactly));
     let transposed: Matrix = std::array::from_fn(|i| std::array::from_fn(|j| b[j][i]));
     let square = product(&transposed, &b);
     let off = (0..3)
-        .map(|i| (0..3).map(|j| if i == j { Ball::ONE.minus(&square[i][j]) } else { square[i][j] }.magnitude()).sum())
+        .map(|i| {
+            (0..3)
+                .map(|j| {
+                    if i == j { Ball::ONE.minus(&square[i][j]) } else { square[i][j] }.magnitude()
+                })
+                .sum()
+        })
         .fold(0.0, |a: f64, b: f64| if b > a || b.is_nan() { b } else { a });
     if off.is_nan() || off >= 1e-6 {
         return None;
@@ -415,19 +452,22 @@ impl<'a, F: Field> Flow<'a, F> {
         let part = tau.ball();
         let end = tau.midpoint() == 1.0;
         let centre: [Fixed; 3] = std::array::from_fn(|i| {
-            step.centre[i].iter().rev().fold(Fixed::zero(), |s, c| if end { s.plus(c) } else { s.times(tau).plus(c) })
+            step.centre[i]
+                .iter()
+                .rev()
+                .fold(Fixed::zero(), |s, c| if end { s.plus(c) } else { s.times(tau).plus(c) })
         });
         let jacobian: Matrix = std::array::from_fn(|i| {
             std::array::from_fn(|j| {
-                let sum = step.set[i]
-                    .iter()
-                    .rev()
-                    .fold(Ball::ZERO, |s, c| if end { s.plus(&c.by[j]) } else { s.times(&part).plus(&c.by[j]) });
+                let sum = step.set[i].iter().rev().fold(Ball::ZERO, |s, c| {
+                    if end { s.plus(&c.by[j]) } else { s.times(&part).plus(&c.by[j]) }
+                });
                 sum.widened(step.last[i].by[j].magnitude())
             })
         });
         let error = std::array::from_fn(|i| centre[i].r + step.last[i].value.magnitude());
-        let mut image = set.image(self.field.scale(&centre), centre.map(|c| c.centre()), error, &jacobian)?;
+        let mut image =
+            set.image(self.field.scale(&centre), centre.map(|c| c.centre()), error, &jacobian)?;
         image.time = set.time.plus(&tau.times(&number(step.h)));
         Some(image)
     }
@@ -456,7 +496,8 @@ impl<'a, F: Field> Flow<'a, F> {
         (value > 0.0 && value < 1.0).then_some(t)
     }
 
-    /// The set's next crossing of the plane where its coordinate `axis` is zero, before `longest` more time: every orbit's first.
+    /// The set's next crossing of the plane where its coordinate `axis` is zero, before `longest`
+    /// more time: every orbit's first.
     pub fn next_crossing(&mut self, start: &Set, longest: f64) -> Option<Crossing> {
         let mut set = start.clone();
         let begin = set.time.midpoint();
@@ -490,7 +531,9 @@ impl<'a, F: Field> Flow<'a, F> {
             }
             let after = self.advance(&set, &step, &one)?;
             let height = after.hull()[self.axis];
-            if !height.excludes_zero() || (height.m > 0.0) != (if leaves { upward } else { below.m > 0.0 }) {
+            if !height.excludes_zero()
+                || (height.m > 0.0) != (if leaves { upward } else { below.m > 0.0 })
+            {
                 at_most = 0.5 * step.h;
                 continue;
             }
@@ -511,14 +554,17 @@ impl<'a, F: Field> Flow<'a, F> {
             if !speed.excludes_zero() || (speed.m > 0.0) != upward {
                 return None;
             }
-            // All orbits meet the plane within this time, forward or backward, if they stay where their speed is known.
+            // All orbits meet the plane within this time, forward or backward, if they stay where
+            // their speed is known.
             let within = hull[axis].magnitude() / speed.least() * (1.0 + 1e-12) + 1e-290;
-            let reach: [Ball; 3] = std::array::from_fn(|i| hull[i].widened(within * slope[i].value.magnitude()));
+            let reach: [Ball; 3] =
+                std::array::from_fn(|i| hull[i].widened(within * slope[i].value.magnitude()));
             if !(0..3).all(|i| reach[i].within(&stay[i])) {
                 stay = reach.map(|b| b.widened(1e-3 * b.r + 1e-15 * b.m.abs()));
                 continue;
             }
-            // D phi(t, .) = 1 + the integral of Df D phi, and D phi is within exp(L |t|) - 1 <= 2 L |t| of 1 in every element, L the norm of Df (Gronwall).
+            // D phi(t, .) = 1 + the integral of Df D phi, and D phi is within exp(L |t|) - 1 <= 2 L
+            // |t| of 1 in every element, L the norm of Df (Gronwall).
             let size = |i: usize, j: usize| slope[i].by[j].magnitude();
             let row = |i: usize| (size(i, 0) + size(i, 1) + size(i, 2)) * (1.0 + 1e-14);
             let off = 2.0 * within * row(0).max(row(1)).max(row(2));
@@ -533,7 +579,8 @@ impl<'a, F: Field> Flow<'a, F> {
             let (mut jacobian, mut error) = ([[Ball::ZERO; 3]; 3], [0.0; 3]);
             for i in (0..3).filter(|i| *i != axis) {
                 let ratio = slope[i].value.divided(&speed)?;
-                jacobian[i] = std::array::from_fn(|j| moved(i, j).minus(&ratio.times(&moved(axis, j))));
+                jacobian[i] =
+                    std::array::from_fn(|j| moved(i, j).minus(&ratio.times(&moved(axis, j))));
                 error[i] = own * ratio.magnitude() * (1.0 + 1e-14);
             }
             let mut centre = set.centre.clone();
@@ -557,7 +604,8 @@ fn root(x: f64, n: usize) -> f64 {
     }
     // From the exponent, a line between powers of two.
     let bits = x.to_bits();
-    let log = ((bits >> 52) as f64 - 1023.0) + (bits & ((1 << 52) - 1)) as f64 / (1_u64 << 52) as f64;
+    let log =
+        ((bits >> 52) as f64 - 1023.0) + (bits & ((1 << 52) - 1)) as f64 / (1_u64 << 52) as f64;
     let part = log / n as f64;
     let whole = part.floor();
     let mut power = 1.0;

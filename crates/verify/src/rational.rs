@@ -15,7 +15,8 @@ pub struct Rational {
 
 impl Rational {
     fn new(numerator: BigInt, denominator: BigInt) -> Self {
-        // Almost all denominators are powers of two, because the numbers were floating-point numbers.
+        // Almost all denominators are powers of two, because the numbers were floating-point
+        // numbers.
         let twos = |n: &BigInt| n.trailing_zeros();
         let shift = twos(&numerator).unwrap_or(0).min(twos(&denominator).unwrap_or(0));
         Self { numerator: numerator >> shift, denominator: denominator >> shift }
@@ -75,14 +76,22 @@ impl Rational {
             return None;
         }
         let exponent = exponent - i64::try_from(part.len()).ok()?;
-        let power = BigInt::from(10).pow(u32::try_from(exponent.unsigned_abs()).ok().filter(|e| *e < 10_000)?);
+        let power = BigInt::from(10)
+            .pow(u32::try_from(exponent.unsigned_abs()).ok().filter(|e| *e < 10_000)?);
         let digits: BigInt = all.parse().ok()?;
-        Some(if exponent < 0 { Self::new(digits, power) } else { Self::new(digits * power, 1.into()) })
+        Some(if exponent < 0 {
+            Self::new(digits, power)
+        } else {
+            Self::new(digits * power, 1.into())
+        })
     }
 
     /// The absolute value.
     pub fn abs(&self) -> Self {
-        Self { numerator: self.numerator.magnitude().clone().into(), denominator: self.denominator.clone() }
+        Self {
+            numerator: self.numerator.magnitude().clone().into(),
+            denominator: self.denominator.clone(),
+        }
     }
 
     /// The largest multiple of a small power of two that is not above it.
@@ -94,8 +103,13 @@ impl Rational {
     pub fn inverse(&self) -> Option<Self> {
         match self.numerator.sign() {
             Sign::NoSign => None,
-            Sign::Plus => Some(Self { numerator: self.denominator.clone(), denominator: self.numerator.clone() }),
-            Sign::Minus => Some(Self { numerator: -&self.denominator, denominator: -&self.numerator }),
+            Sign::Plus => Some(Self {
+                numerator: self.denominator.clone(),
+                denominator: self.numerator.clone(),
+            }),
+            Sign::Minus => {
+                Some(Self { numerator: -&self.denominator, denominator: -&self.numerator })
+            }
         }
     }
 
@@ -109,7 +123,8 @@ impl Rational {
         // Sixty bits of the quotient, and their power of two.
         let (n, d) = (self.numerator.magnitude(), self.denominator.magnitude());
         let shift = 60 + d.bits() as i64 - n.bits() as i64;
-        let quotient = if shift >= 0 { (n << shift as usize) / d } else { n / (d << (-shift) as usize) };
+        let quotient =
+            if shift >= 0 { (n << shift as usize) / d } else { n / (d << (-shift) as usize) };
         let digits = quotient.iter_u64_digits().next().unwrap_or(0) as f64;
         let mut value = if self.is_negative() { -digits } else { digits };
         let factor = if shift >= 0 { 0.5 } else { 2.0 };
@@ -236,7 +251,10 @@ impl Range {
 
     /// The least range that holds both.
     pub fn hull(&self, o: &Self) -> Self {
-        Self { low: self.low.clone().min(o.low.clone()), high: self.high.clone().max(o.high.clone()) }
+        Self {
+            low: self.low.clone().min(o.low.clone()),
+            high: self.high.clone().max(o.high.clone()),
+        }
     }
 
     /// The distance of the bounds.
@@ -315,7 +333,8 @@ impl Sub for &Range {
 impl Mul for &Range {
     type Output = Range;
     fn mul(self, o: &Range) -> Range {
-        let products = [&self.low * &o.low, &self.low * &o.high, &self.high * &o.low, &self.high * &o.high];
+        let products =
+            [&self.low * &o.low, &self.low * &o.high, &self.high * &o.low, &self.high * &o.high];
         let [a, b, c, d] = products;
         let low = a.clone().min(b.clone()).min(c.clone()).min(d.clone());
         Range { low, high: a.max(b).max(c).max(d) }
@@ -343,7 +362,9 @@ mod tests {
         assert_eq!(&exactly(1e300) * &exactly(5e-324), &exactly(5e-324) * &exactly(1e300));
         assert_eq!(&exactly(0.1) - &exactly(0.1), Rational::whole(0));
         assert_eq!(exactly(-0.0), Rational::whole(0));
-        assert!(Rational::exactly(f64::NAN).is_none() && Rational::exactly(f64::INFINITY).is_none());
+        assert!(
+            Rational::exactly(f64::NAN).is_none() && Rational::exactly(f64::INFINITY).is_none()
+        );
         for x in [0.1, -3.5e-200, 1.7e308, 5e-324, 0.0, 1.0] {
             assert_eq!(exactly(x).approximately(), x);
         }
@@ -365,26 +386,49 @@ mod tests {
         let d = |t: &str| Rational::decimal(t).unwrap();
         for (x, root, ln) in [
             // 40 digits, from mpmath.
-            ("2", "1.414213562373095048801688724209698078570", "0.6931471805599453094172321214581765680755"),
-            ("1.01", "1.004987562112089027021926491275957618694", "0.009950330853168082848215357544260741688630"),
-            ("0.05", "0.2236067977499789696409173668731276235441", "-2.995732273553990993435223576142540775677"),
-            ("1e9", "31622.77660168379331998893544432718533720", "20.72326583694641115616192309215927786840"),
+            (
+                "2",
+                "1.414213562373095048801688724209698078570",
+                "0.6931471805599453094172321214581765680755",
+            ),
+            (
+                "1.01",
+                "1.004987562112089027021926491275957618694",
+                "0.009950330853168082848215357544260741688630",
+            ),
+            (
+                "0.05",
+                "0.2236067977499789696409173668731276235441",
+                "-2.995732273553990993435223576142540775677",
+            ),
+            (
+                "1e9",
+                "31622.77660168379331998893544432718533720",
+                "20.72326583694641115616192309215927786840",
+            ),
         ] {
-            for (got, want) in [(Range::point(&d(x)).sqrt(), root), (Range::point(&d(x)).ln(), ln)] {
-                let (got, want) = (got.unwrap(), Range::point(&d(want)).widened(&Rational::tenth_to(34)));
+            for (got, want) in [(Range::point(&d(x)).sqrt(), root), (Range::point(&d(x)).ln(), ln)]
+            {
+                let (got, want) =
+                    (got.unwrap(), Range::point(&d(want)).widened(&Rational::tenth_to(34)));
                 assert!(got.within(&want) && got.low <= got.high, "{x}: {got}");
             }
             let root = Range::point(&d(x)).sqrt().unwrap();
             assert!(&root.low * &root.low <= d(x) && &root.high * &root.high >= d(x));
         }
         let r = |a: &str, b: &str| Range { low: d(a), high: d(b) };
-        assert!(r("-1", "1").ln().is_none() && r("0", "1").ln().is_none() && r("-1", "1").sqrt().is_none());
+        assert!(
+            r("-1", "1").ln().is_none()
+                && r("0", "1").ln().is_none()
+                && r("-1", "1").sqrt().is_none()
+        );
         assert!(r("-1", "1").inverse().is_none());
         let i = r("-4", "-2").inverse().unwrap();
         assert_eq!((i.low, i.high), (d("-0.5"), d("-0.25")));
         let third = Range::point(&Rational::whole(-3).inverse().unwrap()).rounded();
         assert!(
-            third.low < Rational::whole(-3).inverse().unwrap() && Rational::whole(-3).inverse().unwrap() < third.high
+            third.low < Rational::whole(-3).inverse().unwrap()
+                && Rational::whole(-3).inverse().unwrap() < third.high
         );
         assert!(third.width() < Rational::tenth_to(70));
     }

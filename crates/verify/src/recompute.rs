@@ -41,10 +41,19 @@ impl Patch {
     fn set(&self) -> Check<Set> {
         let [x, z] = self.centre.each_ref().map(|c| Fixed::of(&Range::point(c)));
         if self.first == [1.0, 0.0] && self.second == [0.0, 1.0] {
-            return Ok(Set::boxed([x, Fixed::zero(), z], [self.radii[0], 0.0, self.radii[1]]).on_plane());
+            return Ok(
+                Set::boxed([x, Fixed::zero(), z], [self.radii[0], 0.0, self.radii[1]]).on_plane()
+            );
         }
-        need(x.r == 0.0 && z.r == 0.0, "a parallelogram's middle has no more than 192 binary places")?;
-        let frame = [[self.first[0], 0.0, self.second[0]], [0.0, 1.0, 0.0], [self.first[1], 0.0, self.second[1]]];
+        need(
+            x.r == 0.0 && z.r == 0.0,
+            "a parallelogram's middle has no more than 192 binary places",
+        )?;
+        let frame = [
+            [self.first[0], 0.0, self.second[0]],
+            [0.0, 1.0, 0.0],
+            [self.first[1], 0.0, self.second[1]],
+        ];
         Ok(Set::new([x, Fixed::zero(), z], frame, [self.radii[0], 0.0, self.radii[1]]).on_plane())
     }
 }
@@ -54,14 +63,16 @@ pub(super) struct Closed {
     pub value: [Range; 2],
     pub point: [Range; 2],
     pub derivative: [[Range; 2]; 2],
-    /// Quotients of differences at the point, columns first: they tell more digits, without being bounds.
+    /// Quotients of differences at the point, columns first: they tell more digits, without being
+    /// bounds.
     pub quotients: [[Range; 2]; 2],
     /// The same along the edges of the candidate, for each column: means of the derivative there.
     pub edges: [[[Range; 2]; 2]; 2],
     pub rows: Rc<Vec<Crossing>>,
 }
 
-/// Orbits that were computed, by their starts: a checker that is asked for many certificates computes each once.
+/// Orbits that were computed, by their starts: a checker that is asked for many certificates
+/// computes each once.
 #[derive(Default)]
 pub(super) struct Known {
     /// No orbits are computed.
@@ -81,7 +92,11 @@ impl Known {
 
     /// Refuses what a reader does not do.
     fn may_compute(&self) -> Check<()> {
-        if self.reads_only { Err("orbits are enclosed: this checker only reads".into()) } else { Ok(()) }
+        if self.reads_only {
+            Err("orbits are enclosed: this checker only reads".into())
+        } else {
+            Ok(())
+        }
     }
 
     /// The first `count` crossings of y = 0 by all orbits from a patch.
@@ -115,7 +130,8 @@ impl Known {
 
     /// The state after `count` crossings from a point.
     fn image(&self, field: &Caricature, at: &[Rational; 2], count: usize) -> Check<[Range; 2]> {
-        let rows = self.crossings(field, &Patch::point(&at[0], &at[1]), count, FlowSettings::NARROW)?;
+        let rows =
+            self.crossings(field, &Patch::point(&at[0], &at[1]), count, FlowSettings::NARROW)?;
         let last = rows.last().ok_or("an orbit crosses")?;
         Ok(PLANE.map(|i| last.states[i].clone()))
     }
@@ -181,15 +197,20 @@ impl Known {
             off.approximately() * (1.0 + 1e-14)
         });
         let value = self.image(field, centre, count)?;
-        let derivative = |at: &[Rational; 2], radii: [f64; 2], settings: FlowSettings| -> Check<_> {
-            let rows = self.crossings(field, &Patch::boxed(at.clone(), radii), count, settings)?;
-            let d = rows.last().ok_or("an orbit crosses")?.set.derivative();
-            Ok((in_plane(&d)?, rows))
-        };
+        let derivative =
+            |at: &[Rational; 2], radii: [f64; 2], settings: FlowSettings| -> Check<_> {
+                let rows =
+                    self.crossings(field, &Patch::boxed(at.clone(), radii), count, settings)?;
+                let d = rows.last().ok_or("an orbit crosses")?.set.derivative();
+                Ok((in_plane(&d)?, rows))
+            };
         let (wide, _) = derivative(centre, radii, FlowSettings::WIDE)?;
         let first = krawczyk(centre, &value, &wide, &approximate_inverse(&wide)?, candidate)?;
         for i in 0..2 {
-            need(first[i].inside(&candidate[i]), "an independent Krawczyk operator maps the candidate into itself")?;
+            need(
+                first[i].inside(&candidate[i]),
+                "an independent Krawczyk operator maps the candidate into itself",
+            )?;
         }
         // Newton's method, then the inclusion again in a box as small as the arithmetic allows.
         let y = approximate_inverse(&wide)?;
@@ -200,12 +221,21 @@ impl Known {
             at = krawczyk(&at, &image, &wide, &y, &exact)?.each_ref().map(middle);
         }
         let (slope, rows) = derivative(&at, [CLOSE; 2], FlowSettings::NARROW)?;
-        let near = at
-            .each_ref()
-            .map(|x| Range::point(x).widened(&Rational::exactly(0.99 * CLOSE).unwrap_or(Rational::whole(0))));
-        let point = krawczyk(&at, &self.image(field, &at, count)?, &slope, &approximate_inverse(&slope)?, &near)?;
+        let near = at.each_ref().map(|x| {
+            Range::point(x).widened(&Rational::exactly(0.99 * CLOSE).unwrap_or(Rational::whole(0)))
+        });
+        let point = krawczyk(
+            &at,
+            &self.image(field, &at, count)?,
+            &slope,
+            &approximate_inverse(&slope)?,
+            &near,
+        )?;
         for i in 0..2 {
-            need(point[i].inside(&near[i]) && near[i].inside(&candidate[i]), "the closed orbit is enclosed anew")?;
+            need(
+                point[i].inside(&near[i]) && near[i].inside(&candidate[i]),
+                "the closed orbit is enclosed anew",
+            )?;
         }
         let quotients = self.derivative(field, &at, APART, count)?;
         let corner = |i: bool, j: bool| {
@@ -265,12 +295,15 @@ fn approximate_inverse(d: &[[Range; 2]; 2]) -> Check<[[Range; 2]; 2]> {
     let m = |i: usize, j: usize| middle(&d[i][j]).approximately() - f64::from(u8::from(i == j));
     let [a, b, c, e] = [m(0, 0), m(0, 1), m(1, 0), m(1, 1)];
     let determinant = a * e - b * c;
-    let point = |x: f64| Rational::exactly(x / determinant).map(|x| Range::point(&x)).ok_or("1 is no multiplier");
+    let point = |x: f64| {
+        Rational::exactly(x / determinant).map(|x| Range::point(&x)).ok_or("1 is no multiplier")
+    };
     Ok([[point(e)?, point(-b)?], [point(-c)?, point(a)?]])
 }
 
-/// The passage in the inner problem: (p, q)/q(s0) at s = 0 for p/q at s0 in `ratio` and |q(s0)| <= largest, and the derivative of (p, q) at s = -x0 by that at s = 0
-/// for all states between the canard and those.
+/// The passage in the inner problem: (p, q)/q(s0) at s = 0 for p/q at s0 in `ratio` and |q(s0)| <=
+/// largest, and the derivative of (p, q) at s = -x0 by that at s = 0 for all states between the
+/// canard and those.
 fn inner_passage(
     field: &Inner,
     ratio: &Range,

@@ -27,7 +27,9 @@ impl<'de> Visitor<'de> for Look {
         let mut keys = BTreeSet::new();
         while let Some(key) = map.next_key::<String>()? {
             if keys.contains(&key) {
-                return Err(Error::custom(format_args!("the key {key:?} stands twice in one object")));
+                return Err(Error::custom(format_args!(
+                    "the key {key:?} stands twice in one object"
+                )));
             }
             keys.insert(key);
             map.next_value::<Once>()?;

@@ -19,12 +19,13 @@ use crate::record::{self, Hash};
 
 /// Check sweeps in seconds: recompute some of their rows, chosen by chance, bit for bit.
 ///
-/// Of a figure made of sweeps (census, audit, basin) and of any file that `twofold sweep` wrote. Which rows are
-/// recomputed follows from the digest of all of them and from --seed. Exit code 0: all came out the same. 1: something
-/// did not.
+/// Of a figure made of sweeps (census, audit, basin) and of any file that `twofold sweep` wrote.
+/// Which rows are recomputed follows from the digest of all of them and from --seed. Exit code 0:
+/// all came out the same. 1: something did not.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  twofold audit census --rows 1\n  twofold audit basin --rows 20 --seed 12345\n  twofold audit my-sweep.csv --json"
+    after_help = "Examples:\n  twofold audit census --rows 1\n  twofold audit basin --rows 20 \
+        --seed 12345\n  twofold audit my-sweep.csv --json"
 )]
 pub struct Arguments {
     /// Figures, or files of rows (.csv).
@@ -92,7 +93,8 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
                 })
             })
             .collect();
-        print_json(&json!({ "format": "twofold-audit", "version": 2, "all_the_same": sound, "findings": found }))?;
+        print_json(&json!({ "format": "twofold-audit", "version": 2, "all_the_same": sound,
+                "findings": found }))?;
     }
     Ok(if sound { Exit::Fine } else { Exit::CheckFailed })
 }
@@ -106,7 +108,9 @@ fn read(what: &str) -> Result<Sweeps, CliError> {
     let sweeps = figures::data(&figure.id);
     if sweeps.is_empty() {
         let id = figure.id.to_string();
-        return Err(CliError::Usage(format!("{id} is not made of sweeps; `twofold check {id}` recomputes all of it")));
+        return Err(CliError::Usage(format!(
+            "{id} is not made of sweeps; `twofold check {id}` recomputes all of it"
+        )));
     }
     sweeps.iter().map(|(file, bytes)| Ok(((*file).to_owned(), rows_of(file, bytes)?))).collect()
 }
@@ -135,13 +139,17 @@ fn recheck(
     sweeps: &[(String, Rows)],
     progress: &Progress,
 ) -> Result<Report, CliError> {
-    let rows: Vec<(usize, Row)> =
-        sweeps.iter().enumerate().flat_map(|(i, (_, rows))| rows.iter().map(move |row| (i, row))).collect();
+    let rows: Vec<(usize, Row)> = sweeps
+        .iter()
+        .enumerate()
+        .flat_map(|(i, (_, rows))| rows.iter().map(move |row| (i, row)))
+        .collect();
     let wanted = if arguments.all {
         (0..rows.len()).collect()
     } else {
         // Of which sweep a row is belongs to it.
-        let said: Vec<_> = rows.iter().map(|(sweep, row)| (sweeps[*sweep].1.sweep().hash(), row.line())).collect();
+        let said: Vec<_> =
+            rows.iter().map(|(sweep, row)| (sweeps[*sweep].1.sweep().hash(), row.line())).collect();
         choose(rows.len(), arguments.rows, &Hash::of(&canonical_json(&said)), arguments.seed)
     };
     let tally = Tally::new(progress, wanted.len() as u64);
@@ -155,15 +163,24 @@ fn recheck(
         wanted.par_iter().with_max_len(1).map(one).collect()
     })?;
     tally.finish();
-    let mut report =
-        Report { name: name.to_owned(), recomputed: found.len(), of: rows.len(), wrong: Vec::new(), parts: Vec::new() };
+    let mut report = Report {
+        name: name.to_owned(),
+        recomputed: found.len(),
+        of: rows.len(),
+        wrong: Vec::new(),
+        parts: Vec::new(),
+    };
     for (number, again) in found {
         let ((sweep, row), again) = (&rows[number], again?);
         let (file, same) = (&sweeps[*sweep].0, row.line() == again.line());
         report.parts.push(json!({ "file": file, "row": row.number(), "same": same }));
         if !same {
             let number = row.number();
-            report.wrong.push(format!("row {number} of {file} is {}, and comes out as {}", row.line(), again.line()));
+            report.wrong.push(format!(
+                "row {number} of {file} is {}, and comes out as {}",
+                row.line(),
+                again.line()
+            ));
         }
     }
     Ok(report)

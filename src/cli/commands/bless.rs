@@ -15,10 +15,13 @@ use crate::paper::{figures, verdict_table};
 use crate::record::manifest::VERSION;
 use crate::record::{self, Manifest};
 
-/// Recompute figures and write them as the new reference: figures/figN/expected.json, its PNG, and a line in CHANGES.md.
-/// Refused while any test other than the golden ones fails.
+/// Recompute figures and write them as the new reference: figures/figN/expected.json, its PNG, and
+/// a line in CHANGES.md. Refused while any test other than the golden ones fails.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  twofold bless fig7 --reason \"the exits are resolved in extended precision\"")]
+#[command(
+    after_help = "Example:\n  twofold bless fig7 --reason \"the exits are resolved in extended \
+        precision\""
+)]
 pub struct Arguments {
     /// Figures to bless, such as fig7; all if none is named.
     figures: Vec<String>,
@@ -42,7 +45,9 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let reason = arguments.reason.trim();
     if reason.is_empty() || reason.contains('\n') {
-        return Err(CliError::Usage("--reason: give one line that says why the reference changes".into()));
+        return Err(CliError::Usage(
+            "--reason: give one line that says why the reference changes".into(),
+        ));
     }
     let figures = chosen(&arguments.figures)?;
     record::files::try_folder(&arguments.expected)?;
@@ -50,27 +55,35 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         if !arguments.json {
             return print(text);
         }
-        let changed: Vec<_> = changed.iter().map(|(name, what)| json!({ "picture": name, "what": what })).collect();
+        let changed: Vec<_> =
+            changed.iter().map(|(name, what)| json!({ "picture": name, "what": what })).collect();
         print_json(
-            &json!({ "format": "twofold-bless", "version": 1, "outcome": outcome, "reason": reason, "changed": changed }),
+            &json!({ "format": "twofold-bless", "version": 1, "outcome": outcome, "reason": reason,
+                "changed": changed }),
         )
     };
     // The tests are those of the checkout that holds the references.
     let checkout = arguments.expected.join("..").join("Cargo.toml");
-    if !record::files::read_text(&checkout).is_ok_and(|text| text.contains("name = \"twofold-dynamics\"")) {
+    if !record::files::read_text(&checkout)
+        .is_ok_and(|text| text.contains("name = \"twofold-dynamics\""))
+    {
         return Err(CliError::Usage(format!(
-            "{} is not in a checkout of twofold; a reference is made where its program and its tests are",
+            "{} is not in a checkout of twofold; a reference is made where its program and its \
+                tests are",
             arguments.expected.display()
         )));
     }
     if !tests_pass()? {
-        let why = "refused: a test fails that compares with no reference; a reference must not be made by a program that is wrong";
+        let why = "refused: a test fails that compares with no reference; a reference must not be \
+            made by a program that is wrong";
         say("refused", &[], why)?;
         return Ok(Exit::CheckFailed);
     }
     let progress = Progress::new(arguments.quiet);
     let executor = Executor::new(None, &progress);
-    in_pool(arguments.threads, || executor.gather(&questions(figures.iter().flat_map(|f| &f.pictures))))?;
+    in_pool(arguments.threads, || {
+        executor.gather(&questions(figures.iter().flat_map(|f| &f.pictures)))
+    })?;
     let mut changed: Vec<(String, String)> = Vec::new();
     for figure in &figures {
         let folder = arguments.expected.join(&*figure.id);
@@ -114,10 +127,12 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     Ok(Exit::Fine)
 }
 
-const HEADER: &str = "# Why the reference pictures changed\n\nA line per `twofold bless`, oldest first: reason, then each picture \
+const HEADER: &str = "# Why the reference pictures changed\n\nA line per `twofold bless`, oldest \
+    first: reason, then each picture \
                       with the first layer that changed.\n\n";
 
-/// Puts the verdicts into docs/findings.md, if it stands beside the references and has a place for them.
+/// Puts the verdicts into docs/findings.md, if it stands beside the references and has a place for
+/// them.
 fn write_table(expected: &Path) -> Result<(), CliError> {
     let path = expected.join("..").join("docs").join("findings.md");
     let Ok(written) = record::files::read_text(&path) else { return Ok(()) };
@@ -125,7 +140,8 @@ fn write_table(expected: &Path) -> Result<(), CliError> {
         .iter()
         .filter_map(|f| {
             let path = figures::reference_file(expected, &f.id);
-            Manifest::parse(&record::files::read_text(&path).ok()?, &path.display().to_string()).ok()
+            Manifest::parse(&record::files::read_text(&path).ok()?, &path.display().to_string())
+                .ok()
         })
         .collect();
     if let Some(text) = verdict_table::with_table(&written, &verdict_table::table(&manifests)) {
@@ -145,7 +161,9 @@ fn tests_pass() -> Result<bool, CliError> {
         .stdout(Stdio::null())
         .status()
         .map_err(|e| {
-            CliError::Usage(format!("cannot run the tests with cargo: {e}; bless from a checkout with Rust installed"))
+            CliError::Usage(format!(
+                "cannot run the tests with cargo: {e}; bless from a checkout with Rust installed"
+            ))
         })?;
     Ok(status.success())
 }

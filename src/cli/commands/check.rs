@@ -1,4 +1,5 @@
-//! `twofold check`: recompute the figures and compare with the committed manifests, or with published pictures.
+//! `twofold check`: recompute the figures and compare with the committed manifests, or with
+//! published pictures.
 
 use std::path::{Path, PathBuf};
 
@@ -13,20 +14,21 @@ use crate::paper::figures;
 use crate::paper::pipeline::{PictureRecord, compute, questions};
 use crate::record::{self, Layer, Manifest, listed};
 
-/// Recompute figures and compare spec, data, pixels and files with the committed manifests; exit code 1 on a difference.
+/// Recompute figures and compare spec, data, pixels and files with the committed manifests; exit
+/// code 1 on a difference.
 #[derive(Debug, clap::Args)]
-#[command(
-    after_help = "Examples:\n  twofold check fig5 fig6\n  twofold check --json --quiet > check.json\n  twofold check --against ~/their-pictures"
-)]
+#[command(after_help = "Examples:\n  twofold check fig5 fig6\n  twofold check --json --quiet > \
+        check.json\n  twofold check --against ~/their-pictures")]
 pub struct Arguments {
     /// Figures to check, such as fig7; all if none is named.
     figures: Vec<String>,
-    /// What to check against instead of figures/figN/expected.json: another manifest, or a folder with published pictures (PNG, named
-    /// like ours). A picture holds by the first of these that does: same file, same pixels, few and slightly changed pixels, small RMS,
-    /// high SSIM.
+    /// What to check against instead of figures/figN/expected.json: another manifest, or a folder
+    /// with published pictures (PNG, named like ours). A picture holds by the first of these that
+    /// does: same file, same pixels, few and slightly changed pixels, small RMS, high SSIM.
     #[arg(long, value_name = "DIR|MANIFEST")]
     against: Option<PathBuf>,
-    /// Folder that holds figN/expected.json [default: the references that this program was built with].
+    /// Folder that holds figN/expected.json [default: the references that this program was built
+    /// with].
     #[arg(long, value_name = "DIR", conflicts_with = "against")]
     expected: Option<PathBuf>,
     /// Threads; 0 is one per core.
@@ -70,7 +72,9 @@ impl Finding {
                 format!("{name}: DIFFERS first in its {} of panel {}", layer.name(), listed(panels))
             }
             State::MissingReference { why } => format!("{name}: MISSING REFERENCE: {why}"),
-            State::NotMade => format!("{name}: NOT MADE: the manifest lists it, but its figure has no such picture"),
+            State::NotMade => format!(
+                "{name}: NOT MADE: the manifest lists it, but its figure has no such picture"
+            ),
         }
     }
 }
@@ -78,7 +82,13 @@ impl Finding {
 pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let mut figures = chosen(&arguments.figures)?;
     if let Some(folder) = arguments.against.as_ref().filter(|path| path.is_dir()) {
-        return published::check(folder, &figures, arguments.threads, arguments.quiet, arguments.json);
+        return published::check(
+            folder,
+            &figures,
+            arguments.threads,
+            arguments.quiet,
+            arguments.json,
+        );
     }
     let given = match &arguments.against {
         None => None,
@@ -86,7 +96,8 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
             let manifest = read_manifest(path)?;
             if let Some(other) = arguments.figures.iter().find(|name| **name != manifest.figure) {
                 return Err(CliError::Usage(format!(
-                    "{} is about \"{}\" and says nothing of {other}; leave {other} out, or name another manifest",
+                    "{} is about \"{}\" and says nothing of {other}; leave {other} out, or name \
+                        another manifest",
                     path.display(),
                     manifest.figure
                 )));
@@ -94,7 +105,8 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
             figures.retain(|f| *f.id == manifest.figure);
             if figures.is_empty() {
                 return Err(CliError::Usage(format!(
-                    "{} is about \"{}\", which is not among the figures to check; name another manifest or figure",
+                    "{} is about \"{}\", which is not among the figures to check; name another \
+                        manifest or figure",
                     path.display(),
                     manifest.figure
                 )));
@@ -108,7 +120,9 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         .map(|figure| match &given {
             Some(manifest) => Ok(manifest.clone()),
             None => match &arguments.expected {
-                Some(folder) => manifest_of(&figure.id, &figures::reference_file(folder, &figure.id)),
+                Some(folder) => {
+                    manifest_of(&figure.id, &figures::reference_file(folder, &figure.id))
+                }
                 None => embedded(&figure.id),
             },
         })
@@ -116,7 +130,9 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let progress = Progress::new(arguments.quiet);
     // A check never rests on a store: everything is computed here and now.
     let executor = Executor::new(None, &progress);
-    in_pool(arguments.threads, || executor.gather(&questions(figures.iter().flat_map(|f| &f.pictures))))?;
+    in_pool(arguments.threads, || {
+        executor.gather(&questions(figures.iter().flat_map(|f| &f.pictures)))
+    })?;
     let mut findings = Vec::new();
     let mut found = |name: &str, state: State| {
         let finding = Finding { name: name.to_owned(), state };
@@ -136,7 +152,9 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
             let actual = compute(picture, &executor)?.record;
             found(&actual.hashes.name, compare(&manifest, &actual))?;
         }
-        for missing in manifest.pictures.iter().filter(|e| !figure.pictures.iter().any(|p| p.name == e.name)) {
+        for missing in
+            manifest.pictures.iter().filter(|e| !figure.pictures.iter().any(|p| p.name == e.name))
+        {
             found(&missing.name, State::NotMade)?;
         }
     }
@@ -149,12 +167,16 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
             "findings": findings,
         }))?;
     } else if failures == 0 {
-        let pictures =
-            if findings.len() == 1 { "1 picture".to_owned() } else { format!("{} pictures", findings.len()) };
+        let pictures = if findings.len() == 1 {
+            "1 picture".to_owned()
+        } else {
+            format!("{} pictures", findings.len())
+        };
         print(&format!("{pictures} checked, all the same"))?;
     } else {
         print(&format!(
-            "{failures} differ. If the change is meant, look at the pictures (twofold report), then: twofold bless --reason \"why\""
+            "{failures} differ. If the change is meant, look at the pictures (twofold report), \
+                then: twofold bless --reason \"why\""
         ))?;
     }
     Ok(if failures == 0 { Exit::Fine } else { Exit::CheckFailed })
@@ -173,7 +195,8 @@ fn compare(manifest: &Manifest, actual: &PictureRecord) -> State {
 
 /// The reference that this program was built with.
 fn embedded(id: &str) -> Result<Manifest, CliError> {
-    let text = figures::reference(id).ok_or_else(|| CliError::Usage(format!("no reference is committed for {id}")))?;
+    let text = figures::reference(id)
+        .ok_or_else(|| CliError::Usage(format!("no reference is committed for {id}")))?;
     Ok(Manifest::parse(text, &format!("the built-in reference of {id}"))?)
 }
 
@@ -183,7 +206,11 @@ fn manifest_of(id: &str, path: &Path) -> Result<Manifest, CliError> {
     if manifest.figure == id {
         return Ok(manifest);
     }
-    Err(CliError::Usage(format!("{} is about \"{}\", and not about {id}", path.display(), manifest.figure)))
+    Err(CliError::Usage(format!(
+        "{} is about \"{}\", and not about {id}",
+        path.display(),
+        manifest.figure
+    )))
 }
 
 fn read_manifest(path: &Path) -> Result<Manifest, CliError> {

@@ -3,10 +3,12 @@
 use super::chosen;
 use crate::cli::{self, CliError, Exit, FigureFlags};
 
-/// Compute figures and write them as PNG, SVG and PDF, with their numbers as CSV: all their computations side by side, each once.
+/// Compute figures and write them as PNG, SVG and PDF, with their numbers as CSV: all their
+/// computations side by side, each once.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  twofold figure\n  twofold figure fig7 fig9 --out pictures\n  twofold figure fig7 --t-end 100 --fresh"
+    after_help = "Examples:\n  twofold figure\n  twofold figure fig7 fig9 --out pictures\n  \
+        twofold figure fig7 --t-end 100 --fresh"
 )]
 pub struct Arguments {
     /// Figures to make, such as fig7; all if none is named.

@@ -14,10 +14,12 @@ use crate::render::{Format, Provenance, ProvenanceError, decode_png, read_proven
 /// Print the provenance inside a PNG, SVG or PDF file and say whether twofold made it and it is
 /// unchanged.
 ///
-/// Exit code 0: made by twofold and unchanged. 1: not made by twofold, or changed, or of the name of a committed picture but not its bytes. 2: the file cannot
-/// be read as a picture. The seal inside a file tells damage and editing; only the committed hash tells forgery.
+/// Exit code 0: made by twofold and unchanged. 1: not made by twofold, or changed, or of the name
+/// of a committed picture but not its bytes. 2: the file cannot be read as a picture. The seal
+/// inside a file tells damage and editing; only the committed hash tells forgery.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:\n  twofold inspect fig7-printed.png\n  twofold inspect --json someone-elses.pdf")]
+#[command(after_help = "Examples:\n  twofold inspect fig7-printed.png\n  twofold inspect --json \
+        someone-elses.pdf")]
 pub struct Arguments {
     /// The picture.
     file: PathBuf,
@@ -78,7 +80,8 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         return Err(CliError::Usage(format!("{}: {error}", arguments.file.display())));
     }
     let manifests = manifests(&arguments.expected)?;
-    let inspection = inspect(&bytes, read, &manifests, arguments.file.file_stem().and_then(|s| s.to_str()));
+    let inspection =
+        inspect(&bytes, read, &manifests, arguments.file.file_stem().and_then(|s| s.to_str()));
     if arguments.json {
         print_json(&inspection)?;
     } else {
@@ -130,7 +133,8 @@ fn inspect(
         }
         other => other,
     };
-    let contradicted = !matches!(committed, Committed::Same { .. } | Committed::Unlisted | Committed::NoManifests);
+    let contradicted =
+        !matches!(committed, Committed::Same { .. } | Committed::Unlisted | Committed::NoManifests);
     Inspection {
         format: match format {
             Format::Png => "PNG",
@@ -145,7 +149,13 @@ fn inspect(
     }
 }
 
-fn committed(bytes: &[u8], hash: &Hash, format: Format, named: Option<&str>, manifests: &[Manifest]) -> Committed {
+fn committed(
+    bytes: &[u8],
+    hash: &Hash,
+    format: Format,
+    named: Option<&str>,
+    manifests: &[Manifest],
+) -> Committed {
     if manifests.is_empty() {
         return Committed::NoManifests;
     }
@@ -158,7 +168,8 @@ fn committed(bytes: &[u8], hash: &Hash, format: Format, named: Option<&str>, man
     if let Some(e) = all().find(|e| file(e) == *hash) {
         return Committed::Same { picture: e.name.clone() };
     }
-    let pixels = (format == Format::Png).then(|| decode_png(bytes).ok()).flatten().map(|p| pixel_hash(&p));
+    let pixels =
+        (format == Format::Png).then(|| decode_png(bytes).ok()).flatten().map(|p| pixel_hash(&p));
     if let Some(e) = all().find(|e| Some(&e.pixels) == pixels.as_ref()) {
         return Committed::SamePixels { picture: e.name.clone() };
     }
@@ -169,7 +180,8 @@ fn committed(bytes: &[u8], hash: &Hash, format: Format, named: Option<&str>, man
 }
 
 fn describe(i: &Inspection, file: &Path, expected: &Path) -> String {
-    let mut lines = vec![format!("{}: {}, SHA-256 {}", file.display(), i.format, i.sha256.as_str())];
+    let mut lines =
+        vec![format!("{}: {}, SHA-256 {}", file.display(), i.format, i.sha256.as_str())];
     let width = i.provenance.iter().map(|(k, _)| k.chars().count()).max().unwrap_or(0);
     for (key, value) in &i.provenance {
         lines.push(format!("  {:width$}  {}", harmless(key), harmless(value)));
@@ -189,10 +201,15 @@ fn describe(i: &Inspection, file: &Path, expected: &Path) -> String {
             format!("Reference: it has the name of {picture} and is NOT the committed file")
         }
         Committed::Misnamed { picture, name } => {
-            format!("Reference: it is the committed {picture}, byte for byte, and its name is that of {name}")
+            format!(
+                "Reference: it is the committed {picture}, byte for byte, and its name is that \
+                of {name}"
+            )
         }
         Committed::Unlisted => {
-            "Reference: no committed manifest lists it (an altered picture, or another version's)".into()
+            "Reference: no committed manifest lists it (an altered picture, or another \
+                version's)"
+                .into()
         }
         Committed::NoManifests => {
             format!("Reference: no manifests in {}; judged by its seal alone", expected.display())

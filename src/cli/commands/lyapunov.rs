@@ -16,11 +16,14 @@ use crate::job::general::{GeneralExponents, GeneralRun, MeanRate};
 use crate::job::{AnyQuestion, Executor, JobError, LargestExponent, Question, Stop, encode};
 use crate::num::elementary::log10;
 
-/// The largest Lyapunov exponent of the orbit from the start, with its 95 % interval: the mean rate at which a tangent vector grows.
+/// The largest Lyapunov exponent of the orbit from the start, with its 95 % interval: the mean rate
+/// at which a tangent vector grows.
 ///
-/// Above zero: neighbours part exponentially. Zero in the interval: a closed orbit, a torus, or growth that is not exponential. Below: a rest.
-/// The interval holds the scatter of averages over blocks of the orbit, what growth like a power of time adds, and the method's own errors. It knows
-/// only what the orbit has seen: an orbit that changes its ways once in a long while has a larger one.
+/// Above zero: neighbours part exponentially. Zero in the interval: a closed orbit, a torus, or
+/// growth that is not exponential. Below: a rest. The interval holds the scatter of averages over
+/// blocks of the orbit, what growth like a power of time adds, and the method's own errors. It
+/// knows only what the orbit has seen: an orbit that changes its ways once in a long while has a
+/// larger one.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     twofold lyapunov --system chua --t-end 5000\n  \
@@ -30,7 +33,8 @@ use crate::num::elementary::log10;
 pub struct Arguments {
     #[command(flatten)]
     flags: RunFlags,
-    /// Time before averaging begins, in which the orbit settles and the vector turns into the fastest direction [default: a tenth of --t-end].
+    /// Time before averaging begins, in which the orbit settles and the vector turns into the
+    /// fastest direction [default: a tenth of --t-end].
     #[arg(long, value_name = "T", allow_hyphen_values = true, help_heading = "Exponent")]
     transient: Option<f64>,
     /// Output format [default: what the name of --out ends in, else text].
@@ -75,25 +79,40 @@ impl Arguments {
         let spec = self.flags.spec(Use::Exponent)?;
         let transient = self.transient.unwrap_or(0.1 * spec.t_end);
         if !(transient >= 0.0 && transient < spec.t_end) {
-            let text = format!("--transient is {transient}: give a time from 0 to below --t-end, {}", spec.t_end);
+            let text = format!(
+                "--transient is {transient}: give a time from 0 to below --t-end, {}",
+                spec.t_end
+            );
             return Err(CliError::Usage(text));
         }
         let settings = LyapunovOptions {
             tolerance: spec.method.tolerance,
-            max_step: if let StepCap::Absolute(h) = spec.method.step_cap { h } else { f64::INFINITY },
+            max_step: if let StepCap::Absolute(h) = spec.method.step_cap {
+                h
+            } else {
+                f64::INFINITY
+            },
             transient,
             duration: spec.t_end - transient,
             max_steps: spec.method.max_steps,
             kick: spec.schedule.kick,
         };
-        Ok(LargestExponent { system: spec.system, switch: spec.switch, start: spec.start, settings })
+        Ok(LargestExponent {
+            system: spec.system,
+            switch: spec.switch,
+            start: spec.start,
+            settings,
+        })
     }
 
     /// The question about a general system.
     fn of_general(&self, mut run: GeneralRun) -> Result<GeneralExponents, CliError> {
         for flag in ["--section", "--chord", "--every"] {
             if self.flags.given().contains(&flag) {
-                return Err(CliError::no_effect(flag, "an exponent is an average along the whole orbit; leave it out"));
+                return Err(CliError::no_effect(
+                    flag,
+                    "an exponent is an average along the whole orbit; leave it out",
+                ));
             }
         }
         if self.flags.t_end.is_none() {
@@ -106,7 +125,9 @@ impl Arguments {
         let length = run.options.t_end - run.options.t_start;
         let transient = self.transient.unwrap_or(0.1 * length);
         if !(transient >= 0.0 && transient < length) {
-            let text = format!("--transient is {transient}: give a time from 0 to below the run's length, {length}");
+            let text = format!(
+                "--transient is {transient}: give a time from 0 to below the run's length, {length}"
+            );
             return Err(CliError::Usage(text));
         }
         let count = run.model.coordinates().len().min(MOST_EXPONENTS);
@@ -138,7 +159,9 @@ pub fn run(arguments: &Arguments) -> Result<cli::Exit, CliError> {
     }
     let found: Exponent = answer.fact("exponent").map_err(JobError::from)?;
     let bytes = match format {
-        Format::Json => encode::json(&answer, &json!({ "kind": question.kind(), "question": question.json() })),
+        Format::Json => {
+            encode::json(&answer, &json!({ "kind": question.kind(), "question": question.json() }))
+        }
         Format::Text => {
             let half_width: f64 = answer.fact("half_width").map_err(JobError::from)?;
             let sign: Sign = answer.fact("sign").map_err(JobError::from)?;
@@ -152,7 +175,8 @@ pub fn run(arguments: &Arguments) -> Result<cli::Exit, CliError> {
             // So many that rounding does not move the interval.
             let digits = (2.0 - log10(half_width)).ceil().clamp(6.0, 17.0) as usize;
             format!(
-                "{value:.digits$} +- {half_width:.1e} per unit time ({meaning}; mean over t = {transient} to {until}, 95 % interval)\n"
+                "{value:.digits$} +- {half_width:.1e} per unit time ({meaning}; mean over t = \
+                    {transient} to {until}, 95 % interval)\n"
             )
             .into_bytes()
         }
@@ -161,7 +185,10 @@ pub fn run(arguments: &Arguments) -> Result<cli::Exit, CliError> {
     match progress.asked_to_stop() {
         Some(exit) if answer.stop == Stop::Interrupted => {
             let until = transient + found.duration;
-            Err(CliError::Stopped { said: format!("interrupted: the mean is over t = {transient} to {until}"), exit })
+            Err(CliError::Stopped {
+                said: format!("interrupted: the mean is over t = {transient} to {until}"),
+                exit,
+            })
         }
         _ => Ok(cli::Exit::Fine),
     }
@@ -179,9 +206,12 @@ fn of_general(arguments: &Arguments, question: &GeneralExponents) -> Result<cli:
     let answer = Executor::new(None, &progress).ask(question)?;
     let fact = |e| CliError::Job(JobError::Fact(e));
     let found: Vec<MeanRate> = answer.fact("exponents").map_err(fact)?;
-    let (from, until): (f64, f64) = (answer.fact("from").map_err(fact)?, answer.fact("to").map_err(fact)?);
+    let (from, until): (f64, f64) =
+        (answer.fact("from").map_err(fact)?, answer.fact("to").map_err(fact)?);
     let bytes = match format {
-        Format::Json => encode::json(&answer, &json!({ "kind": question.kind(), "question": question.json() })),
+        Format::Json => {
+            encode::json(&answer, &json!({ "kind": question.kind(), "question": question.json() }))
+        }
         Format::Text => {
             let mut text = String::new();
             for (i, MeanRate { value, half_width }) in found.iter().enumerate() {
@@ -192,9 +222,13 @@ fn of_general(arguments: &Arguments, question: &GeneralExponents) -> Result<cli:
                     () if value > 0.0 => "neighbours part",
                     () => "neighbours approach",
                 };
-                let mean =
-                    if i == 0 { format!("; mean over t = {from} to {until}, 95 % interval") } else { String::new() };
-                text += &format!("{value:.6} +- {half_width:.1e} per unit time ({meaning}{mean})\n");
+                let mean = if i == 0 {
+                    format!("; mean over t = {from} to {until}, 95 % interval")
+                } else {
+                    String::new()
+                };
+                text +=
+                    &format!("{value:.6} +- {half_width:.1e} per unit time ({meaning}{mean})\n");
             }
             text.into_bytes()
         }

@@ -10,11 +10,10 @@ use crate::record;
 
 /// Print the completions for a shell.
 #[derive(Debug, clap::Args)]
-#[command(
-    after_help = "Examples:\n  twofold completions bash > ~/.local/share/bash-completion/completions/twofold\n  \
+#[command(after_help = "Examples:\n  twofold completions bash > \
+        ~/.local/share/bash-completion/completions/twofold\n  \
                         twofold completions zsh > ~/.zfunc/_twofold\n  \
-                        twofold completions fish > ~/.config/fish/completions/twofold.fish"
-)]
+                        twofold completions fish > ~/.config/fish/completions/twofold.fish")]
 pub struct Completions {
     /// The shell.
     #[arg(value_enum)]

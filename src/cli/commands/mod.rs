@@ -31,7 +31,8 @@ use crate::paper::{Figure, figures};
 
 /// Reference software for the breakdown of determinism at a two-fold singularity (Jeffrey 2013).
 #[derive(Debug, Parser)]
-#[command(name = "twofold", version, long_version = LONG_VERSION, propagate_version = true, max_term_width = 120, after_help = Exit::HELP)]
+#[command(name = "twofold", version, long_version = LONG_VERSION, propagate_version = true,
+    max_term_width = 120, after_help = Exit::HELP)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -61,7 +62,8 @@ enum Command {
     Man(manual::Man),
 }
 
-/// The definition of every command and flag, from which help, manual pages and docs/commands.md are made.
+/// The definition of every command and flag, from which help, manual pages and docs/commands.md are
+/// made.
 pub fn definition() -> clap::Command {
     Arguments::command()
 }
@@ -124,7 +126,10 @@ fn chosen(names: &[String]) -> Result<Vec<Figure>, CliError> {
     let all = figures::all();
     if let Some(unknown) = names.iter().find(|n| !all.iter().any(|f| f.id == **n)) {
         let known: Vec<&str> = all.iter().map(|f| &*f.id).collect();
-        return Err(CliError::Usage(format!("there is no figure \"{unknown}\"; choose among {}", known.join(", "))));
+        return Err(CliError::Usage(format!(
+            "there is no figure \"{unknown}\"; choose among {}",
+            known.join(", ")
+        )));
     }
     Ok(all.into_iter().filter(|f| names.is_empty() || names.iter().any(|n| *n == *f.id)).collect())
 }

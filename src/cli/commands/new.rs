@@ -8,10 +8,12 @@ use crate::hybrid;
 use crate::system::definition::State;
 use crate::system::library;
 
-/// Write a commented system file that runs as it stands, to be changed: `twofold run --system FILE`.
+/// Write a commented system file that runs as it stands, to be changed: `twofold run --system
+/// FILE`.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  twofold new my.toml\n  twofold new my-circuit.toml --from chua\n  twofold new my-ball.toml --from bouncing-ball\n  twofold new --list"
+    after_help = "Examples:\n  twofold new my.toml\n  twofold new my-circuit.toml --from chua\n  \
+        twofold new my-ball.toml --from bouncing-ball\n  twofold new --list"
 )]
 pub struct Arguments {
     /// The file to write, .toml, or - for standard output.
@@ -40,7 +42,9 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         None => TEMPLATE,
         Some(name) => library::text(name).or_else(|| library::general(name)).ok_or_else(|| {
             let (near, known) = general::known(name);
-            CliError::Usage(format!("--from {name}: there is no such built-in system{near}; built in are {known}"))
+            CliError::Usage(format!(
+                "--from {name}: there is no such built-in system{near}; built in are {known}"
+            ))
         })?,
     };
     let tables = tables(text);
@@ -53,7 +57,8 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         }
         if let (Some((table, _)), Some(name)) = (tables.first(), &arguments.from) {
             return Err(CliError::Usage(format!(
-                "--from {name}: the system reads {table}, which is written beside its file; give a file's name instead of -"
+                "--from {name}: the system reads {table}, which is written beside its file; give a \
+                    file's name instead of -"
             )));
         }
         deliver(None, text.as_bytes())?;
@@ -67,7 +72,9 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     }
     let mut files = vec![(file.clone(), text)];
     files.extend(tables.into_iter().map(|(name, text)| (file.with_file_name(name), text)));
-    if let Some((there, _)) = files.iter().find(|(f, _)| f.symlink_metadata().is_ok() && !arguments.force) {
+    if let Some((there, _)) =
+        files.iter().find(|(f, _)| f.symlink_metadata().is_ok() && !arguments.force)
+    {
         return Err(CliError::Usage(format!(
             "{} is there already; choose another name or folder, or replace it with --force",
             there.display()
@@ -80,7 +87,8 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let name = file.display();
     let written: Vec<String> = files.iter().map(|(f, _)| f.display().to_string()).collect();
     print(&format!(
-        "wrote {}; try\n  twofold plot --system {name} --out picture.png\n  twofold run --system {name} --t-end 20",
+        "wrote {}; try\n  twofold plot --system {name} --out picture.png\n  twofold run --system \
+            {name} --t-end 20",
         written.join(" and ")
     ))?;
     Ok(Exit::Fine)

@@ -22,17 +22,21 @@ use crate::job::rest::{Rest, Stability as RestStability};
 use crate::job::spec::Observation;
 use crate::job::{Answer, AnyQuestion, ClosedOrbit, Executor, JobError, Question, Stop, encode};
 
-/// Find a closed orbit through a plane by Newton's method, with its period and Floquet multipliers; with --along, follow it as a parameter
-/// changes, through folds, and say where it loses its stability.
+/// Find a closed orbit through a plane by Newton's method, with its period and Floquet multipliers;
+/// with --along, follow it as a parameter changes, through folds, and say where it loses its
+/// stability.
 ///
-/// The motion from the start settles first (--settle), so that attracting orbits are found without a guess; an orbit that repels needs a near
-/// --start and --settle 0. The discontinuous system's orbits (--switch filippov) may cross the switching surface and slide on it; one that
-/// grazes it, or comes to where its future is a set, has no return map, and that is said.
+/// The motion from the start settles first (--settle), so that attracting orbits are found without
+/// a guess; an orbit that repels needs a near --start and --settle 0. The discontinuous system's
+/// orbits (--switch filippov) may cross the switching surface and slide on it; one that grazes it,
+/// or comes to where its future is a set, has no return map, and that is said.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     twofold orbit --system relay-third-order --switch filippov --section q=0\n  \
-    twofold orbit --system buck --section s=0 --along supply=20..26 --format csv --out branch.csv\n  \
-    twofold orbit --reading reconstructed --section y=0 --start 0.8063,0,-0.0002 --settle 0 --format json")]
+    twofold orbit --system buck --section s=0 --along supply=20..26 --format csv --out \
+    branch.csv\n  \
+    twofold orbit --reading reconstructed --section y=0 --start 0.8063,0,-0.0002 --settle 0 \
+    --format json")]
 pub struct Arguments {
     #[command(flatten)]
     flags: RunFlags,
@@ -46,10 +50,22 @@ pub struct Arguments {
     #[arg(long, value_name = "T", allow_hyphen_values = true, help_heading = "Orbit")]
     settle: Option<f64>,
     /// Give up on a return after this time.
-    #[arg(long, value_name = "T", default_value_t = 1000.0, allow_hyphen_values = true, help_heading = "Orbit")]
+    #[arg(
+        long,
+        value_name = "T",
+        default_value_t = 1000.0,
+        allow_hyphen_values = true,
+        help_heading = "Orbit"
+    )]
     longest_return: f64,
-    /// Follow the orbit along a parameter of the system, or eps, from one value to another, in at least so many steps [default: 40].
-    #[arg(long, value_name = "NAME=FROM..TO[:STEPS]", allow_hyphen_values = true, help_heading = "Orbit")]
+    /// Follow the orbit along a parameter of the system, or eps, from one value to another, in at
+    /// least so many steps [default: 40].
+    #[arg(
+        long,
+        value_name = "NAME=FROM..TO[:STEPS]",
+        allow_hyphen_values = true,
+        help_heading = "Orbit"
+    )]
     along: Option<String>,
     /// Period of a general system that depends on the time, instead of --section.
     #[arg(long, value_name = "T", allow_hyphen_values = true, help_heading = "Orbit")]
@@ -89,7 +105,8 @@ impl Arguments {
     /// The question about a system with h, plus and minus.
     fn of_surfaces(&self) -> Result<ClosedOrbit, CliError> {
         if self.period.is_some() {
-            let why = "equations with h, plus and minus do not see the time; leave it out, and give --section";
+            let why = "equations with h, plus and minus do not see the time; leave it out, and \
+                give --section";
             return Err(CliError::no_effect("--period", why));
         }
         let spec = self.flags.spec(Use::Orbit)?;
@@ -99,9 +116,10 @@ impl Arguments {
             ));
         };
         let settle = self.settle.unwrap_or(200.0);
-        for (flag, number, least) in
-            [("--settle", settle, "0 or more"), ("--longest-return", self.longest_return, "above 0")]
-        {
+        for (flag, number, least) in [
+            ("--settle", settle, "0 or more"),
+            ("--longest-return", self.longest_return, "above 0"),
+        ] {
             let good = number.is_finite() && (number > 0.0 || flag == "--settle" && number == 0.0);
             if !good {
                 return Err(CliError::Usage(format!("{flag} is {number}: give a time {least}")));
@@ -133,12 +151,16 @@ impl Arguments {
         if let Some((flag, _)) = refused.iter().find(|(_, given)| *given) {
             let why = match *flag {
                 "--along" => {
-                    "branches are followed of systems with h, plus and minus; an attractor of this one is followed by `twofold scan --follow`"
+                    "branches are followed of systems with h, plus and minus; an attractor of this \
+                        one is followed by `twofold scan --follow`"
                 }
                 "--downward" => {
-                    "a general system's orbit closes at rising crossings; for falling ones negate the section, such as --section \"-v=0\", and leave it out"
+                    "a general system's orbit closes at rising crossings; for falling ones negate \
+                        the section, such as --section \"-v=0\", and leave it out"
                 }
-                "--t-end" => "--settle and --longest-return say how long motion is followed; leave it out",
+                "--t-end" => {
+                    "--settle and --longest-return say how long motion is followed; leave it out"
+                }
                 _ => "an orbit is its point, period and multipliers; leave it out",
             };
             return Err(CliError::no_effect(*flag, why));
@@ -152,16 +174,21 @@ impl Arguments {
                 ));
             }
             (Some(period), _) if period.is_finite() && period > 0.0 => Return::Period(period),
-            (Some(period), _) => return Err(CliError::Usage(format!("--period is {period}: give a time above 0"))),
+            (Some(period), _) => {
+                return Err(CliError::Usage(format!("--period is {period}: give a time above 0")));
+            }
             (None, Record::Section(_)) if driven => {
                 return Err(CliError::Usage(
-                    "the equations depend on the time: give their period (--period) instead of --section".into(),
+                    "the equations depend on the time: give their period (--period) instead of \
+                        --section"
+                        .into(),
                 ));
             }
             (None, Record::Section(_)) => Return::Crossings(self.returns.unwrap_or(1)),
             (None, _) => {
                 return Err(CliError::Usage(format!(
-                    "an orbit needs a place or time to close: give --section, such as {}=0, or --period of equations that depend on the time",
+                    "an orbit needs a place or time to close: give --section, such as {}=0, or \
+                        --period of equations that depend on the time",
                     run.model.coordinates()[0]
                 )));
             }
@@ -187,17 +214,23 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let answer = match Executor::new(None, &progress).ask(&question) {
         Err(JobError::Interrupted) if progress.asked_to_stop().is_some() => {
             let exit = progress.asked_to_stop().unwrap_or(Exit::Interrupted);
-            return Err(CliError::Stopped { said: "interrupted before an orbit was found".into(), exit });
+            return Err(CliError::Stopped {
+                said: "interrupted before an orbit was found".into(),
+                exit,
+            });
         }
         other => other?,
     };
     let bytes = match format {
         Format::Text => text(&question, &answer)?.into_bytes(),
         Format::Csv => {
-            let about = json!({ "kind": question.kind(), "question": question.json(), "facts": answer.facts });
+            let about = json!({ "kind": question.kind(), "question": question.json(),
+                "facts": answer.facts });
             encode::csv(answer.table("branch").unwrap_or(&answer.tables[0]), &about)
         }
-        Format::Json => encode::json(&answer, &json!({ "kind": question.kind(), "question": question.json() })),
+        Format::Json => {
+            encode::json(&answer, &json!({ "kind": question.kind(), "question": question.json() }))
+        }
     };
     if answer.stop == Stop::Interrupted
         && let Some(exit) = progress.asked_to_stop()
@@ -220,35 +253,53 @@ fn of_general(arguments: &Arguments, question: &GeneralOrbit) -> Result<Exit, Cl
     let out = arguments.delivery.out.as_deref();
     let format = ending::format(out, arguments.format, Format::Text)?;
     if let Format::Csv = format {
-        return Err(CliError::Usage("--format csv: of a general system's orbit give text or json".into()));
+        return Err(CliError::Usage(
+            "--format csv: of a general system's orbit give text or json".into(),
+        ));
     }
     try_delivery(out)?;
     let progress = Progress::with_grace(arguments.delivery.quiet);
     let answer = match Executor::new(None, &progress).ask(question) {
         Err(JobError::Interrupted) if progress.asked_to_stop().is_some() => {
             let exit = progress.asked_to_stop().unwrap_or(Exit::Interrupted);
-            return Err(CliError::Stopped { said: "interrupted before an orbit was found".into(), exit });
+            return Err(CliError::Stopped {
+                said: "interrupted before an orbit was found".into(),
+                exit,
+            });
         }
         other => other?,
     };
     let fact = |e| CliError::Job(JobError::Fact(e));
     let multipliers: Vec<[f64; 2]> = answer.fact("multipliers").map_err(fact)?;
     let point: Vec<f64> = answer.fact("point").map_err(fact)?;
-    let (period, gap): (f64, f64) = (answer.fact("period").map_err(fact)?, answer.fact("gap").map_err(fact)?);
+    let (period, gap): (f64, f64) =
+        (answer.fact("period").map_err(fact)?, answer.fact("gap").map_err(fact)?);
     let largest = multipliers.first().map_or(0.0, |[re, im]| (re * re + im * im).sqrt());
     let names = question.run.model.coordinates();
     let bytes = match format {
-        Format::Json => encode::json(&answer, &json!({ "kind": question.kind(), "question": question.json() })),
+        Format::Json => {
+            encode::json(&answer, &json!({ "kind": question.kind(), "question": question.json() }))
+        }
         _ => {
             let mut text = String::new();
             let mut line = |label: &str, what: String| {
                 let _ = writeln!(text, "{label:<13} {what}");
             };
             line("period", format!("{period}"));
-            line("point", names.iter().zip(&point).map(|(n, x)| format!("{n} = {x}")).collect::<Vec<_>>().join(", "));
+            line(
+                "point",
+                names
+                    .iter()
+                    .zip(&point)
+                    .map(|(n, x)| format!("{n} = {x}"))
+                    .collect::<Vec<_>>()
+                    .join(", "),
+            );
             line("multipliers", complex(&multipliers));
             let stability = match () {
-                () if (largest - 1.0).abs() < 1e-6 => "neutral: a multiplier is on the unit circle within its error",
+                () if (largest - 1.0).abs() < 1e-6 => {
+                    "neutral: a multiplier is on the unit circle within its error"
+                }
                 () if largest < 1.0 => "attracts",
                 () => "repels",
             };
@@ -265,13 +316,17 @@ fn of_general(arguments: &Arguments, question: &GeneralOrbit) -> Result<Exit, Cl
 fn along(text: &str) -> Result<Along, CliError> {
     let wrong = |why: &str| {
         CliError::Usage(format!(
-            "--along \"{text}\": {why}; give it as NAME=FROM..TO or NAME=FROM..TO:STEPS, such as alpha=0.1..0.2:40"
+            "--along \"{text}\": {why}; give it as NAME=FROM..TO or NAME=FROM..TO:STEPS, such as \
+                alpha=0.1..0.2:40"
         ))
     };
     let (name, range) = text.split_once('=').ok_or_else(|| wrong("there is no \"=\""))?;
     let (range, steps) = match range.rsplit_once(':') {
         Some((range, steps)) => {
-            let steps: usize = steps.trim().parse().map_err(|_| wrong("what follows \":\" is no number of steps"))?;
+            let steps: usize = steps
+                .trim()
+                .parse()
+                .map_err(|_| wrong("what follows \":\" is no number of steps"))?;
             (range, steps)
         }
         None => (range, 40),
@@ -314,21 +369,37 @@ fn text(question: &ClosedOrbit, answer: &Answer) -> Result<String, CliError> {
         ),
     );
     line("period", format!("{period}"));
-    line("point", names.iter().zip(&point).map(|(n, x)| format!("{n} = {x}")).collect::<Vec<_>>().join(", "));
+    line(
+        "point",
+        names.iter().zip(&point).map(|(n, x)| format!("{n} = {x}")).collect::<Vec<_>>().join(", "),
+    );
     let error: f64 = answer.fact("multiplier_error").map_err(fact)?;
     line("multipliers", format!("{}, each +- {error:.1e}", complex(&multipliers)));
     line(
         "stability",
         match (answer.fact::<Stability>("stability").map_err(fact)?, rate) {
             (Stability::NotIsolated, _) => {
-                "neutral: a multiplier is 1 within its error; the orbit is not isolated, or at a fold".into()
+                "neutral: a multiplier is 1 within its error; the orbit is not isolated, or at a \
+                    fold"
+                    .into()
             }
             (Stability::Neutral, _) => {
-                "neutral: a multiplier is on the unit circle within its error; linear terms do not decide".into()
+                "neutral: a multiplier is on the unit circle within its error; linear terms do not \
+                    decide"
+                    .into()
             }
-            (Stability::Stable, None) => "attracts in finite time (all multipliers are zero)".into(),
-            (Stability::Stable, Some(rate)) => format!("attracts, by {rate:.6e} per unit time in the end"),
-            (Stability::Unstable, rate) => format!("repels, by {:.6e} per unit time", -rate.unwrap_or(f64::NAN)),
+            (Stability::Stable, None) => "attracts in finite time (all multipliers are \
+                zero)"
+                .into(),
+            (Stability::Stable, Some(rate)) => format!(
+                "attracts, by {rate:.6e} per unit time in \
+                the end"
+            ),
+            (Stability::Unstable, rate) => format!(
+                "repels, by {:.6e} per unit \
+                time",
+                -rate.unwrap_or(f64::NAN)
+            ),
         },
     );
     if let (Some(along), Some(branch)) = (&question.along, answer.table("branch")) {
@@ -336,7 +407,12 @@ fn text(question: &ClosedOrbit, answer: &Answer) -> Result<String, CliError> {
         let values = branch.numbers(name);
         line(
             "branch",
-            format!("{} orbits, {name} = {} to {}", values.len(), along.from, values.last().unwrap_or(&along.from)),
+            format!(
+                "{} orbits, {name} = {} to {}",
+                values.len(),
+                along.from,
+                values.last().unwrap_or(&along.from)
+            ),
         );
         line("its end", ended(answer, name));
         if let Some(table) = answer.table("bifurcations") {
@@ -351,24 +427,37 @@ fn text(question: &ClosedOrbit, answer: &Answer) -> Result<String, CliError> {
 }
 
 fn complex(numbers: &[[f64; 2]]) -> String {
-    let said = |m: &[f64; 2]| if m[1] == 0.0 { format!("{:.9}", m[0]) } else { format!("{:.9} {:+.9} i", m[0], m[1]) };
+    let said = |m: &[f64; 2]| {
+        if m[1] == 0.0 { format!("{:.9}", m[0]) } else { format!("{:.9} {:+.9} i", m[0], m[1]) }
+    };
     numbers.iter().map(said).collect::<Vec<_>>().join(", ")
 }
 
 /// The rest for people.
 fn at_rest(question: &ClosedOrbit, rest: &Rest) -> String {
     let names = question.system.coordinates();
-    let state = names.iter().zip(&rest.state).map(|(n, x)| format!("{n} = {x}")).collect::<Vec<_>>().join(", ");
+    let state = names
+        .iter()
+        .zip(&rest.state)
+        .map(|(n, x)| format!("{n} = {x}"))
+        .collect::<Vec<_>>()
+        .join(", ");
     let stability = match (rest.stability, rest.rate()) {
-        (RestStability::Attracts, Some(rate)) => format!("attracts, by {rate:.6e} per unit time in the end"),
+        (RestStability::Attracts, Some(rate)) => {
+            format!("attracts, by {rate:.6e} per unit time in the end")
+        }
         (RestStability::Attracts, None) => "attracts in finite time".into(),
-        (RestStability::Repels, Some(rate)) if rate < 0.0 => format!("repels, by {:.6e} per unit time", -rate),
+        (RestStability::Repels, Some(rate)) if rate < 0.0 => {
+            format!("repels, by {:.6e} per unit time", -rate)
+        }
         (RestStability::Repels, _) => "repels".into(),
         (RestStability::Neutral, _) => "neutral: linear terms do not decide".into(),
     };
-    let numbers = if rest.eigenvalues.is_empty() { "none".into() } else { complex(&rest.eigenvalues) };
+    let numbers =
+        if rest.eigenvalues.is_empty() { "none".into() } else { complex(&rest.eigenvalues) };
     format!(
-        "{:<13} {state}\n{:<13} {numbers}\n{:<13} {stability}\nThe motion comes to rest: there is no closed orbit near.\n",
+        "{:<13} {state}\n{:<13} {numbers}\n{:<13} {stability}\nThe motion comes to rest: there is \
+            no closed orbit near.\n",
         rest.word(),
         "eigenvalues",
         "stability"
@@ -379,7 +468,9 @@ fn ended(answer: &Answer, name: &str) -> String {
     use crate::analyse::branch::End;
     match answer.fact::<End>("end") {
         Ok(End::Reached) => "the range's other end".into(),
-        Ok(End::TurnedBack) => format!("it turned back and left the range of {name} where it came in"),
+        Ok(End::TurnedBack) => {
+            format!("it turned back and left the range of {name} where it came in")
+        }
         Ok(End::Enough) => format!("{MOST_ORBITS} orbits"),
         Ok(End::Vanished) => "the orbit shrinks to a point".into(),
         Ok(End::Lost(why)) => format!("it cannot be followed further: {why}"),

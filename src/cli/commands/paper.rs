@@ -17,7 +17,9 @@ use crate::paper::verdict::PanelVerdict;
 /// Everything that is written goes to out/ in the folder, and with bless to expected/.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  twofold paper new my-paper && twofold paper make my-paper\n  twofold paper check papers/giaouris-2008\n  twofold paper bless my-paper --reason \"first results\""
+    after_help = "Examples:\n  twofold paper new my-paper && twofold paper make my-paper\n  \
+        twofold paper check papers/giaouris-2008\n  twofold paper bless my-paper --reason \"first \
+        results\""
 )]
 pub struct Arguments {
     #[command(subcommand)]
@@ -32,7 +34,8 @@ enum Action {
         #[arg(value_name = "DIR")]
         folder: PathBuf,
     },
-    /// Compute the figures into out/ and score the claims; what was computed before is taken from out/.store.
+    /// Compute the figures into out/ and score the claims; what was computed before is taken from
+    /// out/.store.
     Make(Flags),
     /// Compare pictures and outcomes with those in expected/; exit code 1 on a difference.
     Check(Flags),
@@ -71,7 +74,11 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let (flags, what) = match &arguments.action {
         Action::New { folder } => {
             begin(folder)?;
-            print(&format!("wrote {}; try: twofold paper make {}", folder.display(), folder.display()))?;
+            print(&format!(
+                "wrote {}; try: twofold paper make {}",
+                folder.display(),
+                folder.display()
+            ))?;
             return Ok(Exit::Fine);
         }
         Action::Make(flags) => (flags, What::Make),
@@ -80,7 +87,9 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         Action::Bless { flags, reason } => {
             let reason = reason.trim();
             if reason.is_empty() || reason.contains('\n') {
-                return Err(CliError::Usage("--reason: give one line that says why expectations change".into()));
+                return Err(CliError::Usage(
+                    "--reason: give one line that says why expectations change".into(),
+                ));
             }
             (flags, What::Bless(reason))
         }
@@ -93,8 +102,10 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     if let Some((claim, why)) = made.failure()
         && let Some(exit) = progress.asked_to_stop()
     {
-        let said =
-            format!("interrupted at claim {claim} ({why}); what is finished is kept, and the same command goes on");
+        let said = format!(
+            "interrupted at claim {claim} ({why}); what is finished is kept, and the same command \
+                goes on"
+        );
         return Err(CliError::Stopped { said, exit });
     }
     let (holds, all) = made.score();
@@ -106,12 +117,15 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         .claims
         .iter()
         .map(|s| match &s.verdict {
-            Ok(v) => json!({ "claim": v.claim, "outcome": outcome(v.agrees), "found": v.found, "odds": v.odds, "decided": v.decided, "rule_after_data": v.rule_after_data }),
-            Err(why) => json!({ "claim": s.claim.id, "outcome": "failed", "found": why.to_string() }),
+            Ok(v) => json!({ "claim": v.claim, "outcome": outcome(v.agrees), "found": v.found,
+                "odds": v.odds, "decided": v.decided, "rule_after_data": v.rule_after_data }),
+            Err(why) => json!({ "claim": s.claim.id, "outcome": "failed",
+                "found": why.to_string() }),
         })
         .chain(made.panels().map(|v| {
             let claim = format!("{}/{}", v.picture, v.panel);
-            json!({ "claim": claim, "outcome": outcome(v.agrees), "found": v.found, "because": v.because })
+            json!({ "claim": claim, "outcome": outcome(v.agrees), "found": v.found,
+                "because": v.because })
         }))
         .collect();
     let lines = || {
@@ -119,7 +133,9 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
             Ok(v) => format!("{}: {}: {}", v.claim, outcome(v.agrees), v.found),
             Err(why) => format!("{}: cannot be scored: {why}", s.claim.id),
         });
-        let panel = |v: &PanelVerdict| format!("{}/{}: {}: {}", v.picture, v.panel, outcome(v.agrees), v.found);
+        let panel = |v: &PanelVerdict| {
+            format!("{}/{}: {}: {}", v.picture, v.panel, outcome(v.agrees), v.found)
+        };
         claims.chain(made.panels().map(panel))
     };
     match what {
@@ -129,7 +145,8 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
                 _ => None,
             };
             if flags.json {
-                print_json(&json!({ "format": "twofold-paper", "version": 1, "claims": claims, "report": page }))?;
+                print_json(&json!({ "format": "twofold-paper", "version": 1, "claims": claims,
+                        "report": page }))?;
             } else {
                 lines().try_for_each(|line| print(&line))?;
                 let page = page.map_or(String::new(), |page| format!("; {}", page.display()));
@@ -142,7 +159,8 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
             let same = findings.iter().all(|f| f.state == State::Same);
             if flags.json {
                 print_json(
-                    &json!({ "format": "twofold-paper-check", "version": 1, "all_the_same": same, "findings": findings, "claims": claims }),
+                    &json!({ "format": "twofold-paper-check", "version": 1, "all_the_same": same,
+                        "findings": findings, "claims": claims }),
                 )?;
             } else {
                 findings.iter().try_for_each(|f| print(&f.line()))?;
@@ -157,7 +175,9 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         What::Bless(reason) => {
             let changed = folder.bless(&made, reason)?;
             if flags.json {
-                print_json(&json!({ "format": "twofold-paper-bless", "version": 1, "changed": changed }))?;
+                print_json(
+                    &json!({ "format": "twofold-paper-bless", "version": 1, "changed": changed }),
+                )?;
             } else if changed.is_empty() {
                 print("nothing changed")?;
             } else {

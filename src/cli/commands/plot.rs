@@ -21,27 +21,33 @@ use crate::record;
 use crate::render::number::number;
 use crate::render::{RenderError, markup, render};
 
-/// Draw a run: its states against time, a phase plane, its path in space, or with --section its crossings of a plane. The file's
-/// name says the format: .png (600 dpi), .svg or .pdf.
+/// Draw a run: its states against time, a phase plane, its path in space, or with --section its
+/// crossings of a plane. The file's name says the format: .png (600 dpi), .svg or .pdf.
 ///
-/// Axes and labels come from the system; the switching surface h = 0 is drawn where it depends on nothing but the states shown, coloured
-/// by what happens there where they are all the states. The same command makes the same bytes on any machine.
+/// Axes and labels come from the system; the switching surface h = 0 is drawn where it depends on
+/// nothing but the states shown, coloured by what happens there where they are all the states. The
+/// same command makes the same bytes on any machine.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
-    twofold plot --system stick-slip --switch filippov --exit at-once:plus --t-end 30 --out stick-slip.png\n  \
+    twofold plot --system stick-slip --switch filippov --exit at-once:plus --t-end 30 --out \
+    stick-slip.png\n  \
     twofold plot --system my.toml --set gain=2 --kind series --axes x,v --out my.svg\n  \
     twofold plot --reading reconstructed --t-end 2000 --section y=0 --out section.pdf\n  \
-    twofold run --system wheel --t-end 60 --out wheel.csv && twofold plot --from wheel.csv --camera -115,18 --out wheel.png")]
+    twofold run --system wheel --t-end 60 --out wheel.csv && twofold plot --from wheel.csv \
+    --camera -115,18 --out wheel.png")]
 pub struct Arguments {
     #[command(flatten)]
     flags: RunFlags,
-    /// Draw what `twofold run` has written to this file (CSV or JSON) and compute nothing; flags of the run are then refused.
+    /// Draw what `twofold run` has written to this file (CSV or JSON) and compute nothing; flags of
+    /// the run are then refused.
     #[arg(long, value_name = "FILE", help_heading = "Picture")]
     from: Option<PathBuf>,
-    /// What is shown [default: section with --section, else by the number of axes that the system suggests].
+    /// What is shown [default: section with --section, else by the number of axes that the system
+    /// suggests].
     #[arg(long, value_enum, help_heading = "Picture")]
     kind: Option<KindFlag>,
-    /// The states on the axes, by name: horizontal, (depth,) vertical; of a series, its panels [default: the system's].
+    /// The states on the axes, by name: horizontal, (depth,) vertical; of a series, its panels
+    /// [default: the system's].
     #[arg(long, value_name = "X,Y,...", value_delimiter = ',', help_heading = "Picture")]
     axes: Vec<String>,
     /// Azimuth and elevation of the camera in degrees, of a picture in space [default: -60,25].
@@ -63,7 +69,8 @@ pub struct Arguments {
     /// Format, for standard output.
     #[arg(long, value_enum)]
     format: Option<Format>,
-    /// Say the words of an SVG picture a second time as invisible text, so that they can be searched and copied (a PDF picture always does).
+    /// Say the words of an SVG picture a second time as invisible text, so that they can be
+    /// searched and copied (a PDF picture always does).
     #[arg(long)]
     searchable: bool,
     /// No progress on standard error.
@@ -111,16 +118,21 @@ impl Format {
     pub(super) fn of(out: &Path, given: Option<Self>) -> Result<Self, CliError> {
         if is_standard_output(out) {
             return given.ok_or_else(|| {
-                CliError::Usage("--out - names no format: give --format png, --format svg or --format pdf".into())
+                CliError::Usage(
+                    "--out - names no format: give --format png, --format svg or --format pdf"
+                        .into(),
+                )
             });
         }
         if given.is_some() {
             return Err(CliError::no_effect(
                 "--format",
-                "the file's name says the format; leave it out, or write to standard output (--out -)",
+                "the file's name says the format; leave it out, or write to standard output (--out \
+                    -)",
             ));
         }
-        let extension = out.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+        let extension =
+            out.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
         Self::value_variants().iter().copied().find(|f| f.word() == extension).ok_or_else(|| {
             CliError::Usage(format!(
                 "--out {}: a picture's name ends in .png, .svg or .pdf, which says what is written",
@@ -139,7 +151,11 @@ impl Format {
 }
 
 /// Draws a sheet and writes it.
-pub(super) fn write(sheet: &crate::render::Sheet, out: &Path, format: Format) -> Result<(), CliError> {
+pub(super) fn write(
+    sheet: &crate::render::Sheet,
+    out: &Path,
+    format: Format,
+) -> Result<(), CliError> {
     let rendered = render(sheet).map_err(|error| match error {
         RenderError::Text(e) => CliError::Usage(format!("{e}; give another --title")),
         other => CliError::Job(JobError::Other(other.to_string())),
@@ -157,7 +173,8 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     if arguments.searchable && format != Format::Svg {
         return Err(CliError::no_effect(
             "--searchable",
-            "only an SVG picture has a choice: PDF always carries its words, PNG cannot; leave it out",
+            "only an SVG picture has a choice: PDF always carries its words, PNG cannot; leave it \
+                out",
         ));
     }
     let recorded = match &arguments.from {
@@ -183,7 +200,8 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     };
     let frame = plot::Frame::from(&spec);
     let look = look(arguments, &frame)?;
-    let unsuitable = |e: plot::PlotError| CliError::Usage(format!("--kind {}: {e}", look.kind.word()));
+    let unsuitable =
+        |e: plot::PlotError| CliError::Usage(format!("--kind {}: {e}", look.kind.word()));
     // Said before anything is computed.
     plot::axes(&frame, look.kind, &look.axes).map_err(unsuitable)?;
     try_delivery(Some(&arguments.out))?;
@@ -210,7 +228,11 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
 }
 
 /// Draws the run of a general system.
-fn draw_general(arguments: &Arguments, mut run: GeneralRun, format: Format) -> Result<Exit, CliError> {
+fn draw_general(
+    arguments: &Arguments,
+    mut run: GeneralRun,
+    format: Format,
+) -> Result<Exit, CliError> {
     if arguments.flags.chord.is_none()
         && let Record::Path { chord } = &mut run.options.record
     {
@@ -219,7 +241,8 @@ fn draw_general(arguments: &Arguments, mut run: GeneralRun, format: Format) -> R
     let recorded = Recorded::General(run.clone(), arguments.flags.section.clone());
     let frame = recorded.frame();
     let look = look(arguments, &frame)?;
-    let unsuitable = |e: plot::PlotError| CliError::Usage(format!("--kind {}: {e}", look.kind.word()));
+    let unsuitable =
+        |e: plot::PlotError| CliError::Usage(format!("--kind {}: {e}", look.kind.word()));
     plot::axes(&frame, look.kind, &look.axes).map_err(unsuitable)?;
     try_delivery(Some(&arguments.out))?;
     let progress = Progress::new(arguments.quiet);
@@ -252,7 +275,8 @@ pub(super) fn general_small_print(run: &GeneralRun) -> String {
 pub(super) fn small_print(spec: &RunSpec) -> Vec<String> {
     let mut lines = wording::small_print(None, &[spec]);
     let title = format!("{}, ", markup::literal(spec.system.definition().title()));
-    if let Some(rest) = lines.first().and_then(|line| line.strip_prefix(&title)).map(str::to_owned) {
+    if let Some(rest) = lines.first().and_then(|line| line.strip_prefix(&title)).map(str::to_owned)
+    {
         lines[0] = rest;
     }
     lines
@@ -283,10 +307,14 @@ fn look(arguments: &Arguments, frame: &plot::Frame) -> Result<Look, CliError> {
                 "only a picture in space has one; leave it out, or give --kind space",
             ));
         }
-        Some(&[azimuth, elevation]) if azimuth.is_finite() && elevation.abs() <= 90.0 => Some((azimuth, elevation)),
+        Some(&[azimuth, elevation]) if azimuth.is_finite() && elevation.abs() <= 90.0 => {
+            Some((azimuth, elevation))
+        }
         Some(_) => {
             return Err(CliError::Usage(
-                "--camera: give azimuth and elevation in degrees, the elevation from -90 to 90, such as -60,25".into(),
+                "--camera: give azimuth and elevation in degrees, the elevation from -90 to 90, \
+                    such as -60,25"
+                    .into(),
             ));
         }
     };
@@ -309,16 +337,20 @@ fn recorded(file: &Path) -> Result<(RunSpec, Answer), CliError> {
         let stop = encode::stop_of_csv(&bytes).unwrap_or(Stop::Finished);
         (heading.about, Answer { stop, ..Answer::of_tables(vec![table]) })
     };
-    let question = about.get("question").cloned().ok_or_else(|| wrong("it does not say of which run it is".into()))?;
+    let question = about
+        .get("question")
+        .cloned()
+        .ok_or_else(|| wrong("it does not say of which run it is".into()))?;
     if about["kind"] == "general-run" {
         let name = question["system"]["name"].as_str().unwrap_or("FILE");
         return Err(CliError::Usage(format!(
-            "--from {}: the run of a general system is drawn from the system itself: twofold plot --system {name}",
+            "--from {}: the run of a general system is drawn from the system itself: twofold plot \
+                --system {name}",
             file.display()
         )));
     }
-    let spec: RunSpec =
-        serde_json::from_value(question).map_err(|e| wrong(format!("its question is not a run ({e})")))?;
+    let spec: RunSpec = serde_json::from_value(question)
+        .map_err(|e| wrong(format!("its question is not a run ({e})")))?;
     spec.validate().map_err(|e| wrong(format!("its question is wrong ({e})")))?;
     Ok((spec, answer))
 }

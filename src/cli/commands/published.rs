@@ -32,13 +32,20 @@ struct Finding {
 
 /// Computes every figure of which the folder holds a picture, and prints for each picture the
 /// criterion that it meets.
-pub fn check(folder: &Path, figures: &[Figure], threads: usize, quiet: bool, json: bool) -> Result<Exit, CliError> {
+pub fn check(
+    folder: &Path,
+    figures: &[Figure],
+    threads: usize,
+    quiet: bool,
+    json: bool,
+) -> Result<Exit, CliError> {
     let tree = read_tree(folder, &|path| path.ends_with(".png"))?;
     let published = tree.files;
     let named = |name: &str| -> Vec<&FileBytes> {
         published.iter().filter(|f| f.name().strip_suffix(".png") == Some(name)).collect()
     };
-    let known: Vec<&str> = figures.iter().flat_map(|f| &f.pictures).map(|p| p.name.as_str()).collect();
+    let known: Vec<&str> =
+        figures.iter().flat_map(|f| &f.pictures).map(|p| p.name.as_str()).collect();
     if !known.iter().any(|name| !named(name).is_empty()) {
         return Err(CliError::Usage(format!(
             "{}: no picture in this folder has a name of one of ours; ours are called {}",
@@ -75,7 +82,8 @@ pub fn check(folder: &Path, figures: &[Figure], threads: usize, quiet: bool, jso
             say(held(file, &computed, &limits))?;
         }
     }
-    for other in published.iter().filter(|f| !known.iter().any(|n| f.name() == format!("{n}.png"))) {
+    for other in published.iter().filter(|f| !known.iter().any(|n| f.name() == format!("{n}.png")))
+    {
         say(passed_over(&other.path, "not named like one of the pictures to check, skipped"))?;
     }
     for link in &tree.dangling {
@@ -111,7 +119,11 @@ fn held(file: &FileBytes, computed: &Computed, limits: &Limits) -> Finding {
         comparison,
     };
     if Hash::of(&file.bytes) == ours.png {
-        return finding(Some(Criterion::SameFile), "holds exactly (file: SHA-256 equal)".into(), None);
+        return finding(
+            Some(Criterion::SameFile),
+            "holds exactly (file: SHA-256 equal)".into(),
+            None,
+        );
     }
     // The size is in the first bytes: a file that claims another is not decoded.
     let expected = (computed.rendered.pixels.width, computed.rendered.pixels.height);
@@ -120,10 +132,13 @@ fn held(file: &FileBytes, computed: &Computed, limits: &Limits) -> Finding {
     }
     let theirs = match decode_png(&file.bytes) {
         Ok(pixels) => pixels,
-        Err(error) => return finding(None, format!("DIFFERS: cannot be read as a picture ({error})"), None),
+        Err(error) => {
+            return finding(None, format!("DIFFERS: cannot be read as a picture ({error})"), None);
+        }
     };
     if pixel_hash(&theirs) == ours.pixels {
-        let text = "holds exactly in its pixels (SHA-256 equal); the file's encoding or metadata differ";
+        let text =
+            "holds exactly in its pixels (SHA-256 equal); the file's encoding or metadata differ";
         return finding(Some(Criterion::Pixels), text.into(), None);
     }
     let comparison = match compare(&computed.rendered.pixels, &theirs) {
@@ -132,10 +147,18 @@ fn held(file: &FileBytes, computed: &Computed, limits: &Limits) -> Finding {
     };
     match limits.strictest(&comparison) {
         Some(criterion) => {
-            let text = format!("holds within tolerance ({}); {}", limits.describe(criterion), say(&comparison));
+            let text = format!(
+                "holds within tolerance ({}); {}",
+                limits.describe(criterion),
+                say(&comparison)
+            );
             finding(Some(criterion), text, Some(comparison))
         }
-        None => finding(None, format!("DIFFERS: no criterion is met; {}", say(&comparison)), Some(comparison)),
+        None => finding(
+            None,
+            format!("DIFFERS: no criterion is met; {}", say(&comparison)),
+            Some(comparison),
+        ),
     }
 }
 
@@ -145,7 +168,8 @@ fn cannot_be_compared(sizes: &SizesDiffer) -> String {
 
 fn say(c: &Comparison) -> String {
     format!(
-        "{} pixels changed ({:.4} %), largest difference {}, RMS {:.3} (worst block {:.1}), SSIM {:.5} (worst window {:.3})",
+        "{} pixels changed ({:.4} %), largest difference {}, RMS {:.3} (worst block {:.1}), SSIM \
+            {:.5} (worst window {:.3})",
         c.changed_pixels,
         100.0 * c.changed_share,
         c.largest_difference,

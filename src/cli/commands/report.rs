@@ -10,8 +10,11 @@ use crate::paper::{Figure, figures};
 use crate::record::{self, FileBytes, visit_tree};
 use crate::report::{Links, MadeFile, Program, Report, archive, assemble, names, page};
 
-const FINDINGS: &str =
-    concat!(include_str!("../../../docs/findings.md"), "\n\n", include_str!("../../../docs/theorems.md"));
+const FINDINGS: &str = concat!(
+    include_str!("../../../docs/findings.md"),
+    "\n\n",
+    include_str!("../../../docs/theorems.md")
+);
 /// The pages of odds that the report repeats.
 const ODDS: &str = concat!(
     include_str!("../../../docs/census.md"),
@@ -21,19 +24,26 @@ const ODDS: &str = concat!(
     include_str!("../../../docs/parameters.md")
 );
 
-/// Write a self-contained page about the figures in a folder, and beside it report.json, verdicts.json and RO-Crate metadata.
+/// Write a self-contained page about the figures in a folder, and beside it report.json,
+/// verdicts.json and RO-Crate metadata.
 ///
-/// A difference from the reference is shown on the page; it is not a failure of this command (see `twofold check`).
+/// A difference from the reference is shown on the page; it is not a failure of this command (see
+/// `twofold check`).
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:\n  twofold report\n  twofold report --figures pictures --out page.html --json")]
+#[command(
+    after_help = "Examples:\n  twofold report\n  twofold report --figures pictures --out page.html \
+        --json"
+)]
 pub struct Arguments {
     /// Folder with the figures; the JSON files are written to it.
     #[arg(long, value_name = "DIR", default_value = "target/figures")]
     figures: PathBuf,
-    /// Folder that holds figN/expected.json [default: figures, or away from a checkout the hashes that this program was built with].
+    /// Folder that holds figN/expected.json [default: figures, or away from a checkout the hashes
+    /// that this program was built with].
     #[arg(long, value_name = "DIR")]
     expected: Option<PathBuf>,
-    /// The page; index.html in the folder with the figures if not given. Elsewhere it names the files instead of linking to them.
+    /// The page; index.html in the folder with the figures if not given. Elsewhere it names the
+    /// files instead of linking to them.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// What was written and found, as JSON on standard output.
@@ -48,8 +58,12 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
 fn report(arguments: &Arguments) -> Result<Exit, CliError> {
     let folder = &arguments.figures;
     let known = figures::all();
-    let (made, _) = visit_tree(folder, &|_| true, &|path, place| MadeFile::read(path, place, &known))
-        .map_err(|e| CliError::Usage(format!("{e}; run `make figures` first, or name another --figures")))?;
+    let (made, _) =
+        visit_tree(folder, &|_| true, &|path, place| MadeFile::read(path, place, &known)).map_err(
+            |e| {
+                CliError::Usage(format!("{e}; run `make figures` first, or name another --figures"))
+            },
+        )?;
     let report = assemble(
         &made,
         &references(arguments.expected.as_deref())?,
@@ -57,7 +71,8 @@ fn report(arguments: &Arguments) -> Result<Exit, CliError> {
     );
     if report.figures.is_empty() {
         return Err(CliError::Usage(format!(
-            "{}: no figure's pictures are in this folder; run `make figures` first, or name another --figures",
+            "{}: no figure's pictures are in this folder; run `make figures` first, or name \
+                another --figures",
             folder.display()
         )));
     }
@@ -97,7 +112,10 @@ pub fn references(given: Option<&Path>) -> Result<Vec<FileBytes>, CliError> {
     if given.is_none() && !folder.exists() {
         let embedded = |f: &Figure| {
             let text = figures::reference(&f.id)?;
-            Some(FileBytes { path: format!("{}/expected.json", &*f.id), bytes: text.as_bytes().to_vec() })
+            Some(FileBytes {
+                path: format!("{}/expected.json", &*f.id),
+                bytes: text.as_bytes().to_vec(),
+            })
         };
         return Ok(figures::all().iter().filter_map(embedded).collect());
     }

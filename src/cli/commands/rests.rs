@@ -8,11 +8,13 @@ use crate::cli::{CliError, Exit, ending};
 use crate::job::general::{Family, GeneralRests, RestPlace, Resting};
 use crate::job::{Executor, JobError, Question, encode};
 
-/// Find the rests of a system in a box: equilibria of its fields and pseudo-equilibria on its switching surfaces, with eigenvalues and stability.
+/// Find the rests of a system in a box: equilibria of its fields and pseudo-equilibria on its
+/// switching surfaces, with eigenvalues and stability.
 ///
-/// Newton's method starts at up to 400 places of the box, for the fields and for every set of up to four switching surfaces; a rest that no start
-/// leads to is not found. Rests that fill a curve are one line, with its ends in the box. Systems with h, plus and minus are read as general ones;
-/// one with a table [second] is refused.
+/// Newton's method starts at up to 400 places of the box, for the fields and for every set of up to
+/// four switching surfaces; a rest that no start leads to is not found. Rests that fill a curve are
+/// one line, with its ends in the box. Systems with h, plus and minus are read as general ones; one
+/// with a table [second] is refused.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     twofold rests --system gene-switch --within x=0..2 --within y=0..2\n  \
@@ -52,12 +54,20 @@ impl Arguments {
         let names = model.coordinates();
         let mut within = vec![(-10.0, 10.0); names.len()];
         for text in &self.within {
-            let wrong =
-                |why: &str| CliError::Usage(format!("--within \"{text}\": {why}; give one such as {}=-2..2", names[0]));
+            let wrong = |why: &str| {
+                CliError::Usage(format!(
+                    "--within \"{text}\": {why}; give one such as {}=-2..2",
+                    names[0]
+                ))
+            };
             let (name, range) = text.split_once('=').ok_or_else(|| wrong("there is no \"=\""))?;
             let (low, high) = range.split_once("..").ok_or_else(|| wrong("there is no \"..\""))?;
-            let state = names.iter().position(|n| *n == name.trim()).ok_or_else(|| wrong("there is no such state"))?;
-            let number = |text: &str| text.trim().parse::<f64>().map_err(|_| wrong("a bound is no number"));
+            let state = names
+                .iter()
+                .position(|n| *n == name.trim())
+                .ok_or_else(|| wrong("there is no such state"))?;
+            let number =
+                |text: &str| text.trim().parse::<f64>().map_err(|_| wrong("a bound is no number"));
             within[state] = (number(low)?, number(high)?);
         }
         Ok(GeneralRests { model, within })
@@ -79,7 +89,9 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
             let none = "no rest was found in the box (--within)".to_owned();
             format!("{}\n", if lines.is_empty() { none } else { lines.join("\n") }).into_bytes()
         }
-        Format::Json => encode::json(&answer, &json!({ "kind": question.kind(), "question": question.json() })),
+        Format::Json => {
+            encode::json(&answer, &json!({ "kind": question.kind(), "question": question.json() }))
+        }
     };
     deliver(out, &bytes)?;
     Ok(Exit::Fine)
@@ -113,12 +125,19 @@ fn line(rest: &Resting, names: &[&str], with_mode: bool) -> String {
     let state = match &rest.family {
         None => point(&rest.state),
         Some(Family { dimension: 1, ends: Some([from, to]) }) => {
-            format!("every point of a curve from {} to {}, such as {}", point(from), point(to), point(&rest.state))
+            format!(
+                "every point of a curve from {} to {}, such as {}",
+                point(from),
+                point(to),
+                point(&rest.state)
+            )
         }
         Some(Family { dimension: 1, ends: None }) => {
             format!("every point of a closed curve, such as {}", point(&rest.state))
         }
-        Some(Family { dimension, .. }) => format!("one of a set of {dimension} dimensions: {}", point(&rest.state)),
+        Some(Family { dimension, .. }) => {
+            format!("one of a set of {dimension} dimensions: {}", point(&rest.state))
+        }
     };
     let values: Vec<String> = rest
         .eigenvalues
@@ -129,7 +148,14 @@ fn line(rest: &Resting, names: &[&str], with_mode: bool) -> String {
             im => format!("{re} + {im}i"),
         })
         .collect();
-    let values = if values.is_empty() { String::new() } else { format!("; eigenvalues {}", values.join(", ")) };
-    let behind = rest.behind.as_ref().map(|event| format!("; behind the event {event:?}, which changes motion before"));
+    let values = if values.is_empty() {
+        String::new()
+    } else {
+        format!("; eigenvalues {}", values.join(", "))
+    };
+    let behind = rest
+        .behind
+        .as_ref()
+        .map(|event| format!("; behind the event {event:?}, which changes motion before"));
     format!("{place}{mode}: {state}; {}{values}{}", rest.kind, behind.unwrap_or_default())
 }

@@ -14,13 +14,16 @@ use crate::cli::speak::{Delivery, complain, deliver, is_standard_output, try_del
 use crate::cli::{CliError, Exit};
 use crate::job::general::GeneralRun;
 use crate::job::spec::{Method, SwitchSpec};
-use crate::job::{self, Answer, Executor, Horizon, JobError, Question, Run, Stop, encode, simulate};
+use crate::job::{
+    self, Answer, Executor, Horizon, JobError, Question, Run, Stop, encode, simulate,
+};
 use crate::record::files::Growing;
 
 /// Compute one run: its path, or with --section its crossings of a plane.
 ///
-/// CSV is written as it is computed: a run of any length needs little memory. A flag that would have no effect on the run is refused. Ctrl-C
-/// keeps what has been computed: on standard output, or beside --out under the name FILE.part, with a last line that says so.
+/// CSV is written as it is computed: a run of any length needs little memory. A flag that would
+/// have no effect on the run is refused. Ctrl-C keeps what has been computed: on standard output,
+/// or beside --out under the name FILE.part, with a last line that says so.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     twofold run --reading reconstructed --t-end 100 --section y=0\n  \
@@ -37,8 +40,8 @@ pub struct Arguments {
     /// Output format [default: what the name of --out ends in, else csv].
     #[arg(long, value_enum)]
     format: Option<Format>,
-    /// With taylor-extended, compute the orbit with the next precision and with another order, too, and say on standard error until when all three agree to
-    /// nine digits.
+    /// With taylor-extended, compute the orbit with the next precision and with another order, too,
+    /// and say on standard error until when all three agree to nine digits.
     #[arg(long)]
     horizon: bool,
     #[command(flatten)]
@@ -47,7 +50,8 @@ pub struct Arguments {
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
 enum Format {
-    /// A line of column names, a row per point, and the run's record in a last line that begins with #.
+    /// A line of column names, a row per point, and the run's record in a last line that begins
+    /// with #.
     Csv,
     /// Spec, statistics, columns and rows.
     Json,
@@ -60,7 +64,11 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let spec = arguments.flags.spec(Use::Any)?;
     let out = arguments.delivery.out.as_deref();
     // A spec is JSON whatever the run's numbers would be.
-    let format = if arguments.print_spec { Format::Json } else { ending::format(out, arguments.format, Format::Csv)? };
+    let format = if arguments.print_spec {
+        Format::Json
+    } else {
+        ending::format(out, arguments.format, Format::Csv)?
+    };
     try_delivery(out)?;
     if arguments.print_spec {
         let mut text = serde_json::to_vec_pretty(&spec).expect("specs are plain data");
@@ -69,11 +77,15 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         return Ok(Exit::Fine);
     }
     if arguments.horizon && spec.method.name != Method::TaylorExtended {
-        let why = "--horizon: other methods' errors are those of their tolerance; leave it out, or use --method taylor-extended";
+        let why = "--horizon: other methods' errors are those of their tolerance; leave it out, or \
+            use --method taylor-extended";
         return Err(CliError::Usage(why.into()));
     }
-    if arguments.horizon && matches!(spec.switch, SwitchSpec::Delayed { .. } | SwitchSpec::Relay { .. }) {
-        let why = "--horizon: it compares with the next precision, and such a switch is followed with 106 bits at most; leave it out, or compare two tolerances";
+    if arguments.horizon
+        && matches!(spec.switch, SwitchSpec::Delayed { .. } | SwitchSpec::Relay { .. })
+    {
+        let why = "--horizon: it compares with the next precision, and such a switch is followed \
+            with 106 bits at most; leave it out, or compare two tolerances";
         return Err(CliError::Usage(why.into()));
     }
     let progress = Progress::with_grace(arguments.delivery.quiet);
@@ -88,9 +100,13 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
 /// Follows a general system and delivers its rows as they come.
 fn general_run(arguments: &Arguments, run: &GeneralRun) -> Result<Exit, CliError> {
     let out = arguments.delivery.out.as_deref();
-    for (flag, given) in [("--print-spec", arguments.print_spec), ("--horizon", arguments.horizon)] {
+    for (flag, given) in [("--print-spec", arguments.print_spec), ("--horizon", arguments.horizon)]
+    {
         if given {
-            return Err(CliError::no_effect(flag, "a general system's file is its own description; leave it out"));
+            return Err(CliError::no_effect(
+                flag,
+                "a general system's file is its own description; leave it out",
+            ));
         }
     }
     let format = ending::format(out, arguments.format, Format::Csv)?;
@@ -100,10 +116,16 @@ fn general_run(arguments: &Arguments, run: &GeneralRun) -> Result<Exit, CliError
     if let Format::Json = format {
         let answer = Executor::new(None, &progress).ask(run)?;
         let bytes = encode::json(&answer, &run.about());
-        let stopped = if answer.stop == Stop::Interrupted { progress.asked_to_stop() } else { None };
-        return deliver_whole_or_part(&answer, &bytes, out, stopped).map(|()| said_how_it_ended(run, &answer));
+        let stopped =
+            if answer.stop == Stop::Interrupted { progress.asked_to_stop() } else { None };
+        return deliver_whole_or_part(&answer, &bytes, out, stopped)
+            .map(|()| said_how_it_ended(run, &answer));
     }
-    let monitor = job::Progress::begin(&progress, if title.is_empty() { "run" } else { title }, run.options.t_end);
+    let monitor = job::Progress::begin(
+        &progress,
+        if title.is_empty() { "run" } else { title },
+        run.options.t_end,
+    );
     let reached = |t: f64| {
         let _ = monitor.reached(t);
         progress.asked_to_stop().is_none()
@@ -129,7 +151,9 @@ fn general_run(arguments: &Arguments, run: &GeneralRun) -> Result<Exit, CliError
     );
     monitor.done(&format!("{count} rows"));
     match failed {
-        Some(CliError::Output(e)) if e.kind() == io::ErrorKind::BrokenPipe => return Ok(Exit::Fine),
+        Some(CliError::Output(e)) if e.kind() == io::ErrorKind::BrokenPipe => {
+            return Ok(Exit::Fine);
+        }
         Some(error) => return Err(error),
         None => {}
     }
@@ -178,14 +202,19 @@ fn said_how_it_ended(run: &GeneralRun, answer: &Answer) -> Exit {
         let mut events = run.model.definition().events().iter();
         let sets = events.any(|e| e.name == name && e.mode.is_none() && !e.set.is_empty());
         complain(&format!(
-            "{name} happens infinitely often before t = {} (error at most {}), where the run ends{}",
+            "{name} happens infinitely often before t = {} (error at most {}), where the run \
+                ends{}",
             zeno["t"],
             zeno["error"],
             if sets { "; after_zeno = \"stick\" lets it rest there" } else { "" },
         ));
     }
     if let Some(event) = answer.facts.get("stopped_by") {
-        complain(&format!("{} ends the run at t = {}", event.as_str().unwrap_or_default(), answer.facts["t"]));
+        complain(&format!(
+            "{} ends the run at t = {}",
+            event.as_str().unwrap_or_default(),
+            answer.facts["t"]
+        ));
     }
     Exit::Fine
 }
@@ -194,7 +223,8 @@ fn said_how_it_ended(run: &GeneralRun, answer: &Answer) -> Exit {
 const AGREEMENT: f64 = 1e-9;
 
 fn say_horizon(run: &Run, progress: &Progress) -> Result<(), CliError> {
-    let answer = Executor::new(None, progress).ask(&Horizon { run: run.0.clone(), within: AGREEMENT })?;
+    let answer =
+        Executor::new(None, progress).ask(&Horizon { run: run.0.clone(), within: AGREEMENT })?;
     let fact = |name: &str| answer.fact::<f64>(name).map_err(JobError::from);
     let whole = answer.stop == Stop::Finished && fact("horizon")? >= run.0.t_end;
     complain(&format!(
@@ -210,7 +240,12 @@ fn say_horizon(run: &Run, progress: &Progress) -> Result<(), CliError> {
 }
 
 /// Computes the run and delivers it.
-fn record(run: &Run, format: Format, out: Option<&Path>, progress: &Progress) -> Result<Exit, CliError> {
+fn record(
+    run: &Run,
+    format: Format,
+    out: Option<&Path>,
+    progress: &Progress,
+) -> Result<Exit, CliError> {
     let funnel = matches!(run.0.switch, SwitchSpec::Filippov { funnel: Some(_), .. });
     if let (Format::Csv, false) = (format, funnel) {
         return stream(run, out, progress);
@@ -241,7 +276,10 @@ fn deliver_whole_or_part(
 
 fn stopped_at(t: f64, rows: u64, part: Option<&Path>, exit: Exit) -> CliError {
     let place = part.map_or("standard output".to_owned(), |p| p.display().to_string());
-    CliError::Stopped { said: format!("interrupted at t = {t}: the {rows} rows up to there are in {place}"), exit }
+    CliError::Stopped {
+        said: format!("interrupted at t = {t}: the {rows} rows up to there are in {place}"),
+        exit,
+    }
 }
 
 /// Where rows go as they come.
@@ -268,8 +306,8 @@ impl Rows {
     }
 }
 
-/// CSV as it is computed: memory stays flat, and who reads standard output sees rows as they come. Whether the run came to its end is known
-/// when it has: a last line says if it did not.
+/// CSV as it is computed: memory stays flat, and who reads standard output sees rows as they come.
+/// Whether the run came to its end is known when it has: a last line says if it did not.
 fn stream(run: &Run, out: Option<&Path>, progress: &Progress) -> Result<Exit, CliError> {
     let file = out.filter(|f| !is_standard_output(f));
     let mut rows = match file {
@@ -295,10 +333,14 @@ fn stream(run: &Run, out: Option<&Path>, progress: &Progress) -> Result<Exit, Cl
         &*monitor,
     );
     monitor.done(
-        &found.as_ref().map_or("failed".to_owned(), |f| format!("{} steps, {} rows", f.statistics.steps, f.rows)),
+        &found.as_ref().map_or("failed".to_owned(), |f| {
+            format!("{} steps, {} rows", f.statistics.steps, f.rows)
+        }),
     );
     match failed {
-        Some(CliError::Output(e)) if e.kind() == io::ErrorKind::BrokenPipe => return Ok(Exit::Fine),
+        Some(CliError::Output(e)) if e.kind() == io::ErrorKind::BrokenPipe => {
+            return Ok(Exit::Fine);
+        }
         Some(error) => return Err(error),
         None => {}
     }

@@ -24,37 +24,53 @@ use crate::render::markup;
 
 use super::plot::{Format, general_small_print, small_print, write};
 
-/// Vary one or two settings of a run and see what it does: over one, an orbit diagram (the late crossings of the plane for each value); over
-/// two, such as a plane of starts, a map of what each run ends on.
+/// Vary one or two settings of a run and see what it does: over one, an orbit diagram (the late
+/// crossings of the plane for each value); over two, such as a plane of starts, a map of what each
+/// run ends on.
 ///
-/// --follow begins each run where the one before ended, so that an attractor is followed up or down for as long as it attracts.
-/// Endings are the outcomes of `twofold sweep`: rest, period-K, irregular and so on. Runs that end on the same attractor have the same number. For
-/// more settings, statistics and resuming see there.
-/// Ctrl-C keeps the rows that are finished: on standard output, or beside --out under the name FILE.part.
+/// --follow begins each run where the one before ended, so that an attractor is followed up or down
+/// for as long as it attracts. Endings are the outcomes of `twofold sweep`: rest, period-K,
+/// irregular and so on. Runs that end on the same attractor have the same number. For more
+/// settings, statistics and resuming see there. Ctrl-C keeps the rows that are finished: on
+/// standard output, or beside --out under the name FILE.part.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
-    twofold scan --system buck --section s=0 --over params.supply=22..33:100 --t-end 200 --plot buck.png --out buck.csv\n  \
-    twofold scan --system buck-ramp --period 4e-4 --over params.input=20..32:60 --t-end 0.08 --follow both --plot buck.png --out buck.csv\n  \
-    twofold scan --system chua --section y=0 --over start.x=-3..3:40 --over start.z=-6..6:40 --t-end 200 --plot basins.png --out basins.csv")]
+    twofold scan --system buck --section s=0 --over params.supply=22..33:100 --t-end 200 --plot \
+    buck.png --out buck.csv\n  \
+    twofold scan --system buck-ramp --period 4e-4 --over params.input=20..32:60 --t-end 0.08 \
+    --follow both --plot buck.png --out buck.csv\n  \
+    twofold scan --system chua --section y=0 --over start.x=-3..3:40 --over start.z=-6..6:40 \
+    --t-end 200 --plot basins.png --out basins.csv")]
 pub struct Arguments {
     #[command(flatten)]
     flags: RunFlags,
-    /// A setting and its values: params.NAME, start.NAME, shift.NAME, eps ... =FROM..TO:COUNT, FROM..TO:log:COUNT or a,b,c; once or twice.
-    #[arg(long, value_name = "NAME=VALUES", required = true, allow_hyphen_values = true, help_heading = "Scan")]
+    /// A setting and its values: params.NAME, start.NAME, shift.NAME, eps ... =FROM..TO:COUNT,
+    /// FROM..TO:log:COUNT or a,b,c; once or twice.
+    #[arg(
+        long,
+        value_name = "NAME=VALUES",
+        required = true,
+        allow_hyphen_values = true,
+        help_heading = "Scan"
+    )]
     over: Vec<Axis>,
-    /// Over two settings, attractors this near (as a share of the largest number in any start or attractor) have one number [default: 0.01].
+    /// Over two settings, attractors this near (as a share of the largest number in any start or
+    /// attractor) have one number [default: 0.01].
     #[arg(long, value_name = "SHARE", allow_hyphen_values = true, help_heading = "Scan")]
     alike: Option<f64>,
-    /// Period of a general system that depends on the time: its states at the multiples of it, instead of a --section.
+    /// Period of a general system that depends on the time: its states at the multiples of it,
+    /// instead of a --section.
     #[arg(long, value_name = "T", allow_hyphen_values = true, help_heading = "Scan")]
     period: Option<f64>,
-    /// Over one setting, begin each run where that of the value below or above ended; both: up, then down. Not for switches with a memory.
+    /// Over one setting, begin each run where that of the value below or above ended; both: up,
+    /// then down. Not for switches with a memory.
     #[arg(long, value_enum, help_heading = "Scan")]
     follow: Option<Direction>,
     /// Draw the picture into this file (.png, .svg or .pdf).
     #[arg(long, value_name = "FILE", help_heading = "Scan")]
     plot: Option<PathBuf>,
-    /// The state on the diagram's vertical axis, over one setting [default: the first one that is not the plane's].
+    /// The state on the diagram's vertical axis, over one setting [default: the first one that is
+    /// not the plane's].
     #[arg(long, value_name = "STATE", help_heading = "Scan")]
     show: Option<String>,
     /// Threads; 0 is one per core.
@@ -106,7 +122,8 @@ impl Arguments {
             2 => true,
             n => {
                 return usage(format!(
-                    "--over is given {n} times: once for an orbit diagram, twice for a map; `twofold sweep` takes more"
+                    "--over is given {n} times: once for an orbit diagram, twice for a map; \
+                        `twofold sweep` takes more"
                 ));
             }
         };
@@ -114,7 +131,8 @@ impl Arguments {
         if !two && self.alike.is_some() {
             return Err(CliError::no_effect(
                 "--alike",
-                "it says which attractors of a map count as one, and an orbit diagram compares none; leave it out, or give --over twice",
+                "it says which attractors of a map count as one, and an orbit diagram compares \
+                    none; leave it out, or give --over twice",
             ));
         }
         if !(alike > 0.0 && alike.is_finite()) {
@@ -130,13 +148,15 @@ impl Arguments {
             Some(run) => self.of_general(run)?,
             None => {
                 if self.period.is_some() {
-                    let why = "equations with h, plus and minus do not see the time; leave it out, and give --section";
+                    let why = "equations with h, plus and minus do not see the time; leave it out, \
+                        and give --section";
                     return Err(CliError::no_effect("--period", why));
                 }
                 let spec = self.flags.spec(Use::Crossings)?;
                 if self.over.iter().any(Axis::is_random) {
                     return usage(
-                        "--over FROM..TO without a count is drawn at random, which `twofold sweep` does; give FROM..TO:COUNT"
+                        "--over FROM..TO without a count is drawn at random, which `twofold sweep` \
+                            does; give FROM..TO:COUNT"
                             .into(),
                     );
                 }
@@ -151,7 +171,8 @@ impl Arguments {
                     method: spec.method.name.name(),
                     hash: Hash::of_json(&()),
                 };
-                let sweep = Sweep::new(spec, self.over.clone(), None).map_err(|e| over(e.to_string()))?;
+                let sweep =
+                    Sweep::new(spec, self.over.clone(), None).map_err(|e| over(e.to_string()))?;
                 let hash = sweep.hash();
                 (Subject::Surfaces(Box::new(sweep)), Drawn { hash, ..drawn })
             }
@@ -159,11 +180,15 @@ impl Arguments {
         let scan = Scan::new(subject, follow, alike).map_err(over)?;
         if self.plot.is_some()
             && two
-            && !scan.axes().iter().all(|a| matches!(a.value(0, 0.5), Entry::Number(_) | Entry::Integer(_)))
+            && !scan
+                .axes()
+                .iter()
+                .all(|a| matches!(a.value(0, 0.5), Entry::Number(_) | Entry::Integer(_)))
         {
             return usage("--plot: a map is drawn over numbers".into());
         }
-        let names: Vec<String> = scan.axes().iter().map(|a| markup::literal(&a.to_string())).collect();
+        let names: Vec<String> =
+            scan.axes().iter().map(|a| markup::literal(&a.to_string())).collect();
         let varied: Vec<String> = scan.axes().iter().map(|axis| scanned(axis).title).collect();
         drawn.footer = drawn.footer.iter().filter_map(|line| without(line, &varied)).collect();
         drawn.footer.insert(0, format!("over {}", names.join(", ")));
@@ -174,37 +199,51 @@ impl Arguments {
     fn of_general(&self, mut run: GeneralRun) -> Result<(Subject, Drawn), CliError> {
         for flag in ["--chord", "--every"] {
             if self.flags.given().contains(&flag) {
-                return Err(CliError::no_effect(flag, "a scan looks at --section or --period; leave it out"));
+                return Err(CliError::no_effect(
+                    flag,
+                    "a scan looks at --section or --period; leave it out",
+                ));
             }
         }
         let options = &mut run.options;
         match (self.period, &options.record) {
             (Some(_), Record::Section(_)) => {
-                return Err(CliError::no_effect("--period", "--section says where to look; leave one of the two out"));
+                return Err(CliError::no_effect(
+                    "--period",
+                    "--section says where to look; leave one of the two out",
+                ));
             }
             (Some(period), _) if period.is_finite() && period > 0.0 => {
                 // Whole periods, so that the next run can begin at the same phase.
-                options.t_end = options.t_start + ((options.t_end - options.t_start) / period).ceil() * period;
+                options.t_end =
+                    options.t_start + ((options.t_end - options.t_start) / period).ceil() * period;
                 options.record = Record::Times { every: period };
             }
-            (Some(period), _) => return Err(CliError::Usage(format!("--period is {period}: give a time above 0"))),
+            (Some(period), _) => {
+                return Err(CliError::Usage(format!("--period is {period}: give a time above 0")));
+            }
             (None, Record::Section(_)) if self.follow.is_some() && run.model.depends_on_time() => {
                 return Err(CliError::Usage(
-                    "--follow: the equations depend on the time, and the next run begins at --t-start again: give their period (--period) instead of --section".into(),
+                    "--follow: the equations depend on the time, and the next run begins at \
+                        --t-start again: give their period (--period) instead of --section"
+                        .into(),
                 ));
             }
             (None, Record::Section(_)) => {}
             (None, _) => {
                 return Err(CliError::Usage(format!(
-                    "a scan needs a place or time to look at: give --section, such as {}=0, or --period of equations that depend on the time",
+                    "a scan needs a place or time to look at: give --section, such as {}=0, or \
+                        --period of equations that depend on the time",
                     run.model.coordinates()[0]
                 )));
             }
         }
         let fixed = match (&self.period, &self.flags.section) {
-            (None, Some(text)) => {
-                run.model.coordinates().iter().position(|n| text.split('=').next().is_some_and(|s| s.trim() == *n))
-            }
+            (None, Some(text)) => run
+                .model
+                .coordinates()
+                .iter()
+                .position(|n| text.split('=').next().is_some_and(|s| s.trim() == *n)),
             _ => None,
         };
         let about = Hash::of_json(&json!({ "run": run.json(), "over": self.over }));
@@ -223,7 +262,8 @@ impl Arguments {
         match &self.show {
             Some(_) if self.over.len() > 1 || self.plot.is_none() => Err(CliError::no_effect(
                 "--show",
-                "it names the vertical axis of an orbit diagram's picture; leave it out, or give --plot and one --over",
+                "it names the vertical axis of an orbit diagram's picture; leave it out, or give \
+                    --plot and one --over",
             )),
             Some(name) if names.contains(&name.as_str()) => Ok(Some(name.clone())),
             Some(name) => Err(CliError::Usage(format!(
@@ -259,7 +299,10 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         let part = out.filter(|f| !is_standard_output(f)).map(part_of);
         deliver(part.as_deref(), &bytes)?;
         let place = part.map_or("standard output".to_owned(), |p| p.display().to_string());
-        let said = format!("interrupted: {} of {runs} runs are finished, their rows are in {place}", found.finished);
+        let said = format!(
+            "interrupted: {} of {runs} runs are finished, their rows are in {place}",
+            found.finished
+        );
         return Err(CliError::Stopped { said, exit });
     }
     deliver(out, &bytes)?;
@@ -275,19 +318,27 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     }
 }
 
-/// A line of "name = value, name = value" without the values that every run of the scan has its own of; `None` if nothing is left.
+/// A line of "name = value, name = value" without the values that every run of the scan has its own
+/// of; `None` if nothing is left.
 fn without(line: &str, varied: &[String]) -> Option<String> {
-    let is_fixed = |part: &&str| part.split_once(" = ").is_none_or(|(name, _)| !varied.iter().any(|v| v == name));
+    let is_fixed = |part: &&str| {
+        part.split_once(" = ").is_none_or(|(name, _)| !varied.iter().any(|v| v == name))
+    };
     let fixed: Vec<&str> = line.split(", ").filter(is_fixed).collect();
     (!fixed.is_empty()).then(|| fixed.join(", "))
 }
 
-/// A setting as it is drawn; its name as mathematics sets it, of `params.alpha` only the parameter's.
+/// A setting as it is drawn; its name as mathematics sets it, of `params.alpha` only the
+/// parameter's.
 fn scanned(axis: &Axis) -> scan::Scanned {
     let name = axis.coordinate.to_string();
     let values: Vec<f64> = (0..axis.count()).map(|i| axis.value(i, 0.5).value()).collect();
     let logarithmic = matches!(axis.values, Values::Log { .. }) && values.iter().all(|v| *v > 0.0);
-    scan::Scanned { title: markup::name(name.rsplit('.').next().unwrap_or(&name)), values, logarithmic }
+    scan::Scanned {
+        title: markup::name(name.rsplit('.').next().unwrap_or(&name)),
+        values,
+        logarithmic,
+    }
 }
 
 fn picture(scan: &Scan, drawn: &Drawn, table: &Table, basins: &[Basin]) -> crate::render::Sheet {
@@ -303,7 +354,12 @@ fn picture(scan: &Scan, drawn: &Drawn, table: &Table, basins: &[Basin]) -> crate
             .map(|c| (0..table.len()).map(|row| c.get(row).word().to_owned()).collect::<Vec<_>>());
         let points = |way: &str| -> Vec<[f64; 2]> {
             let of = |row: &usize| ways.as_ref().is_none_or(|w| way.is_empty() || w[*row] == way);
-            heights.iter().enumerate().filter(|(row, _)| of(row)).map(|(row, y)| [value(row), *y]).collect()
+            heights
+                .iter()
+                .enumerate()
+                .filter(|(row, _)| of(row))
+                .map(|(row, y)| [value(row), *y])
+                .collect()
         };
         let series = match scan.follow() {
             Some(Follow::Both) => vec![("upwards", points("up")), ("downwards", points("down"))],
@@ -333,8 +389,14 @@ mod tests {
     #[test]
     fn small_print_says_nothing_of_what_is_varied() {
         let varied = ["*α*".to_owned(), "*ε*".to_owned()];
-        assert_eq!(without("*α* = 9, *β* = 14, *t* = 0 … 5", &varied).as_deref(), Some("*β* = 14, *t* = 0 … 5"));
-        assert_eq!(without("tanh smoothing, *ε* = 10^{-3}", &varied).as_deref(), Some("tanh smoothing"));
+        assert_eq!(
+            without("*α* = 9, *β* = 14, *t* = 0 … 5", &varied).as_deref(),
+            Some("*β* = 14, *t* = 0 … 5")
+        );
+        assert_eq!(
+            without("tanh smoothing, *ε* = 10^{-3}", &varied).as_deref(),
+            Some("tanh smoothing")
+        );
         assert_eq!(without("*α* = 9", &varied), None);
         assert_eq!(without("lsoda", &varied).as_deref(), Some("lsoda"));
     }

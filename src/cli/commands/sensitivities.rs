@@ -11,10 +11,12 @@ use crate::hybrid::motion::sensitivity::parameters;
 use crate::job::general::GeneralSensitivities;
 use crate::job::{Executor, JobError, Question, encode};
 
-/// Derivatives of the state at the end of a run by its start and its parameters, through every switch, slide and reset on the way.
+/// Derivatives of the state at the end of a run by its start and its parameters, through every
+/// switch, slide and reset on the way.
 ///
-/// For general systems, and with --switch filippov for those with h, plus and minus. Parameters are varied with the start held fixed. Where a surface
-/// is only touched, two are met at one moment, or impacts accumulate there is no derivative; that is said with time and state.
+/// For general systems, and with --switch filippov for those with h, plus and minus. Parameters are
+/// varied with the start held fixed. Where a surface is only touched, two are met at one moment, or
+/// impacts accumulate there is no derivative; that is said with time and state.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     twofold sensitivities --system bouncing-ball --t-end 1 --by g,r\n  \
@@ -60,7 +62,8 @@ impl Arguments {
             }
             None => general::filippov_run(&self.flags)?.ok_or_else(|| {
                 CliError::Usage(
-                    "sensitivities are computed of general systems and of Filippov motion; give --switch filippov"
+                    "sensitivities are computed of general systems and of Filippov motion; give \
+                        --switch filippov"
                         .into(),
                 )
             })?,

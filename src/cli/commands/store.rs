@@ -8,7 +8,9 @@ use crate::job::Store;
 /// Print the number of answers kept and the disk space they take; with --prune remove those that
 /// can never be used again.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:\n  twofold store\n  twofold store --prune\n  twofold store --clear")]
+#[command(
+    after_help = "Examples:\n  twofold store\n  twofold store --prune\n  twofold store --clear"
+)]
 pub struct Arguments {
     /// Folder in which answers are kept.
     #[arg(long, value_name = "DIR", default_value = "target/store")]
@@ -28,12 +30,20 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         print(&format!("{} MB freed", megabytes(freed)))?;
     }
     let entries = store.entries()?;
-    let size = |current: bool| megabytes(entries.iter().filter(|e| e.current == current).map(|e| e.bytes).sum());
+    let size = |current: bool| {
+        megabytes(entries.iter().filter(|e| e.current == current).map(|e| e.bytes).sum())
+    };
     let stale = entries.iter().filter(|e| !e.current).count();
-    let mut text = format!("{}: {} answers, {} MB", store.folder().display(), entries.len() - stale, size(true));
+    let mut text = format!(
+        "{}: {} answers, {} MB",
+        store.folder().display(),
+        entries.len() - stale,
+        size(true)
+    );
     if stale > 0 {
         text += &format!(
-            "\n{stale} more, {} MB, are damaged or of another version and never used: twofold store --prune",
+            "\n{stale} more, {} MB, are damaged or of another version and never used: twofold \
+                store --prune",
             size(false)
         );
     }

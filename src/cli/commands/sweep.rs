@@ -1,4 +1,5 @@
-//! `twofold sweep`: one run with some of its numbers varied, and where each ends. The sweep itself is [`job::sweep`](crate::job::sweep).
+//! `twofold sweep`: one run with some of its numbers varied, and where each ends. The sweep itself
+//! is [`job::sweep`](crate::job::sweep).
 
 use std::path::{Path, PathBuf};
 
@@ -25,22 +26,30 @@ const SHIFT: f64 = 1e-9;
 /// The seed of random axes.
 const DRAW_SEED: u64 = 2013;
 
-/// Vary any number of a run, and say where each run ends: a row each, on standard output (or --out), and how often each end
-/// occurred on standard error. Without --over, 40 starts whose first component is shifted a little further each time.
+/// Vary any number of a run, and say where each run ends: a row each, on standard output (or
+/// --out), and how often each end occurred on standard error. Without --over, 40 starts whose first
+/// component is shifted a little further each time.
 ///
-/// Rows are written to FILE.journal as they finish; --resume goes on with it after a kill, and `twofold sweep merge` puts parts together:
-/// the same bytes, whatever the parts, their order and how often they were interrupted. A run that fails is a row that says why; the
-/// exit code is then 3. Random numbers of kicks and exits differ from row to row.
+/// Rows are written to FILE.journal as they finish; --resume goes on with it after a kill, and
+/// `twofold sweep merge` puts parts together: the same bytes, whatever the parts, their order and
+/// how often they were interrupted. A run that fails is a row that says why; the exit code is then
+/// 3. Random numbers of kicks and exits differ from row to row.
 #[derive(Debug, clap::Args)]
 #[command(
     args_conflicts_with_subcommands = true,
-    after_help = "What can be varied: params.NAME, start.NAME, shift.NAME (added to the start), rtol, atol, tolerance (both), max-step, t-end,\n\
-    interval (between restarts), eps, eps-prime, sigma, kick-every, kick-size, seed, stream, method.\n\
-    Values: a,b,c; FROM..TO:COUNT; FROM..TO:log:COUNT; STEP*COUNT; FROM..TO and FROM..TO:log drawn at random; seed=FIRST..LAST.\n\n\
+    after_help = "What can be varied: params.NAME, start.NAME, shift.NAME (added to the start), \
+        rtol, atol, tolerance (both), max-step, t-end,\n\
+    interval (between restarts), eps, eps-prime, sigma, kick-every, kick-size, seed, stream, \
+    method.\n\
+    Values: a,b,c; FROM..TO:COUNT; FROM..TO:log:COUNT; STEP*COUNT; FROM..TO and FROM..TO:log drawn \
+    at random; seed=FIRST..LAST.\n\n\
     Examples:\n  \
-    twofold sweep --alpha 0.1 --beta 1e-4 --restart 100 --t-end 1e5 --method dopri5 --out shifted.csv\n  \
-    twofold sweep --t-end 2e5 --over params.alpha=1e-3..1:log:13 --over interval=20,40,100 --out map.csv\n  \
-    twofold sweep --t-end 2e5 --over method=lsoda,dopri5 --over shift.x=-1e-9..1e-9 --random 100 --shard 2/8 --out part2.csv\n  \
+    twofold sweep --alpha 0.1 --beta 1e-4 --restart 100 --t-end 1e5 --method dopri5 --out \
+    shifted.csv\n  \
+    twofold sweep --t-end 2e5 --over params.alpha=1e-3..1:log:13 --over interval=20,40,100 --out \
+    map.csv\n  \
+    twofold sweep --t-end 2e5 --over method=lsoda,dopri5 --over shift.x=-1e-9..1e-9 --random 100 \
+    --shard 2/8 --out part2.csv\n  \
     twofold sweep merge part*.csv --out whole.csv"
 )]
 pub struct Arguments {
@@ -57,19 +66,23 @@ pub struct Arguments {
     /// Seed of those draws [default: 2013].
     #[arg(long, value_name = "SEED", allow_negative_numbers = true)]
     random_seed: Option<u64>,
-    /// Number of runs: short for --over shift.NAME=SHIFT*RUNS with the first component's name [default: 40].
+    /// Number of runs: short for --over shift.NAME=SHIFT*RUNS with the first component's name
+    /// [default: 40].
     #[arg(long, allow_negative_numbers = true)]
     runs: Option<u64>,
-    /// With --runs: the first component of the start is shifted by this, twice this, three times this ... [default: 1e-9].
+    /// With --runs: the first component of the start is shifted by this, twice this, three times
+    /// this ... [default: 1e-9].
     #[arg(long, allow_hyphen_values = true)]
     shift: Option<f64>,
     /// Compute only every Nth row, from the Kth on.
     #[arg(long, value_name = "K/N", default_value = "1/1")]
     shard: Shard,
-    /// Go on with the rows that FILE and FILE.journal hold; FILE may be of the same sweep with fewer draws.
+    /// Go on with the rows that FILE and FILE.journal hold; FILE may be of the same sweep with
+    /// fewer draws.
     #[arg(long)]
     resume: bool,
-    /// With --resume: rows of another version of the program are kept if this many of them, spread evenly, come out the same again.
+    /// With --resume: rows of another version of the program are kept if this many of them, spread
+    /// evenly, come out the same again.
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     recheck: Option<u64>,
     /// Threads; 0 is one per core.
@@ -91,9 +104,11 @@ enum Command {
     Merge(Merge),
 }
 
-/// Put the rows of several parts of one sweep together: files that `twofold sweep` wrote, or journals that it left.
+/// Put the rows of several parts of one sweep together: files that `twofold sweep` wrote, or
+/// journals that it left.
 ///
-/// Parts of two versions of the numerics are refused. If rows are missing, what is there is written and the exit code is 1.
+/// Parts of two versions of the numerics are refused. If rows are missing, what is there is written
+/// and the exit code is 1.
 #[derive(Debug, clap::Args)]
 struct Merge {
     /// The parts: .csv or .journal.
@@ -138,14 +153,19 @@ fn sweep(arguments: &Arguments) -> Result<Sweep, CliError> {
     if over.is_empty() {
         let runs = arguments.runs.unwrap_or(RUNS);
         if !(1..=MOST_RUNS).contains(&runs) {
-            return usage(format!("--runs is {runs}: give a number from 1 to {MOST_RUNS}, or more by --over"));
+            return usage(format!(
+                "--runs is {runs}: give a number from 1 to {MOST_RUNS}, or more by --over"
+            ));
         }
         let shift = arguments.shift.unwrap_or(SHIFT);
         if !shift.is_finite() {
             return usage(format!("--shift is {shift}: give a finite number"));
         }
         let first = spec.system.coordinates().first().map_or(String::new(), |s| (*s).to_owned());
-        over.push(Axis { coordinate: Coordinate::Shift(first), values: Values::Multiples { of: shift, count: runs } });
+        over.push(Axis {
+            coordinate: Coordinate::Shift(first),
+            values: Values::Multiples { of: shift, count: runs },
+        });
     }
     if let (Some(_), None) = (arguments.random_seed, arguments.random) {
         return Err(CliError::no_effect(
@@ -153,7 +173,9 @@ fn sweep(arguments: &Arguments) -> Result<Sweep, CliError> {
             "no axis is drawn at random; leave it out, or give --random N",
         ));
     }
-    let random = arguments.random.map(|count| Draws { count, seed: arguments.random_seed.unwrap_or(DRAW_SEED) });
+    let random = arguments
+        .random
+        .map(|count| Draws { count, seed: arguments.random_seed.unwrap_or(DRAW_SEED) });
     Sweep::new(spec, over, random).map_err(|e| match e {
         crate::job::sweep::SweepError::Spec(spec) => spec.into(),
         other => CliError::Usage(format!("--over: {other}")),
@@ -166,14 +188,20 @@ fn computed(arguments: &Arguments) -> Result<Exit, CliError> {
     let format = format(out, arguments.json)?;
     try_delivery(out)?;
     if arguments.recheck.is_some() && !arguments.resume {
-        return Err(CliError::no_effect("--recheck", "it belongs to --resume; leave it out, or go on with a file"));
+        return Err(CliError::no_effect(
+            "--recheck",
+            "it belongs to --resume; leave it out, or go on with a file",
+        ));
     }
     let mut rows = Rows::of(sweep.clone());
     let mut journal = None;
     if let Some(out) = out {
         journal = Some(open(arguments, out, format, &mut rows)?);
     } else if arguments.resume {
-        return Err(CliError::no_effect("--resume", "there is no file to go on with; give --out FILE"));
+        return Err(CliError::no_effect(
+            "--resume",
+            "there is no file to go on with; give --out FILE",
+        ));
     }
     let pending = Pending::of(&rows, arguments.shard);
     let progress = Progress::with_grace(arguments.quiet);
@@ -193,7 +221,10 @@ fn computed(arguments: &Arguments) -> Result<Exit, CliError> {
                 "standard output".to_owned()
             }
         };
-        let said = format!("interrupted: {} of {wanted} runs are finished, their rows are in {place}", wanted - left);
+        let said = format!(
+            "interrupted: {} of {wanted} runs are finished, their rows are in {place}",
+            wanted - left
+        );
         return Err(CliError::Stopped { said, exit });
     }
     deliver(out, &bytes_of(&rows, format))?;
@@ -204,14 +235,21 @@ fn computed(arguments: &Arguments) -> Result<Exit, CliError> {
 }
 
 /// Opens the journal beside `out` and takes in what is there.
-fn open(arguments: &Arguments, out: &Path, format: Format, rows: &mut Rows) -> Result<Journal, CliError> {
+fn open(
+    arguments: &Arguments,
+    out: &Path,
+    format: Format,
+    rows: &mut Rows,
+) -> Result<Journal, CliError> {
     let path = journal_of(out);
     let (mut journal, lines) = Journal::open(&path)?;
     let refuse = |file: &Path, why: String| CliError::Usage(format!("{}: {why}", file.display()));
     if !arguments.resume && !lines.is_empty() {
         let rows = lines.iter().filter(|line| line.starts_with('[')).count();
-        let why =
-            format!("it holds {rows} rows of a sweep that was not finished; --resume goes on with it, or remove it");
+        let why = format!(
+            "it holds {rows} rows of a sweep that was not finished; --resume goes on with it, or \
+                remove it"
+        );
         return Err(refuse(&path, why));
     }
     if lines.is_empty() {
@@ -235,16 +273,21 @@ fn open(arguments: &Arguments, out: &Path, format: Format, rows: &mut Rows) -> R
 fn take(arguments: &Arguments, rows: &mut Rows, old: Rows, file: &Path) -> Result<(), CliError> {
     let refuse = |why: String| CliError::Usage(format!("{}: {why}", file.display()));
     // A file of fewer draws holds the first rows of this sweep.
-    let more = rows.sweep().draws().filter(|now| old.sweep().draws().is_some_and(|then| then.count < now.count));
+    let more = rows
+        .sweep()
+        .draws()
+        .filter(|now| old.sweep().draws().is_some_and(|then| then.count < now.count));
     let old = match more.and_then(|now| old.with_draws(now.count)) {
         Some(more) if more.sweep() == rows.sweep() => more,
         _ => old,
     };
-    let foreign: Vec<String> = old.numerics().filter(|n| *n != question::NUMERICS).map(str::to_owned).collect();
+    let foreign: Vec<String> =
+        old.numerics().filter(|n| *n != question::NUMERICS).map(str::to_owned).collect();
     if !foreign.is_empty() && old.sweep().hash() == rows.sweep().hash() && !old.is_empty() {
         let Some(wanted) = arguments.recheck else {
             return Err(refuse(format!(
-                "its rows were computed by another version of the numerics ({}); --recheck N keeps them if N of them come out the same again",
+                "its rows were computed by another version of the numerics ({}); --recheck N keeps \
+                    them if N of them come out the same again",
                 foreign.join(", ")
             )));
         };
@@ -255,7 +298,8 @@ fn take(arguments: &Arguments, rows: &mut Rows, old: Rows, file: &Path) -> Resul
                 Ok(again) if again.line() == row.line() => {}
                 Ok(_) => {
                     return Err(refuse(format!(
-                        "row {} has another result with this version; start again without --resume, or in another file",
+                        "row {} has another result with this version; start again without \
+                            --resume, or in another file",
                         row.number()
                     )));
                 }
@@ -284,7 +328,8 @@ fn merged(arguments: &Merge) -> Result<Exit, CliError> {
     let first = parts.next().ok_or_else(|| CliError::Usage("give the parts to merge".into()))?;
     let mut rows = read_rows(first)?;
     for part in parts {
-        rows.merge(read_rows(part)?).map_err(|e| CliError::Usage(format!("{}: {e}", part.display())))?;
+        rows.merge(read_rows(part)?)
+            .map_err(|e| CliError::Usage(format!("{}: {e}", part.display())))?;
     }
     deliver(out, &bytes_of(&rows, format))?;
     let progress = Progress::new(arguments.quiet);
@@ -296,7 +341,8 @@ fn merged(arguments: &Merge) -> Result<Exit, CliError> {
     }
     let first = rows.missing(Shard::WHOLE).next().unwrap_or_default();
     complain(&format!(
-        "error: {missing} of {} rows are in none of the parts, the first of them row {first}; merge their parts, too, or \
+        "error: {missing} of {} rows are in none of the parts, the first of them row {first}; \
+            merge their parts, too, or \
          compute them with --resume",
         rows.sweep().rows()
     ));

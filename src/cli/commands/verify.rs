@@ -11,12 +11,15 @@ use crate::verify::{Refused, verify};
 
 /// Check certificates of theorems (proofs/certificates) by computing what they claim anew.
 ///
-/// Shares no code with the programs that made them: orbits are enclosed by a validated integrator of the checker's own, and what follows is decided in exact
-/// arithmetic. The eight committed certificates take about a minute. Exit code 0: every statement holds. 1: one does not follow, or a number claimed is refused. 2: a file
-/// cannot be read as a certificate. proofs/README.md says what is rigorous and what is compared.
+/// Shares no code with the programs that made them: orbits are enclosed by a validated integrator
+/// of the checker's own, and what follows is decided in exact arithmetic. The eight committed
+/// certificates take about a minute. Exit code 0: every statement holds. 1: one does not follow, or
+/// a number claimed is refused. 2: a file cannot be read as a certificate. proofs/README.md says
+/// what is rigorous and what is compared.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Examples:\n  twofold verify proofs/certificates/*.json\n  twofold verify --json sensitivity.json"
+    after_help = "Examples:\n  twofold verify proofs/certificates/*.json\n  twofold verify --json \
+        sensitivity.json"
 )]
 pub struct Arguments {
     /// Certificates.
@@ -41,11 +44,15 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
                     }
                 }
                 rows.push(json!({
-                    "file": shown, "verified": true, "theorem": v.theorem, "statement": v.statement, "findings": v.findings,
+                    "file": shown, "verified": true, "theorem": v.theorem, "statement": v.statement,
+                        "findings": v.findings,
                 }));
             }
             Err(Refused::Unreadable(why)) => {
-                return Err(CliError::Usage(format!("{shown}: not a certificate: {}", harmless(&why))));
+                return Err(CliError::Usage(format!(
+                    "{shown}: not a certificate: {}",
+                    harmless(&why)
+                )));
             }
             Err(wrong @ Refused::Wrong { .. }) => {
                 exit = Exit::CheckFailed;

@@ -34,14 +34,16 @@ pub fn small_figure(t_end: f64) -> Figure {
                     schedule: Schedule { restart_every: Some(every), kick: None },
                     observe: Observation::Section { coordinate: 1, value: 0.0 },
                 };
-                FigurePanel::new(label, format!("interval {every}"), run).claimed(Claim::Section(claim))
+                FigurePanel::new(label, format!("interval {every}"), run)
+                    .claimed(Claim::Section(claim))
             };
             vec![panel("i", 20.0, SectionClaim::Period(1)), panel("ii", 40.0, SectionClaim::Chaos)]
         },
     )
 }
 
-/// A folder that holds the small figure with its records and verdicts. Made once; copy it before changing anything.
+/// A folder that holds the small figure with its records and verdicts. Made once; copy it before
+/// changing anything.
 pub fn figures() -> &'static Path {
     static MADE: OnceLock<tempfile::TempDir> = OnceLock::new();
     let made = MADE.get_or_init(|| {
@@ -66,7 +68,8 @@ pub fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// References for the pictures in `made`, as `twofold bless` would leave them: figN/expected.json and the PNG files.
+/// References for the pictures in `made`, as `twofold bless` would leave them: figN/expected.json
+/// and the PNG files.
 pub fn write_references(made: &Path, expected: &Path) {
     for folder in fs::read_dir(made).unwrap().map(|e| e.unwrap().path()).filter(|p| p.is_dir()) {
         let id = folder.file_name().unwrap().to_str().unwrap().to_owned();
@@ -78,10 +81,13 @@ pub fn write_references(made: &Path, expected: &Path) {
         for file in files {
             match file.extension().and_then(|e| e.to_str()) {
                 Some("json") => {
-                    let record: serde_json::Value = serde_json::from_slice(&fs::read(&file).unwrap()).unwrap();
+                    let record: serde_json::Value =
+                        serde_json::from_slice(&fs::read(&file).unwrap()).unwrap();
                     pictures.push(serde_json::from_value(record["hashes"].clone()).unwrap());
                 }
-                Some("png") => drop(fs::copy(&file, target.join(file.file_name().unwrap())).unwrap()),
+                Some("png") => {
+                    fs::copy(&file, target.join(file.file_name().unwrap())).unwrap();
+                }
                 _ => {}
             }
         }

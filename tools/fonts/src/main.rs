@@ -1,5 +1,5 @@
-//! Writes crates/render/fonts/glyphs.bin: advances, kerning and outlines of the fonts in assets/fonts, as
-//! skrifa reads them. crates/render/src/font.rs says how the file is laid out.
+//! Writes crates/render/fonts/glyphs.bin: advances, kerning and outlines of the fonts in
+//! assets/fonts, as skrifa reads them. crates/render/src/font.rs says how the file is laid out.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -41,8 +41,10 @@ fn face_table(font: &FontRef) -> Vec<u8> {
     let pairs = kerning(font);
     let kern = |left, right| i16_of(kern(&pairs, left, right).into());
     // Characters that are kerned alike share a row, and a column, of the table of pairs.
-    let (rows, row_of) = classes(glyphs.iter().map(|l| glyphs.iter().map(|r| kern(*l, *r)).collect()));
-    let (columns, column_of) = classes((0..glyphs.len()).map(|r| rows.iter().map(|row| row[r]).collect()));
+    let (rows, row_of) =
+        classes(glyphs.iter().map(|l| glyphs.iter().map(|r| kern(*l, *r)).collect()));
+    let (columns, column_of) =
+        classes((0..glyphs.len()).map(|r| rows.iter().map(|row| row[r]).collect()));
     let mut drawn: BTreeMap<GlyphId, usize> = BTreeMap::new();
     let mut outlines = Vec::new();
     let mut table = Vec::new();
@@ -58,7 +60,11 @@ fn face_table(font: &FontRef) -> Vec<u8> {
         table.extend(character.to_le_bytes());
         table.extend(u32::try_from(offset).unwrap().to_le_bytes());
         table.extend(i16_of(widths.advance_width(*glyph).unwrap_or(0.0)).to_le_bytes());
-        table.extend([row_of[i], column_of[i]].iter().flat_map(|class| u16::try_from(*class).unwrap().to_le_bytes()));
+        table.extend(
+            [row_of[i], column_of[i]]
+                .iter()
+                .flat_map(|class| u16::try_from(*class).unwrap().to_le_bytes()),
+        );
     }
     // Row after row.
     for row in 0..rows.len() {
@@ -91,7 +97,9 @@ fn kerning<'a>(font: &FontRef<'a>) -> Vec<PairPos<'a>> {
     let feature = record.expect("a feature for kerning").feature(features.offset_data()).unwrap();
     let mut tables = Vec::new();
     for index in feature.lookup_list_indices() {
-        if let PositionSubtables::Pair(pairs) = lookups.get(index.get().into()).unwrap().subtables().unwrap() {
+        if let PositionSubtables::Pair(pairs) =
+            lookups.get(index.get().into()).unwrap().subtables().unwrap()
+        {
             tables.extend(pairs.iter().map(Result::unwrap));
         }
     }
@@ -124,7 +132,9 @@ fn outline(font: &FontRef, glyph: GlyphId) -> Vec<u8> {
     let mut pen = Pen { bytes: Vec::new(), last: [0; 2] };
     // A glyph without ink, such as a space, has no outline.
     if let Some(outline) = font.outline_glyphs().get(glyph) {
-        outline.draw(DrawSettings::unhinted(Size::unscaled(), LocationRef::default()), &mut pen).unwrap();
+        outline
+            .draw(DrawSettings::unhinted(Size::unscaled(), LocationRef::default()), &mut pen)
+            .unwrap();
     }
     pen.bytes.push(b'.');
     pen.bytes

@@ -37,10 +37,12 @@ pub(super) struct Captured {
 }
 
 impl<'a> Turns<'a> {
-    /// The longest period up to the limit whose phases stay apart over the last window; 1 if none does.
+    /// The longest period up to the limit whose phases stay apart over the last window; 1 if none
+    /// does.
     pub fn find(points: &'a [Point], times: &'a [f64], extent: f64, th: &Thresholds) -> Self {
         let n = points.len();
-        // Long enough that a ring is walked around, but of a short run the end only: its transient must not move the centre.
+        // Long enough that a ring is walked around, but of a short run the end only: its transient
+        // must not move the centre.
         let shortest = n.min((20 * th.points_per_phase).min((n / 4).max(th.points_per_phase)));
         let mut best = (1, centres(points, 1, shortest));
         for period in (2..=th.longest_period).rev() {
@@ -48,7 +50,9 @@ impl<'a> Turns<'a> {
             if window > shortest.max(n / 2) && n / 2 >= th.fewest_turns * period {
                 // A short section: fewer turns are enough where every phase is a dot.
                 let found = centres(points, period, (n / 4).max(th.fewest_turns * period));
-                if found.1.iter().all(|s| *s <= th.dot * extent) && smallest_gap(&found.0) > 2.0 * th.dot * extent {
+                if found.1.iter().all(|s| *s <= th.dot * extent)
+                    && smallest_gap(&found.0) > 2.0 * th.dot * extent
+                {
                     best = (period, found);
                     break;
                 }
@@ -63,8 +67,8 @@ impl<'a> Turns<'a> {
                     best = (period, found);
                     break;
                 }
-                // Phases that go somewhere may be on their way around a slow island, or along a ring next to a resonance:
-                // look longer.
+                // Phases that go somewhere may be on their way around a slow island, or along a
+                // ring next to a resonance: look longer.
                 window *= 2;
             }
             if best.0 > 1 {
@@ -72,13 +76,14 @@ impl<'a> Turns<'a> {
             }
         }
         let (period, (centres, spreads)) = best;
-        let distances = (0..n).map(|i| distance(&points[i], &centres[(n - 1 - i) % period])).collect();
+        let distances =
+            (0..n).map(|i| distance(&points[i], &centres[(n - 1 - i) % period])).collect();
         let block = (n / period / 10).clamp(10, th.block);
         Self { points, times, period, centres, spreads, distances, block }
     }
 
-    /// Follows the run backwards from its end, block by block, while it goes on turning around the cycle: in a dot, or on a
-    /// smooth ring that joins the next one.
+    /// Follows the run backwards from its end, block by block, while it goes on turning around the
+    /// cycle: in a dot, or on a smooth ring that joins the next one.
     pub fn captured(&self, extent: f64, th: &Thresholds) -> Option<Captured> {
         let n = self.points.len();
         let length = self.block * self.period;
@@ -87,9 +92,9 @@ impl<'a> Turns<'a> {
         let mut next: Option<Ring> = None;
         while (blocks + 1) * length <= n {
             let ring = self.ring(n - (blocks + 1) * length, n - blocks * length);
-            let joins = next
-                .as_ref()
-                .is_none_or(|next| next.largest <= dot || (ring.ends[1] - next.ends[0]).abs() <= th.continuity);
+            let joins = next.as_ref().is_none_or(|next| {
+                next.largest <= dot || (ring.ends[1] - next.ends[0]).abs() <= th.continuity
+            });
             if !(ring.largest <= dot || ring.thickness <= th.thickness && joins) {
                 break;
             }
@@ -101,17 +106,22 @@ impl<'a> Turns<'a> {
         let settled = (settled + 5 * self.period <= n).then_some(settled);
         let mut from = n - blocks * length;
         if let Some(s) = settled {
-            // A fast approach fits within one block: follow it point by point through the linear neighbourhood.
-            let near = self.distances[..s].iter().rposition(|d| *d > th.linear_range * extent).map_or(0, |i| i + 1);
+            // A fast approach fits within one block: follow it point by point through the linear
+            // neighbourhood.
+            let near = self.distances[..s]
+                .iter()
+                .rposition(|d| *d > th.linear_range * extent)
+                .map_or(0, |i| i + 1);
             from = from.min(s).min(near.max(from.min(s).saturating_sub(length)));
         }
         (blocks > 0 || settled.is_some()).then_some(Captured { from, blocks, settled })
     }
 
-    /// The end of a kicked run, as far back as it stays within the linear neighbourhood of the cycle; `None` when it is not there for
-    /// a whole window.
+    /// The end of a kicked run, as far back as it stays within the linear neighbourhood of the
+    /// cycle; `None` when it is not there for a whole window.
     pub fn cloud(&self, extent: f64, th: &Thresholds) -> Option<Captured> {
-        let from = self.distances.iter().rposition(|d| *d > th.linear_range * extent).map_or(0, |i| i + 1);
+        let from =
+            self.distances.iter().rposition(|d| *d > th.linear_range * extent).map_or(0, |i| i + 1);
         (from + self.period * th.points_per_phase <= self.points.len()).then_some(Captured {
             from,
             blocks: 0,
@@ -119,8 +129,8 @@ impl<'a> Turns<'a> {
         })
     }
 
-    /// The straight-line fit to ln(distance) over the captured part, as far as it stays above the floor of what the
-    /// settled run shows anyway.
+    /// The straight-line fit to ln(distance) over the captured part, as far as it stays above the
+    /// floor of what the settled run shows anyway.
     pub fn approach(&self, captured: &Captured) -> Option<Rate> {
         let n = self.points.len();
         let k = self.period;
@@ -133,7 +143,8 @@ impl<'a> Turns<'a> {
         let mut turns = Vec::new();
         let mut i = captured.from;
         while i + k <= n {
-            let square: f64 = self.distances[i..i + k].iter().map(|d| d * d).sum::<f64>() / k as f64;
+            let square: f64 =
+                self.distances[i..i + k].iter().map(|d| d * d).sum::<f64>() / k as f64;
             let d = sqrt(square);
             if d <= floor || d == 0.0 {
                 break;
@@ -154,7 +165,12 @@ impl<'a> Turns<'a> {
             })
             .collect();
         let Line { slope, slope_error, .. } = line(&grouped)?;
-        Some(Rate { per_time: -slope, standard_error: slope_error, from: turns[0].0, to: turns[turns.len() - 1].0 })
+        Some(Rate {
+            per_time: -slope,
+            standard_error: slope_error,
+            from: turns[0].0,
+            to: turns[turns.len() - 1].0,
+        })
     }
 
     /// Mean rotation per turn around the centres in the last block, in circles in (-1/2, 1/2].
@@ -176,15 +192,19 @@ impl<'a> Turns<'a> {
         (sqrt(c * c + s * s) > 0.5 * count).then(|| atan2(s, c) / std::f64::consts::TAU)
     }
 
-    /// The largest gap in angle between neighbours of one phase over the last `blocks` blocks, in circles, as seen from its centre: small
-    /// on a ring that is filled; `None` when the points lie on a line.
+    /// The largest gap in angle between neighbours of one phase over the last `blocks` blocks, in
+    /// circles, as seen from its centre: small on a ring that is filled; `None` when the points lie
+    /// on a line.
     pub fn largest_gap(&self, blocks: usize) -> Option<f64> {
         let n = self.points.len();
         let from = n.saturating_sub(blocks * self.block * self.period);
         let mut largest = 0.0_f64;
         for phase in 0..self.period {
-            let mut angles: Vec<f64> =
-                self.round(phase, from, n)?.iter().map(|p| atan2(p[1], p[0]) / std::f64::consts::TAU).collect();
+            let mut angles: Vec<f64> = self
+                .round(phase, from, n)?
+                .iter()
+                .map(|p| atan2(p[1], p[0]) / std::f64::consts::TAU)
+                .collect();
             angles.sort_by(f64::total_cmp);
             let around = 1.0 + angles.first()? - angles.last()?;
             largest = angles.windows(2).map(|w| w[1] - w[0]).fold(largest.max(around), f64::max);
@@ -205,8 +225,8 @@ impl<'a> Turns<'a> {
         (self.times[n - 1] - self.times[n - 1 - turns * self.period]) / turns as f64
     }
 
-    /// Points of one phase in `from..to` in time order, seen from their centre and scaled so that their ellipse is a circle; `None`
-    /// when they lie on a line.
+    /// Points of one phase in `from..to` in time order, seen from their centre and scaled so that
+    /// their ellipse is a circle; `None` when they lie on a line.
     fn round(&self, phase: usize, from: usize, to: usize) -> Option<Vec<Point>> {
         let n = self.points.len();
         let c = self.centres[phase];
@@ -252,16 +272,22 @@ impl<'a> Turns<'a> {
             let values: Vec<(f64, f64)> = match self.round(phase, from, to) {
                 // By angle, with the logarithm of the distance seen in round coordinates.
                 Some(p) => {
-                    let logs: Vec<f64> =
-                        p.iter().map(|q| 0.5 * ln((q[0] * q[0] + q[1] * q[1]).max(f64::MIN_POSITIVE))).collect();
+                    let logs: Vec<f64> = p
+                        .iter()
+                        .map(|q| 0.5 * ln((q[0] * q[0] + q[1] * q[1]).max(f64::MIN_POSITIVE)))
+                        .collect();
                     let flat = detrended(&logs);
-                    let mut v: Vec<_> = p.iter().zip(flat).map(|(q, l)| (atan2(q[1], q[0]), l)).collect();
+                    let mut v: Vec<_> =
+                        p.iter().zip(flat).map(|(q, l)| (atan2(q[1], q[0]), l)).collect();
                     v.sort_by(|a, b| a.0.total_cmp(&b.0));
                     v
                 }
                 // On a line there is no angle: by time.
                 None => {
-                    let logs: Vec<f64> = (from..to).filter(|i| (n - 1 - i) % self.period == phase).map(log).collect();
+                    let logs: Vec<f64> = (from..to)
+                        .filter(|i| (n - 1 - i) % self.period == phase)
+                        .map(log)
+                        .collect();
                     detrended(&logs).into_iter().map(|l| (0.0, l)).collect()
                 }
             };
@@ -290,7 +316,8 @@ fn centres(points: &[Point], period: usize, window: usize) -> (Vec<Point>, Vec<f
     let mut centres = Vec::with_capacity(period);
     let mut spreads = Vec::with_capacity(period);
     for phase in 0..period {
-        let mut own: Vec<Point> = (n - window..n).rev().skip(phase).step_by(period).map(|i| points[i]).collect();
+        let mut own: Vec<Point> =
+            (n - window..n).rev().skip(phase).step_by(period).map(|i| points[i]).collect();
         own.reverse();
         let centre = fixed_point(&own);
         spreads.push(own.iter().map(|p| distance(p, &centre)).fold(0.0, f64::max));
@@ -310,23 +337,25 @@ fn smallest_gap(points: &[Point]) -> f64 {
     gap
 }
 
-/// Whether some phase moves on during the last `window` points: the means of its halves differ by a good part of its
-/// spread. On a ring whose rotation is nearly rational every phase creeps along the ring and looks like a small cluster; around a cycle
-/// it stays.
+/// Whether some phase moves on during the last `window` points: the means of its halves differ by a
+/// good part of its spread. On a ring whose rotation is nearly rational every phase creeps along
+/// the ring and looks like a small cluster; around a cycle it stays.
 fn drifts(points: &[Point], period: usize, window: usize, spread: f64, th: &Thresholds) -> bool {
     let n = points.len();
     (0..period).any(|phase| {
-        let own: Vec<Point> = (n - window..n).rev().skip(phase).step_by(period).map(|i| points[i]).collect();
+        let own: Vec<Point> =
+            (n - window..n).rev().skip(phase).step_by(period).map(|i| points[i]).collect();
         let (late, early) = own.split_at(own.len() / 2);
-        let mean =
-            |s: &[Point]| -> Point { std::array::from_fn(|k| s.iter().map(|q| q[k]).sum::<f64>() / s.len() as f64) };
+        let mean = |s: &[Point]| -> Point {
+            std::array::from_fn(|k| s.iter().map(|q| q[k]).sum::<f64>() / s.len() as f64)
+        };
         distance(&mean(late), &mean(early)) > th.drift * spread
     })
 }
 
-/// The centre of consecutive images of one phase: the fixed point of the affine map p -> A p + b that fits them best, which
-/// for a spiral is its eye also when the turns in the window are not whole; their mean where that map is not determined or its fixed
-/// point is not among them.
+/// The centre of consecutive images of one phase: the fixed point of the affine map p -> A p + b
+/// that fits them best, which for a spiral is its eye also when the turns in the window are not
+/// whole; their mean where that map is not determined or its fixed point is not among them.
 fn fixed_point(p: &[Point]) -> Point {
     let n = p.len() as f64;
     let mean: Point = std::array::from_fn(|k| p.iter().map(|q| q[k]).sum::<f64>() / n);
@@ -334,9 +363,11 @@ fn fixed_point(p: &[Point]) -> Point {
         return mean;
     }
     let spread = p.iter().map(|q| distance(q, &mean)).fold(0.0, f64::max);
-    // Normal equations for increments: p' - p = B (p - mean) + d, so the fixed point is mean - B^-1 d.
+    // Normal equations for increments: p' - p = B (p - mean) + d, so the fixed point is mean - B^-1
+    // d.
     let m = p.len() - 1;
-    let before: Point = std::array::from_fn(|k| p[..m].iter().map(|q| q[k]).sum::<f64>() / m as f64);
+    let before: Point =
+        std::array::from_fn(|k| p[..m].iter().map(|q| q[k]).sum::<f64>() / m as f64);
     let change: Point = std::array::from_fn(|k| (p[m][k] - p[0][k]) / m as f64);
     let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
     let mut cross = [[0.0; 2]; 2];
@@ -356,7 +387,8 @@ fn fixed_point(p: &[Point]) -> Point {
     if determinant.is_nan() || determinant <= 1e-6 * trace * trace {
         return mean;
     }
-    let b: [[f64; 2]; 2] = cross.map(|[u, v]| [(u * yy - v * xy) / determinant, (v * xx - u * xy) / determinant]);
+    let b: [[f64; 2]; 2] =
+        cross.map(|[u, v]| [(u * yy - v * xy) / determinant, (v * xx - u * xy) / determinant]);
     let det_b = b[0][0] * b[1][1] - b[0][1] * b[1][0];
     let centre = [
         before[0] - (b[1][1] * change[0] - b[0][1] * change[1]) / det_b,
@@ -374,7 +406,8 @@ fn detrended(values: &[f64]) -> Vec<f64> {
     }
 }
 
-/// Centres and largest distances of the other direction's points, by phase, over the same number of turns.
+/// Centres and largest distances of the other direction's points, by phase, over the same number of
+/// turns.
 pub(super) fn other_dots(points: &[Point], period: usize, turns: usize) -> (Vec<Point>, Vec<f64>) {
     let window = points.len().min(turns * period);
     if window < period { (Vec::new(), Vec::new()) } else { centres(points, period, window) }
@@ -393,7 +426,11 @@ pub(super) fn return_time(times: &[f64]) -> f64 {
         return f64::NAN;
     }
     // The median says whether times are sane; the mean is what a rate needs.
-    if median(&mut gaps) > 0.0 { (times[times.len() - 1] - times[0]) / gaps.len() as f64 } else { f64::NAN }
+    if median(&mut gaps) > 0.0 {
+        (times[times.len() - 1] - times[0]) / gaps.len() as f64
+    } else {
+        f64::NAN
+    }
 }
 
 #[cfg(test)]
@@ -403,10 +440,24 @@ mod tests {
     const TAU: f64 = std::f64::consts::TAU;
 
     /// Turns around given centres, the last point having the first.
-    fn around<'a>(points: &'a [Point], times: &'a [f64], centres: &[Point], block: usize) -> Turns<'a> {
+    fn around<'a>(
+        points: &'a [Point],
+        times: &'a [f64],
+        centres: &[Point],
+        block: usize,
+    ) -> Turns<'a> {
         let (n, period) = (points.len(), centres.len());
-        let distances = (0..n).map(|i| distance(&points[i], &centres[(n - 1 - i) % period])).collect();
-        Turns { points, times, period, centres: centres.to_vec(), spreads: vec![0.0; period], distances, block }
+        let distances =
+            (0..n).map(|i| distance(&points[i], &centres[(n - 1 - i) % period])).collect();
+        Turns {
+            points,
+            times,
+            period,
+            centres: centres.to_vec(),
+            spreads: vec![0.0; period],
+            distances,
+            block,
+        }
     }
 
     /// Turns around the origin at these distances, on a line.
@@ -452,8 +503,8 @@ mod tests {
 
     #[test]
     fn a_thin_spiral_has_its_mean_for_a_centre() {
-        // A hundredth as wide as long is still an ellipse; a ten-thousandth is a line, in any unit, level or tilted by
-        // an eighth of a circle.
+        // A hundredth as wide as long is still an ellipse; a ten-thousandth is a line, in any unit,
+        // level or tilted by an eighth of a circle.
         for (scale, tilt) in [(1e-3, 0.0), (1.0, 0.0), (1e3, 0.0), (1.0, 0.125)] {
             for (width, eye) in [(1e-2, true), (1e-4, false)] {
                 let (s, c) = (sin(TAU * tilt), cos(TAU * tilt));
@@ -462,7 +513,8 @@ mod tests {
                     .map(|a| [cos(a), width * sin(a)])
                     .map(|[u, v]| [scale * (2.0 + c * u - s * v), scale * (1.0 + s * u + c * v)])
                     .collect();
-                let mean: Point = std::array::from_fn(|k| points.iter().map(|p| p[k]).sum::<f64>() / 8.0);
+                let mean: Point =
+                    std::array::from_fn(|k| points.iter().map(|p| p[k]).sum::<f64>() / 8.0);
                 let want = if eye { [2.0 * scale, scale] } else { mean };
                 assert!(distance(&fixed_point(&points), &want) < 1e-8 * scale, "{scale} {width}");
                 assert!(distance(&mean, &[2.0 * scale, scale]) > 1e-2 * scale);
@@ -474,7 +526,8 @@ mod tests {
 
     #[test]
     fn a_phase_is_seen_round_and_turns_as_it_does() {
-        // Three phases around three centres, each a tenth of a circle ahead of the next; before the last ten turns something else.
+        // Three phases around three centres, each a tenth of a circle ahead of the next; before the
+        // last ten turns something else.
         let centres = [[5.0, -3.0], [-20.0, 7.0], [0.0, 9.0]];
         for (rotation, scale) in [(0.3, 1.0), (-0.3, 1e-3), (0.1, 1e3), (-0.45, 1.0)] {
             let points: Vec<Point> = (0..36)
@@ -482,7 +535,11 @@ mod tests {
                     let phase = (35 - i) % 3;
                     let angle = rotation * f64::from(i / 3) + 0.1 * f64::from(phase);
                     let junk = if i < 6 { 100.0 } else { 0.0 };
-                    ellipse([centres[phase as usize][0] + junk, centres[phase as usize][1]], angle, scale)
+                    ellipse(
+                        [centres[phase as usize][0] + junk, centres[phase as usize][1]],
+                        angle,
+                        scale,
+                    )
                 })
                 .collect();
             let turns = around(&points, &[], &centres, 10);
@@ -490,34 +547,51 @@ mod tests {
                 let round = turns.round(phase, 6, 36).unwrap();
                 assert_eq!(round.len(), 10);
                 // Second moments one: ten points at the distance sqrt(2/10).
-                assert!(round.iter().all(|q| (q[0] * q[0] + q[1] * q[1] - 0.2).abs() < 1e-10), "{round:?}");
+                assert!(
+                    round.iter().all(|q| (q[0] * q[0] + q[1] * q[1] - 0.2).abs() < 1e-10),
+                    "{round:?}"
+                );
             }
-            assert!((turns.rotation().unwrap() - rotation).abs() < 1e-10, "{rotation}: {:?}", turns.rotation());
+            assert!(
+                (turns.rotation().unwrap() - rotation).abs() < 1e-10,
+                "{rotation}: {:?}",
+                turns.rotation()
+            );
         }
         // A quarter turn is seen whole: all increments point the same way, whichever it is.
-        let quarters: Vec<Point> = (0..12).map(|i| ellipse([0.0; 2], 0.25 * f64::from(i), 1.0)).collect();
+        let quarters: Vec<Point> =
+            (0..12).map(|i| ellipse([0.0; 2], 0.25 * f64::from(i), 1.0)).collect();
         let quarter = around(&quarters, &[], &[[0.0; 2]], 12).rotation().unwrap();
         assert!((quarter - 0.25).abs() < 1e-10, "{quarter}");
         // To and fro by quarters is no rotation.
-        let swing: Vec<Point> = (0..10).map(|i| ellipse([0.0; 2], 0.25 * f64::from(i % 2), 1.0)).collect();
+        let swing: Vec<Point> =
+            (0..10).map(|i| ellipse([0.0; 2], 0.25 * f64::from(i % 2), 1.0)).collect();
         assert_eq!(around(&swing, &[], &[[0.0; 2]], 10).rotation(), None);
     }
 
     #[test]
     fn the_largest_gap_is_found_wherever_it_lies() {
         for offset in 0..20 {
-            let angles = [0.5, 0.75, 0.6, 0.85, 0.0, 0.25, 0.1, 0.35].map(|a| a + 0.05 * f64::from(offset) + 0.013);
+            let angles = [0.5, 0.75, 0.6, 0.85, 0.0, 0.25, 0.1, 0.35]
+                .map(|a| a + 0.05 * f64::from(offset) + 0.013);
             let points: Vec<Point> = angles.iter().map(|a| ellipse([2.0, 1.0], *a, 1.0)).collect();
             let turns = around(&points, &[], &[[2.0, 1.0]], 4);
-            // The last block: 0, 0.1, 0.25, 0.35. With the one before: halves of a circle filled alike.
+            // The last block: 0, 0.1, 0.25, 0.35. With the one before: halves of a circle filled
+            // alike.
             for (blocks, gap) in [(1, 0.65), (2, 0.15)] {
-                assert!((turns.largest_gap(blocks).unwrap() - gap).abs() < 1e-10, "{offset} {blocks}");
+                assert!(
+                    (turns.largest_gap(blocks).unwrap() - gap).abs() < 1e-10,
+                    "{offset} {blocks}"
+                );
             }
             // A block of two phases is twice as many points; both phases go around alike.
             let twice: Vec<Point> = points.iter().flat_map(|p| [[p[0] + 9.0, p[1]], *p]).collect();
             let turns = around(&twice, &[], &[[2.0, 1.0], [11.0, 1.0]], 4);
             for (blocks, gap) in [(1, 0.65), (2, 0.15)] {
-                assert!((turns.largest_gap(blocks).unwrap() - gap).abs() < 1e-10, "{offset} {blocks}");
+                assert!(
+                    (turns.largest_gap(blocks).unwrap() - gap).abs() < 1e-10,
+                    "{offset} {blocks}"
+                );
             }
         }
     }
@@ -525,25 +599,43 @@ mod tests {
     #[test]
     fn a_ring_is_as_thick_as_it_is_uneven() {
         let ring = |r: &dyn Fn(i32) -> f64| -> Vec<Point> {
-            (0..80).map(|i| (r(i), TAU * 0.075 * f64::from(i))).map(|(r, a)| [1.0 + r * cos(a), r * sin(a)]).collect()
+            (0..80)
+                .map(|i| (r(i), TAU * 0.075 * f64::from(i)))
+                .map(|(r, a)| [1.0 + r * cos(a), r * sin(a)])
+                .collect()
         };
         let of = |points: &[Point]| around(points, &[], &[[1.0, 0.0]], 40).ring(40, 80);
         assert!(of(&ring(&|_| 0.3)).thickness < 1e-10);
         // Neighbours differ by twice 0.01 in the logarithm of their distance.
         let uneven = of(&ring(&|i| if i % 2 == 0 { 0.3 * 1.01 } else { 0.3 / 1.01 }));
-        assert!((uneven.thickness / (0.01 * std::f64::consts::SQRT_2) - 1.0).abs() < 0.04, "{}", uneven.thickness);
+        assert!(
+            (uneven.thickness / (0.01 * std::f64::consts::SQRT_2) - 1.0).abs() < 0.04,
+            "{}",
+            uneven.thickness
+        );
         assert!((uneven.largest - 0.303).abs() < 1e-12);
         // A spiral is smooth: its trend does not count. Its ends are tenths, four points each.
         let spiral = of(&ring(&|i| twofold_num::elementary::exp(-0.01 * f64::from(i))));
         assert!(spiral.thickness < 0.02, "{}", spiral.thickness);
-        assert!((spiral.ends[0] + 0.415).abs() < 1e-12 && (spiral.ends[1] + 0.775).abs() < 1e-12, "{:?}", spiral.ends);
+        assert!(
+            (spiral.ends[0] + 0.415).abs() < 1e-12 && (spiral.ends[1] + 0.775).abs() < 1e-12,
+            "{:?}",
+            spiral.ends
+        );
         // On a line it is judged by time.
-        let line = at(&std::array::from_fn::<f64, 40, _>(|i| if i % 2 == 0 { 0.3 * 1.01 } else { 0.3 / 1.01 }));
+        let line = at(&std::array::from_fn::<f64, 40, _>(|i| {
+            if i % 2 == 0 { 0.3 * 1.01 } else { 0.3 / 1.01 }
+        }));
         let three: Vec<Point> = (0..42).map(|i| [[0.3, 0.5, 0.7][i % 3], 0.0]).collect();
         assert!(around(&three, &[], &[[0.0; 2]; 3], 14).ring(0, 42).thickness < 1e-12);
         let flat = around(&line, &[], &[[0.0; 2]], 40).ring(0, 40);
-        assert!((flat.thickness / (0.01 * std::f64::consts::SQRT_2) - 1.0).abs() < 0.01, "{}", flat.thickness);
-        // The last of three phases on an uneven line, the others on smooth rings: a third of the squares is the line's.
+        assert!(
+            (flat.thickness / (0.01 * std::f64::consts::SQRT_2) - 1.0).abs() < 0.01,
+            "{}",
+            flat.thickness
+        );
+        // The last of three phases on an uneven line, the others on smooth rings: a third of the
+        // squares is the line's.
         let mixed: Vec<Point> = (0..42)
             .map(|i| {
                 let (turn, a) = (i / 3, TAU * f64::from(i / 3) * 3.0 / 14.0);
@@ -555,7 +647,11 @@ mod tests {
             .collect();
         let centres = [[0.0, 0.0], [18.0, 0.0], [9.0, 0.0]];
         let mixed = around(&mixed, &[], &centres, 14).ring(0, 42);
-        assert!((mixed.thickness / (0.01 * sqrt(2.0 / 3.0)) - 1.0).abs() < 0.02, "{}", mixed.thickness);
+        assert!(
+            (mixed.thickness / (0.01 * sqrt(2.0 / 3.0)) - 1.0).abs() < 0.02,
+            "{}",
+            mixed.thickness
+        );
     }
 
     #[test]
@@ -570,9 +666,12 @@ mod tests {
     fn a_capture_begins_where_the_run_comes_near_and_settles_where_it_stays() {
         let th = Thresholds::default();
         let captured = |distances: &[f64]| {
-            around(&at(distances), &[], &[[0.0; 2]], 10).captured(1.0, &th).map(|c| (c.from, c.blocks, c.settled))
+            around(&at(distances), &[], &[[0.0; 2]], 10)
+                .captured(1.0, &th)
+                .map(|c| (c.from, c.blocks, c.settled))
         };
-        // Far, near for a block, in the dot: the block before joins the dots, the one before that joins nothing.
+        // Far, near for a block, in the dot: the block before joins the dots, the one before that
+        // joins nothing.
         let run = |far: usize, near: usize, n: usize| -> Vec<f64> {
             let fall = |i: usize| 0.09 / f64::from(1_u32 << (i - far).min(20));
             (0..n)
@@ -587,7 +686,10 @@ mod tests {
                 })
                 .collect()
         };
-        assert_eq!(captured(&[vec![0.5; 30], vec![0.05; 10], vec![1e-3; 60]].concat()), Some((30, 7, Some(40))));
+        assert_eq!(
+            captured(&[vec![0.5; 30], vec![0.05; 10], vec![1e-3; 60]].concat()),
+            Some((30, 7, Some(40)))
+        );
         // An approach within one block, followed point by point.
         assert_eq!(captured(&run(25, 6, 100)), Some((25, 6, Some(31))));
         // Too few in the dot to have settled; a block that joins.
@@ -610,7 +712,8 @@ mod tests {
         let mut distances = [0.05; 51];
         (distances[20], distances[30]) = (0.11, 0.1);
         let from = |d: &[f64]| around(&at(d), &[], &[[0.0; 2]], 10).cloud(1.0, &th).map(|c| c.from);
-        // Thirty points of a phase are a window; as far out as the linear neighbourhood reaches is still in it.
+        // Thirty points of a phase are a window; as far out as the linear neighbourhood reaches is
+        // still in it.
         assert_eq!((from(&distances), from(&distances[..50])), (Some(21), None));
         assert_eq!(from(&distances[21..]), Some(0));
         let points = at(&distances);
@@ -620,41 +723,57 @@ mod tests {
     #[test]
     fn an_approach_is_fitted_down_to_the_floor() {
         let exp = twofold_num::elementary::exp;
-        // exp(-0.2 i) to i = 50; then, in the last half of what is settled, 25 values whose ninetieth percentile is 22e-4.
-        let mut distances: Vec<f64> = (0..100).map(|i| if i < 50 { exp(-0.2 * f64::from(i)) } else { 0.5 }).collect();
+        // exp(-0.2 i) to i = 50; then, in the last half of what is settled, 25 values whose
+        // ninetieth percentile is 22e-4.
+        let mut distances: Vec<f64> =
+            (0..100).map(|i| if i < 50 { exp(-0.2 * f64::from(i)) } else { 0.5 }).collect();
         (0..25).for_each(|k| distances[75 + (7 * k) % 25] = 1e-4 * (k + 1) as f64);
         let times: Vec<f64> = (0..100).map(|i| 10.0 + 3.0 * f64::from(i)).collect();
         let points = at(&distances);
         let captured = Captured { from: 5, blocks: 0, settled: Some(50) };
         let rate = around(&points, &times, &[[0.0; 2]], 10).approach(&captured).unwrap();
         // exp(-0.2 i) > 66e-4 up to i = 25.
-        assert!((rate.per_time - 0.2 / 3.0).abs() < 1e-12 && rate.standard_error < 1e-12, "{rate:?}");
+        assert!(
+            (rate.per_time - 0.2 / 3.0).abs() < 1e-12 && rate.standard_error < 1e-12,
+            "{rate:?}"
+        );
         assert_eq!((rate.from, rate.to), (25.0, 85.0));
-        // Two phases at different distances: their root mean square, at the time of the turn's middle; no floor.
-        let two: Vec<f64> = (0..40).map(|i| exp(-0.1 * f64::from(i / 2)) * [3.0, 1.0][i as usize % 2]).collect();
+        // Two phases at different distances: their root mean square, at the time of the turn's
+        // middle; no floor.
+        let two: Vec<f64> =
+            (0..40).map(|i| exp(-0.1 * f64::from(i / 2)) * [3.0, 1.0][i as usize % 2]).collect();
         let points = at(&two);
         let captured = Captured { from: 0, blocks: 0, settled: None };
         let rate = around(&points, &times[..40], &[[0.0; 2]; 2], 10).approach(&captured).unwrap();
         assert!((rate.per_time - 0.1 / 6.0).abs() < 1e-12, "{rate:?}");
         assert_eq!((rate.from, rate.to), (13.0, 10.0 + 3.0 * 39.0));
         // A floor of three times 0.01: exp(-0.2 turn), in either phase, is above it up to turn 17.
-        let floored: Vec<f64> = (0..100).map(|i| if i < 50 { exp(-0.2 * f64::from(i / 2)) } else { 0.01 }).collect();
+        let floored: Vec<f64> =
+            (0..100).map(|i| if i < 50 { exp(-0.2 * f64::from(i / 2)) } else { 0.01 }).collect();
         let settled = Captured { from: 0, blocks: 0, settled: Some(50) };
         let rate = around(&at(&floored), &times, &[[0.0; 2]; 2], 10).approach(&settled).unwrap();
-        assert!((rate.per_time - 0.2 / 6.0).abs() < 1e-12 && rate.to == 10.0 + 3.0 * 35.0, "{rate:?}");
+        assert!(
+            (rate.per_time - 0.2 / 6.0).abs() < 1e-12 && rate.to == 10.0 + 3.0 * 35.0,
+            "{rate:?}"
+        );
         // A point on the centre ends the fit, and fewer than three turns are none.
         let mut ends = two.clone();
         (ends[6], ends[7]) = (0.0, 0.0);
-        let of = |d: &[f64]| around(&at(d), &times[..d.len()], &[[0.0; 2]; 2], 10).approach(&captured);
+        let of =
+            |d: &[f64]| around(&at(d), &times[..d.len()], &[[0.0; 2]; 2], 10).approach(&captured);
         assert_eq!(of(&ends).unwrap().to, 10.0 + 3.0 * 5.0);
         assert!(of(&ends[2..]).is_none());
     }
 
     #[test]
     fn a_turns_radius_and_duration_are_those_of_the_last_block() {
-        // Twenty turns of two points, a quarter of a time unit apart in the last ten, a whole one before.
-        let times: Vec<f64> = (0..40).map(|i| if i < 20 { f64::from(i) } else { 15.0 + 0.25 * f64::from(i) }).collect();
-        let distances: Vec<f64> = (0..40).map(|i| if i < 20 { 9.0 } else { [1.0, 3.0][i % 2] }).collect();
+        // Twenty turns of two points, a quarter of a time unit apart in the last ten, a whole one
+        // before.
+        let times: Vec<f64> = (0..40)
+            .map(|i| if i < 20 { f64::from(i) } else { 15.0 + 0.25 * f64::from(i) })
+            .collect();
+        let distances: Vec<f64> =
+            (0..40).map(|i| if i < 20 { 9.0 } else { [1.0, 3.0][i % 2] }).collect();
         let points = at(&distances);
         let of = |block: usize| around(&points, &times, &[[0.0; 2]; 2], block);
         assert_eq!((of(9).duration(), of(10).radius()), (0.5, 2.0));
@@ -667,14 +786,16 @@ mod tests {
     fn phases_that_move_on_drift() {
         let th = Thresholds::default();
         // The means of the halves differ by the step; half a spread is the limit.
-        let step =
-            |by: f64| -> Vec<Point> { (0..60).map(|i| if i < 40 { [1.0, 2.0] } else { [1.0, 2.0 + by] }).collect() };
+        let step = |by: f64| -> Vec<Point> {
+            (0..60).map(|i| if i < 40 { [1.0, 2.0] } else { [1.0, 2.0 + by] }).collect()
+        };
         assert!(drifts(&step(0.26), 1, 40, 0.5, &th) && !drifts(&step(0.24), 1, 40, 0.5, &th));
         assert!(drifts(&step(1.3), 1, 40, 2.5, &th) && !drifts(&step(1.2), 1, 40, 2.5, &th));
         // Beyond the window no test applies.
         assert!(!drifts(&step(9.0), 1, 20, 0.5, &th));
         // One of two phases is enough.
-        let one: Vec<Point> = (0..60).map(|i| if i < 40 || i % 2 == 0 { [1.0, 2.0] } else { [1.3, 2.0] }).collect();
+        let one: Vec<Point> =
+            (0..60).map(|i| if i < 40 || i % 2 == 0 { [1.0, 2.0] } else { [1.3, 2.0] }).collect();
         assert!(drifts(&one, 2, 40, 0.5, &th) && !drifts(&one, 2, 40, 0.7, &th));
     }
 
@@ -684,7 +805,10 @@ mod tests {
         let mut points = vec![[90.0, 90.0]; 3];
         (0..5).for_each(|i| points.extend([[1.0, 0.1 * f64::from(i)], [0.0, 5.0]]));
         let (centres, spreads) = other_dots(&points, 2, 5);
-        assert!(distance(&centres[0], &[0.0, 5.0]) + distance(&centres[1], &[1.0, 0.2]) < 1e-12, "{centres:?}");
+        assert!(
+            distance(&centres[0], &[0.0, 5.0]) + distance(&centres[1], &[1.0, 0.2]) < 1e-12,
+            "{centres:?}"
+        );
         assert!(spreads[0] < 1e-12 && (spreads[1] - 0.2).abs() < 1e-12, "{spreads:?}");
         assert_eq!(other_dots(&points, 2, 50).0.len(), 2);
         assert!(other_dots(&points[..1], 2, 5).0.is_empty());
@@ -702,15 +826,17 @@ mod tests {
     fn found(points: &[Point], extent: f64) -> (usize, Vec<f64>, usize) {
         let turns = Turns::find(points, &[], extent, &Thresholds::default());
         let n = points.len();
-        let from_centres = (0..n).map(|i| distance(&points[i], &turns.centres[(n - 1 - i) % turns.period]));
+        let from_centres =
+            (0..n).map(|i| distance(&points[i], &turns.centres[(n - 1 - i) % turns.period]));
         assert_eq!(turns.distances, from_centres.collect::<Vec<_>>());
         (turns.period, turns.spreads, turns.block)
     }
 
     #[test]
     fn the_last_part_of_a_run_decides_and_a_block_is_a_tenth_of_its_turns() {
-        // The last quarter, of short runs thirty points at least, of long ones six hundred at most. On a ring that turns by the golden ratio, in whose last
-        // part the first two fifths are half as far out again as the rest; before it, twice as far.
+        // The last quarter, of short runs thirty points at least, of long ones six hundred at most.
+        // On a ring that turns by the golden ratio, in whose last part the first two fifths are
+        // half as far out again as the rest; before it, twice as far.
         for (n, window, block) in [(100, 30, 10), (1000, 250, 100), (4000, 600, 200)] {
             let points: Vec<Point> = (0..n)
                 .map(|i| {
@@ -733,21 +859,36 @@ mod tests {
 
     #[test]
     fn dots_are_as_many_as_stay_apart() {
-        let dots = |n: usize, places: &[Point]| -> Vec<Point> { (0..n).map(|i| places[i % places.len()]).collect() };
-        let six = |near: f64| [[0.0, 0.0], [1.0, 0.0], [1.0, near], [0.0, 1.0], [0.5, 2.0], [-0.5, 1.0]];
-        // 120 points of six dots are too few for a window of thirty each, and enough turns all the same; 1000 are enough.
+        let dots = |n: usize, places: &[Point]| -> Vec<Point> {
+            (0..n).map(|i| places[i % places.len()]).collect()
+        };
+        let six =
+            |near: f64| [[0.0, 0.0], [1.0, 0.0], [1.0, near], [0.0, 1.0], [0.5, 2.0], [-0.5, 1.0]];
+        // 120 points of six dots are too few for a window of thirty each, and enough turns all the
+        // same; 1000 are enough.
         for (n, block) in [(120, 10), (1000, 16)] {
             // A dot is 0.002 of the extent, and two must fit between two of them: 0.008.
             let (period, spreads, blocks) = found(&dots(n, &six(0.009)), 2.0);
-            assert!((period, blocks) == (6, block) && spreads.iter().all(|s| *s < 1e-15), "{n}: {period} {spreads:?}");
+            assert!(
+                (period, blocks) == (6, block) && spreads.iter().all(|s| *s < 1e-15),
+                "{n}: {period} {spreads:?}"
+            );
             assert_eq!(found(&dots(n, &six(0.007)), 2.0).0, 1);
         }
         // Five turns within the last half are needed: of six dots, 60 points.
-        assert_eq!((found(&dots(59, &six(0.5)), 2.0).0, found(&dots(60, &six(0.5)), 2.0).0), (1, 6));
+        assert_eq!(
+            (found(&dots(59, &six(0.5)), 2.0).0, found(&dots(60, &six(0.5)), 2.0).0),
+            (1, 6)
+        );
         // Two clusters, each to and fro: three radii of the wider one must lie between them.
         for (radius, period) in [(0.32, 2), (0.35, 1)] {
             let points: Vec<Point> = (0..1000)
-                .map(|i| [f64::from(i % 2), if i / 2 % 2 == 0 { radius } else { -radius } * f64::from(i % 2)])
+                .map(|i| {
+                    [
+                        f64::from(i % 2),
+                        if i / 2 % 2 == 0 { radius } else { -radius } * f64::from(i % 2),
+                    ]
+                })
                 .collect();
             assert_eq!(found(&points, 1.5).0, period, "{radius}");
         }
@@ -763,7 +904,8 @@ mod tests {
                 })
                 .collect()
         };
-        // Next to a resonance each of five phases goes along the ring; around it each turns about its centre.
+        // Next to a resonance each of five phases goes along the ring; around it each turns about
+        // its centre.
         assert_eq!(found(&five(4000, 1e-4, 0.0), 3.0).0, 1);
         assert_eq!(found(&five(4000, 0.0, 0.05), 3.0).0, 5);
     }

@@ -1,5 +1,6 @@
-//! Divergence of nearest neighbours: the largest exponent of a return map from its points alone (Rosenstein, Collins & De Luca
-//! 1993, Physica D 65, 117-134; Kantz 1994, Phys. Lett. A 185, 77-87), and their forecast skill (Farmer & Sidorowich 1987).
+//! Divergence of nearest neighbours: the largest exponent of a return map from its points alone
+//! (Rosenstein, Collins & De Luca 1993, Physica D 65, 117-134; Kantz 1994, Phys. Lett. A 185,
+//! 77-87), and their forecast skill (Farmer & Sidorowich 1987).
 //!
 //! A section of a three-dimensional flow is a map of the plane, so its points need no embedding.
 
@@ -10,10 +11,11 @@ use twofold_num::fit::{line, mean, median};
 
 /// Returns followed.
 const HORIZON: usize = 12;
-/// Neighbours closer in time than this are on one strand of the orbit, not neighbours (Theiler 1986).
+/// Neighbours closer in time than this are on one strand of the orbit, not neighbours (Theiler
+/// 1986).
 const THEILER: usize = 12;
-/// The fit ends when the mean distance has reached this share of the mean distance of unrelated points: from there on
-/// distances saturate.
+/// The fit ends when the mean distance has reached this share of the mean distance of unrelated
+/// points: from there on distances saturate.
 const SATURATION: f64 = 0.15;
 /// Parts of the data whose slopes are compared to give a standard error.
 const PARTS: usize = 8;
@@ -31,13 +33,13 @@ pub struct Divergence {
     pub per_time: f64,
     /// Returns that the fit covers, before distances saturate.
     pub returns_fitted: usize,
-    /// 1 - (median distance of the images of neighbours)/(median distance of unrelated points): 1 for a deterministic map seen
-    /// finely, 0 for independent random points.
+    /// 1 - (median distance of the images of neighbours)/(median distance of unrelated points): 1
+    /// for a deterministic map seen finely, 0 for independent random points.
     pub skill: f64,
 }
 
-/// Nearest-neighbour statistics of the consecutive points `p` of a return map with mean return time `return_time`; `None`
-/// below 200 points.
+/// Nearest-neighbour statistics of the consecutive points `p` of a return map with mean return time
+/// `return_time`; `None` below 200 points.
 pub fn divergence(p: &[[f64; 2]], return_time: f64) -> Option<Divergence> {
     let p = &p[p.len().saturating_sub(MOST_POINTS)..];
     if p.len() < 200 {
@@ -72,12 +74,22 @@ pub fn divergence(p: &[[f64; 2]], return_time: f64) -> Option<Divergence> {
     let whole = curve(&pairs);
     let limit = ln(SATURATION * typical);
     let last = (1..=HORIZON).take_while(|&m| whole[m] < limit).last().unwrap_or(1).max(2);
-    // From the first return on: the search itself chose small distances at m = 0, a bias that the first image loses.
-    let slope = |c: &[f64]| line(&(1..=last).map(|m| (m as f64, c[m])).collect::<Vec<_>>()).map(|l| l.slope);
+    // From the first return on: the search itself chose small distances at m = 0, a bias that the
+    // first image loses.
+    let slope = |c: &[f64]| {
+        line(&(1..=last).map(|m| (m as f64, c[m])).collect::<Vec<_>>()).map(|l| l.slope)
+    };
     let per_return = slope(&whole)?;
-    let parts: Vec<f64> = pairs.chunks(pairs.len().div_ceil(PARTS)).filter_map(|c| slope(&curve(c))).collect();
+    let parts: Vec<f64> =
+        pairs.chunks(pairs.len().div_ceil(PARTS)).filter_map(|c| slope(&curve(c))).collect();
     let (_, standard_error) = mean(&parts);
-    Some(Divergence { per_return, standard_error, per_time: per_return / return_time, returns_fitted: last, skill })
+    Some(Divergence {
+        per_return,
+        standard_error,
+        per_time: per_return / return_time,
+        returns_fitted: last,
+        skill,
+    })
 }
 
 fn distance(a: &[f64; 2], b: &[f64; 2]) -> f64 {
@@ -85,8 +97,8 @@ fn distance(a: &[f64; 2], b: &[f64; 2]) -> f64 {
     sqrt(dx * dx + dy * dy)
 }
 
-/// For each point that has `HORIZON` images, its nearest neighbour that is not on the same strand; with points sorted into a grid of
-/// about one point a cell.
+/// For each point that has `HORIZON` images, its nearest neighbour that is not on the same strand;
+/// with points sorted into a grid of about one point a cell.
 fn nearest(p: &[[f64; 2]]) -> Option<Vec<(usize, usize)>> {
     let n = p.len() - HORIZON;
     let p = &p[..n];
@@ -103,8 +115,9 @@ fn nearest(p: &[[f64; 2]]) -> Option<Vec<(usize, usize)>> {
     }
     let side = (sqrt(n as f64) as usize).max(1);
     let width = extent / side as f64 * (1.0 + 1e-12);
-    let cell =
-        |q: &[f64; 2]| -> [usize; 2] { std::array::from_fn(|a| (((q[a] - low[a]) / width) as usize).min(side - 1)) };
+    let cell = |q: &[f64; 2]| -> [usize; 2] {
+        std::array::from_fn(|a| (((q[a] - low[a]) / width) as usize).min(side - 1))
+    };
     let mut cells = vec![Vec::new(); side * side];
     for (i, q) in p.iter().enumerate() {
         let [a, b] = cell(q);
@@ -155,7 +168,8 @@ mod tests {
             .skip(100)
             .collect();
         let d = divergence(&orbit, 1.0).unwrap();
-        // Largest exponent 0.4192 per iteration (e.g. Sprott 2003); the points alone give it to a tenth.
+        // Largest exponent 0.4192 per iteration (e.g. Sprott 2003); the points alone give it to a
+        // tenth.
         assert!((d.per_return - 0.4192).abs() < 0.045, "{d:?}");
         assert!(d.skill > 0.95, "{d:?}");
     }
@@ -183,7 +197,8 @@ mod tests {
 
     #[test]
     fn rates_are_per_return_and_per_time() {
-        // Doubling of the circle, exactly ln 2 a return, as a curve in the plane; the digits of chance keep it from ending at 0.
+        // Doubling of the circle, exactly ln 2 a return, as a curve in the plane; the digits of
+        // chance keep it from ending at 0.
         let mut r = RandomStream::new(9, 0);
         let mut x: f64 = 0.3;
         let orbit: Vec<[f64; 2]> = (0..4000)
@@ -203,7 +218,10 @@ mod tests {
         for unit in [1.0 / 1024.0, 1024.0] {
             let other: Vec<[f64; 2]> = orbit.iter().map(|p| p.map(|c| unit * c)).collect();
             let o = divergence(&other, 2.5).unwrap();
-            assert!((o.per_return - d.per_return).abs() < 1e-12 && o.skill == d.skill, "{d:?} {o:?}");
+            assert!(
+                (o.per_return - d.per_return).abs() < 1e-12 && o.skill == d.skill,
+                "{d:?} {o:?}"
+            );
             assert_eq!(o.returns_fitted, d.returns_fitted);
         }
     }
@@ -247,7 +265,8 @@ mod tests {
             assert_eq!(pairs.len(), n);
             for (i, j) in pairs {
                 let others = (0..n).filter(|k| k.abs_diff(i) > THEILER);
-                let least = others.map(|k| distance(&points[i], &points[k])).fold(f64::INFINITY, f64::min);
+                let least =
+                    others.map(|k| distance(&points[i], &points[k])).fold(f64::INFINITY, f64::min);
                 assert_eq!(distance(&points[i], &points[j]), least);
             }
         }

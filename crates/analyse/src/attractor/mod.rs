@@ -1,21 +1,27 @@
 //! What a run settles on, decided from its section.
 //!
-//! [`classify`] takes the points of a Poincare section and returns a [`Verdict`] with its [`Evidence`]. In order:
+//! [`classify`] takes the points of a Poincare section and returns a [`Verdict`] with its
+//! [`Evidence`]. In order:
 //!
-//! 1. Has the orbit stopped crossing (escaped), are there too few points, is it kicked (noisy by construction)?
-//! 2. Is the end of the run a closed orbit? Points of one direction are sorted modulo k for the longest k whose phases stay apart; the
-//!    run is then followed backwards from its end, block by block, as long as it stays in dots or on smooth closed curves around
-//!    them that join each other. That gives the time of capture (before it lies the transient) and, from ln(distance), the
-//!    rate of approach. A spread-out end must also pass the 0-1 test (Gottwald & Melbourne 2009).
-//! 3. Otherwise it is irregular or a ring that does not surround its mean: the 0-1 test, the divergence of nearest neighbours
-//!    (Rosenstein et al. 1993) and, when given, the largest exponent from the variational equation
-//!    ([`lyapunov`](super::lyapunov)) decide by majority; a tie, or an exponent consistent with zero where the points look irregular, is
+//! 1. Has the orbit stopped crossing (escaped), are there too few points, is it kicked (noisy by
+//!    construction)?
+//! 2. Is the end of the run a closed orbit? Points of one direction are sorted modulo k for the
+//!    longest k whose phases stay apart; the run is then followed backwards from its end, block by
+//!    block, as long as it stays in dots or on smooth closed curves around them that join each
+//!    other. That gives the time of capture (before it lies the transient) and, from ln(distance),
+//!    the rate of approach. A spread-out end must also pass the 0-1 test (Gottwald & Melbourne
+//!    2009).
+//! 3. Otherwise it is irregular or a ring that does not surround its mean: the 0-1 test, the
+//!    divergence of nearest neighbours (Rosenstein et al. 1993) and, when given, the largest
+//!    exponent from the variational equation ([`lyapunov`](super::lyapunov)) decide by majority; a
+//!    tie, or an exponent consistent with zero where the points look irregular, is
 //!    [`Verdict::Undecided`].
 //!
 //! Every limit is in [`Thresholds`].
 //!
-//! Why not the exponent alone? Because systems near a two-fold spiral at rates of 1e-5 to 1e-4 per unit time: over 10^5 the
-//! exponent of such a run cannot be told from zero, while its points say plainly what it does.
+//! Why not the exponent alone? Because systems near a two-fold spiral at rates of 1e-5 to 1e-4 per
+//! unit time: over 10^5 the exponent of such a run cannot be told from zero, while its points say
+//! plainly what it does.
 
 mod cycle;
 mod divergence;
@@ -60,7 +66,11 @@ pub struct Question<'a> {
 }
 
 /// Decides what the run with this section (in time order, both directions) settles on.
-pub fn classify(section: &[SectionPoint], question: &Question<'_>, thresholds: &Thresholds) -> Evidence {
+pub fn classify(
+    section: &[SectionPoint],
+    question: &Question<'_>,
+    thresholds: &Thresholds,
+) -> Evidence {
     let th = thresholds;
     // The direction with more points is counted; upward if equal or one apart.
     let ups = section.iter().filter(|p| p.upward).count();
@@ -95,7 +105,11 @@ pub fn classify(section: &[SectionPoint], question: &Question<'_>, thresholds: &
         || question.t_end.is_some_and(|end| end - last > th.silence * return_time)
     {
         Verdict::Escaped { last_crossing: last }
-    } else if points.len() < th.fewest_points || !extent.is_finite() || extent <= 0.0 || return_time.is_nan() {
+    } else if points.len() < th.fewest_points
+        || !extent.is_finite()
+        || extent <= 0.0
+        || return_time.is_nan()
+    {
         Verdict::TooFew { points: points.len() }
     } else if question.kicked {
         noisy(section, question, th, &split, &mut evidence)
@@ -111,7 +125,8 @@ pub fn classify(section: &[SectionPoint], question: &Question<'_>, thresholds: &
     evidence
 }
 
-/// One direction's points and times, the other direction's points, and which direction the first is.
+/// One direction's points and times, the other direction's points, and which direction the first
+/// is.
 struct Split {
     points: Vec<[f64; 2]>,
     times: Vec<f64>,
@@ -140,15 +155,26 @@ fn noisy(
     Verdict::Noisy { contrast, around }
 }
 
-fn deterministic(split: &Split, question: &Question<'_>, th: &Thresholds, evidence: &mut Evidence) -> Verdict {
+fn deterministic(
+    split: &Split,
+    question: &Question<'_>,
+    th: &Thresholds,
+    evidence: &mut Evidence,
+) -> Verdict {
     let Split { points, times, .. } = split;
     let extent = evidence.extent;
     let turns = Turns::find(points, times, extent, th);
     let captured = turns.captured(extent, th);
-    // Of a spread-out end, as much as the 0-1 test needs; of one phase only, because hopping between phases is not what is asked.
+    // Of a spread-out end, as much as the 0-1 test needs; of one phase only, because hopping
+    // between phases is not what is asked.
     let tail = |from: usize, stride: usize| -> Option<f64> {
-        let used: Vec<f64> =
-            points[from..].iter().rev().step_by(stride).take(th.zero_one_points).map(|u| u[0] + 0.5 * u[1]).collect();
+        let used: Vec<f64> = points[from..]
+            .iter()
+            .rev()
+            .step_by(stride)
+            .take(th.zero_one_points)
+            .map(|u| u[0] + 0.5 * u[1])
+            .collect();
         zero_one(&used)
     };
     if let Some(c) = captured {
@@ -166,7 +192,8 @@ fn deterministic(split: &Split, question: &Question<'_>, th: &Thresholds, eviden
             if approaches {
                 return Verdict::Spiralling(cycle);
             }
-            // A ring surrounds its centre; points on a line through it, or a few clusters around it, are something else.
+            // A ring surrounds its centre; points on a line through it, or a few clusters around
+            // it, are something else.
             if turns.largest_gap(c.blocks).is_some_and(|gap| gap < th.ring_gap) {
                 return Verdict::QuasiPeriodic(cycle);
             }
@@ -188,12 +215,16 @@ fn deterministic(split: &Split, question: &Question<'_>, th: &Thresholds, eviden
     if yes + no == 0 {
         Verdict::TooFew { points: points.len() }
     } else if yes > no && exponent != Some(false) {
-        Verdict::Chaotic { lyapunov: question.lyapunov, bands: occupancy::bands(&points[points.len() / 2..], th) }
+        Verdict::Chaotic {
+            lyapunov: question.lyapunov,
+            bands: occupancy::bands(&points[points.len() / 2..], th),
+        }
     } else if no > yes {
         let whole = Captured { from: 0, blocks: 0, settled: None };
         Verdict::QuasiPeriodic(describe(&turns, &whole, split, th))
     } else {
-        // A tie, or points that look irregular beside an exponent that is not above zero: neither is claimed.
+        // A tie, or points that look irregular beside an exponent that is not above zero: neither
+        // is claimed.
         Verdict::Undecided { lyapunov: question.lyapunov }
     }
 }
@@ -202,7 +233,12 @@ fn describe(turns: &Turns<'_>, captured: &Captured, split: &Split, th: &Threshol
     let Split { times, other, upward, .. } = split;
     let dots = |centres: &[[f64; 2]], spreads: &[f64], upward: bool| -> Vec<CyclePoint> {
         // Phases count backwards; the list goes with the motion.
-        centres.iter().zip(spreads).rev().map(|(u, s)| CyclePoint { u: *u, upward, spread: *s }).collect()
+        centres
+            .iter()
+            .zip(spreads)
+            .rev()
+            .map(|(u, s)| CyclePoint { u: *u, upward, spread: *s })
+            .collect()
     };
     let mut list = dots(&turns.centres, &turns.spreads, *upward);
     let (centres, spreads) = cycle::other_dots(other, turns.period, th.points_per_phase);
@@ -219,8 +255,8 @@ fn describe(turns: &Turns<'_>, captured: &Captured, split: &Split, th: &Threshol
     }
 }
 
-/// Diagonal of the box around all points and the origin of the plane, so that a run that is one dot from its first crossing on still
-/// has a scale.
+/// Diagonal of the box around all points and the origin of the plane, so that a run that is one dot
+/// from its first crossing on still has a scale.
 fn extent(section: &[SectionPoint]) -> f64 {
     let (mut low, mut high) = ([0.0_f64; 2], [0.0_f64; 2]);
     for p in section {
@@ -237,19 +273,34 @@ mod tests {
     use super::*;
     use twofold_num::random::RandomStream;
 
-    fn judge(points: impl IntoIterator<Item = [f64; 2]>, upward: impl Fn(usize) -> bool) -> Evidence {
+    fn judge(
+        points: impl IntoIterator<Item = [f64; 2]>,
+        upward: impl Fn(usize) -> bool,
+    ) -> Evidence {
         let points = points.into_iter().enumerate();
-        let section: Vec<_> = points.map(|(i, u)| SectionPoint { t: i as f64, u, upward: upward(i) }).collect();
+        let section: Vec<_> =
+            points.map(|(i, u)| SectionPoint { t: i as f64, u, upward: upward(i) }).collect();
         classify(&section, &Question::default(), &Thresholds::default())
     }
 
     #[test]
     fn the_extent_is_that_of_all_points_and_the_origin() {
         let of = |points: &[[f64; 2]]| {
-            extent(&points.iter().map(|u| SectionPoint { t: 0.0, u: *u, upward: true }).collect::<Vec<_>>())
+            extent(
+                &points
+                    .iter()
+                    .map(|u| SectionPoint { t: 0.0, u: *u, upward: true })
+                    .collect::<Vec<_>>(),
+            )
         };
-        assert_eq!((of(&[]), of(&[[3.0, 4.0]]), of(&[[-3.0, -4.0], [-1.0, -2.0]])), (0.0, 5.0, 5.0));
-        assert_eq!(of(&[[-1.0, 7.0], [2.0, 3.0], [1.0, 11.0], [0.0, -1.0 - 1e-99]]), of(&[[-1.0, -1.0], [2.0, 11.0]]));
+        assert_eq!(
+            (of(&[]), of(&[[3.0, 4.0]]), of(&[[-3.0, -4.0], [-1.0, -2.0]])),
+            (0.0, 5.0, 5.0)
+        );
+        assert_eq!(
+            of(&[[-1.0, 7.0], [2.0, 3.0], [1.0, 11.0], [0.0, -1.0 - 1e-99]]),
+            of(&[[-1.0, -1.0], [2.0, 11.0]])
+        );
     }
 
     #[test]
@@ -261,23 +312,35 @@ mod tests {
             let e = judge(steps(40).chain([broken]), up);
             assert!(matches!(e.verdict, Verdict::Escaped { last_crossing: 40.0 }), "{e:?}");
         }
-        // Nineteen points; forty in the origin; forty too far apart to be measured; forty at one moment.
+        // Nineteen points; forty in the origin; forty too far apart to be measured; forty at one
+        // moment.
         assert!(matches!(judge(steps(19), up).verdict, Verdict::TooFew { points: 19 }));
         assert!(matches!(judge([[0.0; 2]; 40], up).verdict, Verdict::TooFew { points: 40 }));
-        assert!(matches!(judge(steps(40).map(|u| u.map(|c| 1e200 * c)), up).verdict, Verdict::TooFew { points: 40 }));
+        assert!(matches!(
+            judge(steps(40).map(|u| u.map(|c| 1e200 * c)), up).verdict,
+            Verdict::TooFew { points: 40 }
+        ));
         let once: Vec<_> = steps(40).map(|u| SectionPoint { t: 1.0, u, upward: true }).collect();
         let e = classify(&once, &Question::default(), &Thresholds::default());
-        assert!(matches!(e.verdict, Verdict::TooFew { points: 40 }) && e.return_time.is_nan(), "{e:?}");
+        assert!(
+            matches!(e.verdict, Verdict::TooFew { points: 40 }) && e.return_time.is_nan(),
+            "{e:?}"
+        );
     }
 
     #[test]
     fn the_direction_with_more_points_is_counted_and_upward_if_in_doubt() {
-        // Of 60 dots, so many upwards at (1, 2) and the others downwards at (2, 1): the counted dots come first.
+        // Of 60 dots, so many upwards at (1, 2) and the others downwards at (2, 1): the counted
+        // dots come first.
         for (ups, first) in [(40, true), (30, true), (29, false), (20, false)] {
             let points = (0..60).map(|i| if i < ups { [1.0, 2.0] } else { [2.0, 1.0] });
             let e = judge(points, |i| i < ups);
             let cycle = e.verdict.cycle().unwrap();
-            assert_eq!((cycle.period, cycle.points.len(), cycle.points[0].upward), (1, 2, first), "{ups}: {e:?}");
+            assert_eq!(
+                (cycle.period, cycle.points.len(), cycle.points[0].upward),
+                (1, 2, first),
+                "{ups}: {e:?}"
+            );
             for p in &cycle.points {
                 assert_eq!(p.u, if p.upward { [1.0, 2.0] } else { [2.0, 1.0] });
             }
@@ -290,8 +353,9 @@ mod tests {
     #[test]
     fn a_run_that_crosses_no_more_has_escaped() {
         // Every two units of time until 80: thirty returns later is 140.
-        let section: Vec<_> =
-            (0..41).map(|i| SectionPoint { t: 2.0 * f64::from(i), u: [1.0, 2.0], upward: true }).collect();
+        let section: Vec<_> = (0..41)
+            .map(|i| SectionPoint { t: 2.0 * f64::from(i), u: [1.0, 2.0], upward: true })
+            .collect();
         for (end, name) in [(139.0, "periodic"), (141.0, "escaped")] {
             let question = Question { t_end: Some(end), ..Question::default() };
             let e = classify(&section, &question, &Thresholds::default());
@@ -301,15 +365,21 @@ mod tests {
 
     #[test]
     fn a_picture_is_mixed_if_it_shows_what_was_before_the_capture() {
-        // One dot from the first crossing on, at t = 0; around it kicks hold the run in a cloud, which is never
-        // settled.
-        let dot: Vec<_> = (0..60).map(|i| SectionPoint { t: f64::from(i), u: [1.0, 2.0], upward: true }).collect();
+        // One dot from the first crossing on, at t = 0; around it kicks hold the run in a cloud,
+        // which is never settled.
+        let dot: Vec<_> = (0..60)
+            .map(|i| SectionPoint { t: f64::from(i), u: [1.0, 2.0], upward: true })
+            .collect();
         for kicked in [false, true] {
             for (shown_from, mixed) in [(-1.0, true), (0.0, false), (10.0, false)] {
                 let question = Question { shown_from, kicked, ..Question::default() };
                 let e = classify(&dot, &question, &Thresholds::default());
                 assert_eq!(e.verdict.cycle().map(|c| c.captured_at), Some(0.0), "{e:?}");
-                assert_eq!((e.mixed, e.dots_only), (mixed, !mixed && !kicked), "{shown_from}: {e:?}");
+                assert_eq!(
+                    (e.mixed, e.dots_only),
+                    (mixed, !mixed && !kicked),
+                    "{shown_from}: {e:?}"
+                );
             }
         }
     }
@@ -327,7 +397,8 @@ mod tests {
 
     #[test]
     fn of_a_kicked_run_only_what_is_shown_is_compared() {
-        // A disc with a hole; in the first half of the run the points are in the hole, in the shown half never.
+        // A disc with a hole; in the first half of the run the points are in the hole, in the shown
+        // half never.
         let disc = |n: usize, stream: u64| -> Vec<[f64; 2]> {
             let mut r = RandomStream::new(5, stream);
             let mut points = Vec::new();
@@ -341,26 +412,43 @@ mod tests {
             points
         };
         let section = |points: Vec<[f64; 2]>| -> Vec<SectionPoint> {
-            points.into_iter().enumerate().map(|(i, u)| SectionPoint { t: i as f64, u, upward: true }).collect()
+            points
+                .into_iter()
+                .enumerate()
+                .map(|(i, u)| SectionPoint { t: i as f64, u, upward: true })
+                .collect()
         };
         let free: Vec<_> = (0..3).map(|k| section(disc(20_000, k))).collect();
         let hole = disc(2000, 9).into_iter().map(|u| u.map(|c| 0.3 * c)).collect::<Vec<_>>();
         let run = section([hole, disc(2000, 10)].concat());
-        let question = Question { kicked: true, shown_from: 2000.0, reference: Some(&free), ..Question::default() };
+        let question = Question {
+            kicked: true,
+            shown_from: 2000.0,
+            reference: Some(&free),
+            ..Question::default()
+        };
         let found = classify(&run, &question, &Thresholds::default());
-        let Verdict::Noisy { contrast: Some(contrast), .. } = found.verdict else { panic!("{found:?}") };
+        let Verdict::Noisy { contrast: Some(contrast), .. } = found.verdict else {
+            panic!("{found:?}")
+        };
         assert!(contrast.points == 2000 && contrast.value > 0.95, "{contrast:?}");
     }
 
     #[test]
     fn a_slow_spiral_is_a_ring_until_its_change_can_be_seen() {
         // Over 3000 turns the distance changes by 3 % and by 26 %; the run began long before.
-        for (gamma, name) in [(1e-5, "quasi-periodic"), (1e-4, "spiralling"), (-1e-4, "spiralling")] {
+        for (gamma, name) in [(1e-5, "quasi-periodic"), (1e-4, "spiralling"), (-1e-4, "spiralling")]
+        {
             let section: Vec<_> = (0..3000)
                 .map(|i| {
-                    let (r, a) = (0.2 * twofold_num::elementary::exp(-gamma * f64::from(i)), 2.3 * f64::from(i));
-                    let u =
-                        [0.4 + r * twofold_num::elementary::cos(a), 0.1 + 0.5 * r * twofold_num::elementary::sin(a)];
+                    let (r, a) = (
+                        0.2 * twofold_num::elementary::exp(-gamma * f64::from(i)),
+                        2.3 * f64::from(i),
+                    );
+                    let u = [
+                        0.4 + r * twofold_num::elementary::cos(a),
+                        0.1 + 0.5 * r * twofold_num::elementary::sin(a),
+                    ];
                     SectionPoint { t: 1e6 + f64::from(i), u, upward: true }
                 })
                 .collect();
@@ -372,7 +460,8 @@ mod tests {
             let text = serde_json::to_string(&e).unwrap();
             assert_eq!(serde_json::from_str::<Evidence>(&text).unwrap(), e);
             if gamma == 1e-4 {
-                // It is followed through fifteen blocks of 200 turns. Where more are asked for it is only regular.
+                // It is followed through fifteen blocks of 200 turns. Where more are asked for it
+                // is only regular.
                 let of = |fewest_blocks| {
                     let thresholds = Thresholds { fewest_blocks, ..Thresholds::default() };
                     classify(&section, &Question::default(), &thresholds).name
@@ -399,9 +488,17 @@ mod tests {
     fn what_tells_regular_from_irregular_is_weighed() {
         let exponent = |value: f64| Some(Exponent { value, standard_error: 0.01, duration: 1e3 });
         let verdict = |points: &[[f64; 2]], lyapunov| {
-            let section: Vec<_> =
-                points.iter().enumerate().map(|(i, u)| SectionPoint { t: i as f64, u: *u, upward: true }).collect();
-            classify(&section, &Question { lyapunov, ..Question::default() }, &Thresholds::default()).name
+            let section: Vec<_> = points
+                .iter()
+                .enumerate()
+                .map(|(i, u)| SectionPoint { t: i as f64, u: *u, upward: true })
+                .collect();
+            classify(
+                &section,
+                &Question { lyapunov, ..Question::default() },
+                &Thresholds::default(),
+            )
+            .name
         };
         let mut x = 0.4;
         let mut irregular = || {
@@ -411,8 +508,9 @@ mod tests {
         };
         let irregular: Vec<[f64; 2]> = (0..600).map(|_| irregular()).collect();
         // On a line there is no ring.
-        let regular: Vec<[f64; 2]> =
-            (0..600).map(|i| [1.0 + twofold_num::elementary::sin(2.0 * f64::from(i)), 0.0]).collect();
+        let regular: Vec<[f64; 2]> = (0..600)
+            .map(|i| [1.0 + twofold_num::elementary::sin(2.0 * f64::from(i)), 0.0])
+            .collect();
         // An exponent counts from three of its errors on.
         for (points, lyapunov, want) in [
             (&irregular[..], None, "chaotic"),
@@ -444,11 +542,15 @@ mod tests {
                 [x, y]
             })
             .collect();
-        let ring = (0..3000).map(|i| 2.3 * f64::from(i)).map(|a| [0.4 + 0.2 * cos(a), 0.1 + 0.1 * sin(a)]);
+        let ring =
+            (0..3000).map(|i| 2.3 * f64::from(i)).map(|a| [0.4 + 0.2 * cos(a), 0.1 + 0.1 * sin(a)]);
         let e = judge(chaos.into_iter().chain(ring), |_| true);
         let cycle = e.verdict.cycle().unwrap();
         // Known to within a block of turns.
-        assert!(e.name == "quasi-periodic" && (1000.0..1200.0).contains(&cycle.captured_at), "{e:?}");
+        assert!(
+            e.name == "quasi-periodic" && (1000.0..1200.0).contains(&cycle.captured_at),
+            "{e:?}"
+        );
         assert!((cycle.rotation.unwrap() - 2.3 / std::f64::consts::TAU).abs() < 1e-3, "{e:?}");
     }
 }

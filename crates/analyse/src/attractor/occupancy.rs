@@ -1,7 +1,8 @@
 //! Contrast between islands and sea, which noise reduces.
 //!
-//! Long-lived chaos of a conservative kind, or one that is nearly so, fills a sea around islands that it never enters. Noise lets the orbit leak into
-//! them, and in the end they are as dense as the sea. How much emptier the islands still are is the structure that is left.
+//! Long-lived chaos of a conservative kind, or one that is nearly so, fills a sea around islands
+//! that it never enters. Noise lets the orbit leak into them, and in the end they are as dense as
+//! the sea. How much emptier the islands still are is the structure that is left.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,9 +11,11 @@ use twofold_num::random::RandomStream;
 
 /// How much emptier than the sea the islands of noise-free runs are in a noisy one.
 ///
-/// The sea is every cell that a noise-free run visits; an island is a hole of several cells in it. With the densities of points per cell, the
-/// contrast is 1 - (density in islands)/(density in sea): 1 when no point is in an island, 0 when islands are as dense as the sea,
-/// negative when the run stays in islands. It is calibrated on the noise-free runs themselves, each against the sea of the others.
+/// The sea is every cell that a noise-free run visits; an island is a hole of several cells in it.
+/// With the densities of points per cell, the contrast is 1 - (density in islands)/(density in
+/// sea): 1 when no point is in an island, 0 when islands are as dense as the sea, negative when the
+/// run stays in islands. It is calibrated on the noise-free runs themselves, each against the sea
+/// of the others.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Contrast {
     /// The contrast.
@@ -31,16 +34,22 @@ pub struct Contrast {
     pub points: usize,
 }
 
-/// Blocks of time that are resampled: each far longer than the return time, and enough of them for an interval.
+/// Blocks of time that are resampled: each far longer than the return time, and enough of them for
+/// an interval.
 const BLOCKS: usize = 32;
 /// Resamples.
 const RESAMPLES: usize = 2000;
 /// The share of resamples beyond each end of an interval.
 const TAIL: f64 = 0.025;
 
-/// Compares `section` with the runs of `free`; `None` with fewer than two of those, few points, or no island among them. Directions are kept
-/// apart: a point that one section has going up and the other going down is not common to both.
-pub fn contrast(section: &[SectionPoint], free: &[Vec<SectionPoint>], thresholds: &Thresholds) -> Option<Contrast> {
+/// Compares `section` with the runs of `free`; `None` with fewer than two of those, few points, or
+/// no island among them. Directions are kept apart: a point that one section has going up and the
+/// other going down is not common to both.
+pub fn contrast(
+    section: &[SectionPoint],
+    free: &[Vec<SectionPoint>],
+    thresholds: &Thresholds,
+) -> Option<Contrast> {
     let all = || free.iter().flatten();
     if free.len() < 2 || section.len() < 100 || all().count() < 100 {
         return None;
@@ -65,7 +74,9 @@ pub fn contrast(section: &[SectionPoint], free: &[Vec<SectionPoint>], thresholds
     for i in 0..runs.len() {
         let others: Vec<[f64; 2]> =
             runs.iter().enumerate().filter(|(j, _)| *j != i).flat_map(|(_, r)| r.clone()).collect();
-        if let Some(one) = Map::of(&grid, &others, thresholds.island_cells).and_then(|m| m.contrast(&grid, &runs[i])) {
+        if let Some(one) = Map::of(&grid, &others, thresholds.island_cells)
+            .and_then(|m| m.contrast(&grid, &runs[i]))
+        {
             range = [range[0].min(one), range[1].max(one)];
         }
     }
@@ -73,20 +84,23 @@ pub fn contrast(section: &[SectionPoint], free: &[Vec<SectionPoint>], thresholds
         return None;
     }
     let length = section.len().div_ceil(BLOCKS);
-    let blocks: Vec<[f64; 2]> = section.chunks(length).map(|block| map.counts(&grid, block)).collect();
+    let blocks: Vec<[f64; 2]> =
+        section.chunks(length).map(|block| map.counts(&grid, block)).collect();
     let mut random = RandomStream::new(0x0b1, 0);
     let mut resampled: Vec<f64> = (0..RESAMPLES)
         .filter_map(|_| {
             let mut sum = [0.0; 2];
             for _ in 0..blocks.len() {
-                let block = blocks[((random.uniform() * blocks.len() as f64) as usize).min(blocks.len() - 1)];
+                let block = blocks
+                    [((random.uniform() * blocks.len() as f64) as usize).min(blocks.len() - 1)];
                 sum = [sum[0] + block[0], sum[1] + block[1]];
             }
             map.of_counts(sum)
         })
         .collect();
     resampled.sort_by(f64::total_cmp);
-    let at = |q: f64| resampled.get((resampled.len().saturating_sub(1) as f64 * q) as usize).copied();
+    let at =
+        |q: f64| resampled.get((resampled.len().saturating_sub(1) as f64 * q) as usize).copied();
     let counts = map.counts(&grid, &section);
     Some(Contrast {
         value,
@@ -119,8 +133,10 @@ impl Map {
     fn of(grid: &Grid, points: &[[f64; 2]], island_cells: usize) -> Option<Self> {
         let side = grid.cells + 2;
         let visited = grid.count(points);
-        // What is not visited and can be walked to from the border is outside; other holes are islands if they are large enough.
-        let mut places: Vec<Option<Place>> = visited.iter().map(|n| (*n > 0).then_some(Place::Sea)).collect();
+        // What is not visited and can be walked to from the border is outside; other holes are
+        // islands if they are large enough.
+        let mut places: Vec<Option<Place>> =
+            visited.iter().map(|n| (*n > 0).then_some(Place::Sea)).collect();
         let hole = |from: usize, places: &mut Vec<Option<Place>>| -> Vec<usize> {
             let mut found = vec![from];
             places[from] = Some(Place::Outside);
@@ -144,7 +160,10 @@ impl Map {
             found
         };
         for cell in 0..side * side {
-            let border = cell / side == 0 || cell / side + 1 == side || cell % side == 0 || cell % side + 1 == side;
+            let border = cell / side == 0
+                || cell / side + 1 == side
+                || cell % side == 0
+                || cell % side + 1 == side;
             if border && places[cell].is_none() {
                 hole(cell, &mut places);
             }
@@ -158,7 +177,8 @@ impl Map {
             }
         }
         let places: Vec<Place> = places.into_iter().map(|p| p.unwrap_or(Place::Outside)).collect();
-        let area = [Place::Island, Place::Sea].map(|kind| places.iter().filter(|p| **p == kind).count() as f64);
+        let area = [Place::Island, Place::Sea]
+            .map(|kind| places.iter().filter(|p| **p == kind).count() as f64);
         (area[0] > 0.0).then_some(Self { places, area })
     }
 
@@ -177,7 +197,8 @@ impl Map {
 
     fn of_counts(&self, [islands, sea]: [f64; 2]) -> Option<f64> {
         // Without a point in the sea all are in islands: as far from structure as can be counted.
-        (islands + sea > 0.0).then(|| 1.0 - (islands / self.area[0]) / (sea.max(1.0) / self.area[1]))
+        (islands + sea > 0.0)
+            .then(|| 1.0 - (islands / self.area[0]) / (sea.max(1.0) / self.area[1]))
     }
 
     fn contrast(&self, grid: &Grid, points: &[[f64; 2]]) -> Option<f64> {
@@ -185,8 +206,8 @@ impl Map {
     }
 }
 
-/// The number of separate pieces that consecutive `points` visit in turn: the largest k for which no cell of the grid holds points
-/// of two different phases modulo k.
+/// The number of separate pieces that consecutive `points` visit in turn: the largest k for which
+/// no cell of the grid holds points of two different phases modulo k.
 pub(super) fn bands(points: &[[f64; 2]], thresholds: &Thresholds) -> usize {
     if points.is_empty() {
         return 1;
@@ -209,7 +230,8 @@ pub(super) fn bands(points: &[[f64; 2]], thresholds: &Thresholds) -> usize {
         .unwrap_or(1)
 }
 
-/// A grid of square-ish cells around a set, with one more ring of cells that collects everything outside.
+/// A grid of square-ish cells around a set, with one more ring of cells that collects everything
+/// outside.
 struct Grid {
     low: [f64; 2],
     width: [f64; 2],
@@ -225,7 +247,8 @@ impl Grid {
                 high[k] = high[k].max(q[k]);
             }
         }
-        let width = std::array::from_fn(|k| ((high[k] - low[k]) / cells as f64).max(f64::MIN_POSITIVE));
+        let width =
+            std::array::from_fn(|k| ((high[k] - low[k]) / cells as f64).max(f64::MIN_POSITIVE));
         Self { low, width, cells }
     }
 
@@ -240,7 +263,8 @@ impl Grid {
     fn cell(&self, q: &[f64; 2]) -> usize {
         let side = self.cells + 2;
         let [a, b]: [usize; 2] = std::array::from_fn(|k| {
-            // The upper edge of the box belongs to its last cell, and what is less than a cell beyond it.
+            // The upper edge of the box belongs to its last cell, and what is less than a cell
+            // beyond it.
             let c = ((q[k] - self.low[k]) / self.width[k]).floor();
             if c < 0.0 {
                 0
@@ -259,7 +283,8 @@ mod tests {
     use super::*;
     use twofold_num::elementary::sqrt;
 
-    /// Points of a disc with a round hole, into which a share `leak` of the points that would fall there may go.
+    /// Points of a disc with a round hole, into which a share `leak` of the points that would fall
+    /// there may go.
     fn sea(n: usize, leak: f64, stream: u64) -> Vec<SectionPoint> {
         let mut r = RandomStream::new(11, stream);
         let mut points = Vec::new();
@@ -268,7 +293,11 @@ mod tests {
             let from_hole = sqrt((u[0] - 0.3) * (u[0] - 0.3) + u[1] * u[1]);
             let inside = from_hole < 0.3;
             if u[0] * u[0] + u[1] * u[1] < 1.0 && (!inside || r.uniform() < leak) {
-                points.push(SectionPoint { t: points.len() as f64, u, upward: points.len() % 2 == 0 });
+                points.push(SectionPoint {
+                    t: points.len() as f64,
+                    u,
+                    upward: points.len() % 2 == 0,
+                });
             }
         }
         points
@@ -282,7 +311,9 @@ mod tests {
             let c = of(leak);
             assert!((c.value - (1.0 - leak)).abs() < 0.08, "{leak}: {c:?}");
             assert!(
-                c.interval[0] <= c.value && c.value <= c.interval[1] && c.interval[1] - c.interval[0] < 0.25,
+                c.interval[0] <= c.value
+                    && c.value <= c.interval[1]
+                    && c.interval[1] - c.interval[0] < 0.25,
                 "{c:?}"
             );
             // Noise-free runs score what they should, unlike halves of one run.
@@ -311,16 +342,18 @@ mod tests {
 
     #[test]
     fn each_run_without_noise_is_held_against_the_others() {
-        // The last one is short and fills the hole like the rest: of its own few points it would be a structure, of the
-        // others' it has none.
-        let free: Vec<_> = (0..4).map(|k| if k < 3 { sea(20_000, 0.0, k) } else { sea(600, 1.0, k) }).collect();
+        // The last one is short and fills the hole like the rest: of its own few points it would be
+        // a structure, of the others' it has none.
+        let free: Vec<_> =
+            (0..4).map(|k| if k < 3 { sea(20_000, 0.0, k) } else { sea(600, 1.0, k) }).collect();
         let found = contrast(&sea(4000, 0.0, 9), &free, &Thresholds::default()).unwrap();
         assert!(found.free[0].abs() < 0.4 && found.free[1] > 0.95, "{found:?}");
     }
 
     #[test]
     fn directions_are_kept_apart() {
-        // Upwards the hole is empty, downwards it is as full as the rest: on each other they would have no island.
+        // Upwards the hole is empty, downwards it is as full as the rest: on each other they would
+        // have no island.
         let half = |n: usize, stream: u64| -> Vec<SectionPoint> {
             let open = sea(n, 1.0, stream).into_iter().filter(|p| !p.upward);
             sea(n, 0.0, stream + 100).into_iter().filter(|p| p.upward).chain(open).collect()
@@ -366,10 +399,16 @@ mod tests {
 
     #[test]
     fn islands_are_the_holes_that_are_large_enough() {
-        // Visited cells of a picture, on a grid of 8 by 8: a hole of four cells, one of two, and a bay that is open.
-        let picture = ["########", "#..##..#", "#..#####", "########", "##.....#", "####...#", "########", "###.####"];
+        // Visited cells of a picture, on a grid of 8 by 8: a hole of four cells, one of two, and a
+        // bay that is open.
+        let picture = [
+            "########", "#..##..#", "#..#####", "########", "##.....#", "####...#", "########",
+            "###.####",
+        ];
         let cells = |wanted: u8| -> Vec<[f64; 2]> {
-            let all = (0..64).map(|k| (k / 8, k % 8)).filter(|(a, b)| picture[*a].as_bytes()[*b] == wanted);
+            let all = (0..64)
+                .map(|k| (k / 8, k % 8))
+                .filter(|(a, b)| picture[*a].as_bytes()[*b] == wanted);
             all.map(|(a, b)| [a as f64 + 0.5, b as f64 + 0.5]).collect()
         };
         let grid = Grid { low: [0.0; 2], width: [1.0; 2], cells: 8 };
@@ -406,6 +445,9 @@ mod tests {
         assert_eq!(bands(&(0..300).map(|i| near([0, 0, 1, 2][i % 4])).collect::<Vec<_>>(), &th), 1);
         assert_eq!(bands(&(0..300).map(|i| near((i / 2) % 3)).collect::<Vec<_>>(), &th), 1);
         // Thirty of each are asked for.
-        assert_eq!((bands(&in_turn[..89], &th), bands(&in_turn[..90], &th), bands(&[], &th)), (1, 3, 1));
+        assert_eq!(
+            (bands(&in_turn[..89], &th), bands(&in_turn[..90], &th), bands(&[], &th)),
+            (1, 3, 1)
+        );
     }
 }

@@ -34,21 +34,22 @@ pub struct Rate {
 pub struct Cycle {
     /// Points of one direction per turn: one for "period one", three for "period three".
     pub period: usize,
-    /// All dots: first those of the counted direction in the order of the motion, then those of the other.
+    /// All dots: first those of the counted direction in the order of the motion, then those of the
+    /// other.
     pub points: Vec<CyclePoint>,
     /// Time for one turn.
     pub duration: f64,
     /// Mean distance of the last window's points from their dots.
     pub radius: f64,
-    /// From this time on the run only turns around the cycle. Before it lies the transient; its length is this time minus
-    /// the start.
+    /// From this time on the run only turns around the cycle. Before it lies the transient; its
+    /// length is this time minus the start.
     pub captured_at: f64,
     /// From this time on every point is within a dot's size of its centre, if that has happened.
     pub settled_at: Option<f64>,
     /// How fast the distance from the cycle shrinks, where that could be fitted.
     pub approach: Option<Rate>,
-    /// Mean angle of the motion around the cycle per turn, in full circles, in (-1/2, 1/2]; absent when the points lie on a line
-    /// or within rounding of the centre.
+    /// Mean angle of the motion around the cycle per turn, in full circles, in (-1/2, 1/2]; absent
+    /// when the points lie on a line or within rounding of the centre.
     pub rotation: Option<f64>,
 }
 
@@ -58,7 +59,8 @@ pub struct Cycle {
 pub enum Verdict {
     /// A periodic orbit: at the end every phase is a dot.
     Periodic(Cycle),
-    /// Still on its way to (or, with a negative rate, away from) a periodic orbit, around which it turns in a spiral.
+    /// Still on its way to (or, with a negative rate, away from) a periodic orbit, around which it
+    /// turns in a spiral.
     Spiralling(Cycle),
     /// Rings: regular, neither closing up nor approaching anything at a visible rate.
     QuasiPeriodic(Cycle),
@@ -69,14 +71,16 @@ pub enum Verdict {
         /// Number of separate pieces visited in turn.
         bands: usize,
     },
-    /// What tells regular from irregular motion contradicts itself, or the largest exponent is consistent with zero.
+    /// What tells regular from irregular motion contradicts itself, or the largest exponent is
+    /// consistent with zero.
     Undecided {
         /// The largest exponent given with the question, with its error.
         lyapunov: Option<Exponent>,
     },
     /// Random.
     Noisy {
-        /// How much emptier than the sea the islands of noise-free runs still are; absent where there is nothing to compare with.
+        /// How much emptier than the sea the islands of noise-free runs still are; absent where
+        /// there is nothing to compare with.
         contrast: Option<super::Contrast>,
         /// The closed orbit around which the noise holds the run in small clouds, if it does.
         around: Option<Cycle>,
@@ -167,13 +171,16 @@ impl std::fmt::Display for Verdict {
                             [c.value, c.interval[1], c.interval[0], c.free[0]].map(|v| 1.0 - v);
                         write!(
                             f,
-                            ", islands {value:.2} [{low:.2}, {high:.2}] times as dense as the sea, at most {free:.2} without noise"
+                            ", islands {value:.2} [{low:.2}, {high:.2}] times as dense as the sea, \
+                                at most {free:.2} without noise"
                         )
                     }
                     None => Ok(()),
                 }
             }
-            Self::Escaped { last_crossing } => write!(f, "left the section at t = {last_crossing:.0}"),
+            Self::Escaped { last_crossing } => {
+                write!(f, "left the section at t = {last_crossing:.0}")
+            }
             Self::TooFew { points } => write!(f, "too few crossings ({points})"),
         }
     }
@@ -202,10 +209,11 @@ pub struct Evidence {
     pub mixed: bool,
     /// Everything shown is in dots: the run had settled on its periodic orbit by then.
     pub dots_only: bool,
-    /// K of the 0-1 test: near 0 regular, near 1 irregular. Of the captured part if there is one, else of the end.
+    /// K of the 0-1 test: near 0 regular, near 1 irregular. Of the captured part if there is one,
+    /// else of the end.
     pub zero_one: Option<f64>,
-    /// Divergence of nearest neighbours, per return and per unit time: the largest exponent estimated from the points
-    /// alone.
+    /// Divergence of nearest neighbours, per return and per unit time: the largest exponent
+    /// estimated from the points alone.
     pub divergence: Option<super::Divergence>,
     /// The largest exponent given with the question.
     pub lyapunov: Option<Exponent>,
@@ -252,9 +260,13 @@ mod tests {
             (Verdict::Periodic(settled), "period 3, captured at t = 120, settled at t = 250"),
             (
                 Verdict::Spiralling(falling),
-                "spiralling onto period 3, captured at t = 120, not settled, radius 0.250, rate 3.0e-5",
+                "spiralling onto period 3, captured at t = 120, not settled, radius 0.250, rate \
+                    3.0e-5",
             ),
-            (Verdict::QuasiPeriodic(cycle.clone()), "quasi-periodic around period 3 since t = 120, radius 0.250"),
+            (
+                Verdict::QuasiPeriodic(cycle.clone()),
+                "quasi-periodic around period 3 since t = 120, radius 0.250",
+            ),
             (Verdict::Chaotic { lyapunov, bands: 1 }, "chaotic, largest exponent 0.5000 +- 0.0125"),
             (Verdict::Undecided { lyapunov: None }, "undecided"),
             (
@@ -263,7 +275,8 @@ mod tests {
             ),
             (
                 Verdict::Noisy { contrast: Some(contrast), around: None },
-                "noisy, islands 0.75 [0.70, 0.80] times as dense as the sea, at most 0.10 without noise",
+                "noisy, islands 0.75 [0.70, 0.80] times as dense as the sea, at most 0.10 without \
+                    noise",
             ),
             (Verdict::Escaped { last_crossing: 7.4 }, "left the section at t = 7"),
             (Verdict::TooFew { points: 12 }, "too few crossings (12)"),

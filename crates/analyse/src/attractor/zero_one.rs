@@ -1,16 +1,17 @@
-//! The 0-1 test for chaos: Gottwald & Melbourne (2009), "On the implementation of the 0-1 test for chaos", SIAM J. Appl. Dyn.
-//! Syst. 8, 129-145.
+//! The 0-1 test for chaos: Gottwald & Melbourne (2009), "On the implementation of the 0-1 test for
+//! chaos", SIAM J. Appl. Dyn. Syst. 8, 129-145.
 
 use twofold_num::elementary::{cos, sin, sqrt};
 use twofold_num::fit::median;
 use twofold_num::random::RandomStream;
 
-/// Frequencies tried. The median over them is not disturbed by the few that resonate with the signal.
+/// Frequencies tried. The median over them is not disturbed by the few that resonate with the
+/// signal.
 const FREQUENCIES: usize = 60;
 
-/// K of the 0-1 test for the sequence `phi`, by the correlation method on the mean-square displacement with its oscillating
-/// term removed (their eqs 2.3 and 3.1). About 0 for regular, about 1 for chaotic sequences; `None` below 100
-/// terms.
+/// K of the 0-1 test for the sequence `phi`, by the correlation method on the mean-square
+/// displacement with its oscillating term removed (their eqs 2.3 and 3.1). About 0 for regular,
+/// about 1 for chaotic sequences; `None` below 100 terms.
 ///
 /// ```
 /// use twofold_analyse::attractor::zero_one;
@@ -35,7 +36,8 @@ pub fn zero_one(phi: &[f64]) -> Option<f64> {
         return Some(0.0);
     }
     let scale = 1.0 / sqrt(variance);
-    // Frequencies in (pi/5, 4 pi/5), as they recommend; from a fixed stream so that K is a function of the data.
+    // Frequencies in (pi/5, 4 pi/5), as they recommend; from a fixed stream so that K is a function
+    // of the data.
     let mut random = RandomStream::new(0x0001, 0x0001);
     let mut ks: Vec<f64> = (0..FREQUENCIES)
         .map(|_| {
@@ -102,14 +104,16 @@ mod tests {
                 .skip(200)
                 .collect::<Vec<_>>()
         };
-        let (periodic, chaotic) = (zero_one(&orbit(3.55)).unwrap(), zero_one(&orbit(3.97)).unwrap());
+        let (periodic, chaotic) =
+            (zero_one(&orbit(3.55)).unwrap(), zero_one(&orbit(3.97)).unwrap());
         assert!(periodic.abs() < 0.1, "{periodic}");
         assert!(chaotic > 0.9, "{chaotic}");
     }
 
     #[test]
     fn rotation_is_regular() {
-        let phi: Vec<f64> = (0..1000).map(|i| sin(2.0 * i as f64) + 0.3 * cos(0.7 + 4.0 * i as f64)).collect();
+        let phi: Vec<f64> =
+            (0..1000).map(|i| sin(2.0 * i as f64) + 0.3 * cos(0.7 + 4.0 * i as f64)).collect();
         assert!(zero_one(&phi).unwrap().abs() < 0.1);
     }
 
@@ -122,7 +126,8 @@ mod tests {
     fn a_slow_oscillation_and_a_shifted_one_are_regular() {
         // A seventh of the slowest frequency tried; with a mean a hundred times its size.
         for shift in [0.0, 100.0] {
-            let phi: Vec<f64> = (0..1000).map(|i| shift + 0.01 * sin(0.15 * f64::from(i))).collect();
+            let phi: Vec<f64> =
+                (0..1000).map(|i| shift + 0.01 * sin(0.15 * f64::from(i))).collect();
             assert!(zero_one(&phi).unwrap().abs() < 0.1, "{shift}: {:?}", zero_one(&phi));
         }
     }
@@ -140,13 +145,15 @@ mod tests {
 
     #[test]
     fn it_is_what_its_definition_says() {
-        // Displacements as sums over the stretch itself, squared and averaged; the median over the same frequencies.
+        // Displacements as sums over the stretch itself, squared and averaged; the median over the
+        // same frequencies.
         let mut x = 0.1;
         let mut chaotic = || {
             x = 3.8 * x * (1.0 - x);
             x
         };
-        let phi: Vec<f64> = (0..120).map(|i| 3.0 + sin(1.3 * f64::from(i)) + 0.4 * chaotic()).collect();
+        let phi: Vec<f64> =
+            (0..120).map(|i| 3.0 + sin(1.3 * f64::from(i)) + 0.4 * chaotic()).collect();
         let average = phi.iter().sum::<f64>() / 120.0;
         let mut random = RandomStream::new(0x0001, 0x0001);
         let mut ks: Vec<f64> = (0..FREQUENCIES)

@@ -28,14 +28,24 @@ impl Follower<'_> {
                     passed.push(i);
                     match self.event_of[i] {
                         None => {
-                            let (mode, signs, direction) = (self.config.mode, &self.signs, Some(-side));
-                            let point = Point { t: self.t, x: &self.x, mode, signs, event: None, direction };
+                            let (mode, signs, direction) =
+                                (self.config.mode, &self.signs, Some(-side));
+                            let point = Point {
+                                t: self.t,
+                                x: &self.x,
+                                mode,
+                                signs,
+                                event: None,
+                                direction,
+                            };
                             if !observe(&point) {
                                 return Ok(Some(Ending::Interrupted));
                             }
                         }
                         Some(event) => {
-                            let When::Zero(_, direction) = &definition.events()[event].when else { continue };
+                            let When::Zero(_, direction) = &definition.events()[event].when else {
+                                continue;
+                            };
                             let wanted = match direction {
                                 Direction::Both => true,
                                 Direction::Up => side < 0.0,
@@ -62,7 +72,8 @@ impl Follower<'_> {
                         Exit::Undecided => {
                             return Err(self.undecided(
                                 &zero,
-                                "sliding ceases to attract: it may go on, or leave at any time to either side",
+                                "sliding ceases to attract: it may go on, or leave at any time to \
+                                    either side",
                             ));
                         }
                         rule => zero.iter().for_each(|g| leave.push((*g, rule == Exit::Plus))),
@@ -100,7 +111,8 @@ impl Follower<'_> {
                 zero.retain(|g| g != guard);
             }
             self.ask_new(&mut config);
-            let rest: Vec<usize> = self.sliding.iter().copied().filter(|g| zero.contains(g)).collect();
+            let rest: Vec<usize> =
+                self.sliding.iter().copied().filter(|g| zero.contains(g)).collect();
             self.adopt(config, rest);
         }
         let mut accumulates = None;
@@ -108,7 +120,8 @@ impl Follower<'_> {
             self.outcome.switches += 1;
             let sides = self.config.sides.clone();
             self.settle(&zero)?;
-            let jumped = |guard: &usize| !zero.contains(guard) && sides[*guard] != self.config.sides[*guard];
+            let jumped =
+                |guard: &usize| !zero.contains(guard) && sides[*guard] != self.config.sides[*guard];
             if !self.sliding.is_empty() && self.compiled.active.iter().any(jumped) {
                 // What jumped with it may let sliding end.
                 let (slid, none) = (self.sliding.clone(), vec![false; self.slides.len()]);
@@ -137,14 +150,17 @@ impl Follower<'_> {
         self.happen(definition, &fired, &zero, observe)
     }
 
-    /// Whether a mixture by order ends although no surface is left: a fast surface ceases to attract for one side of a slower one.
+    /// Whether a mixture by order ends although no surface is left: a fast surface ceases to
+    /// attract for one side of a slower one.
     fn ends_inside(&mut self) -> bool {
         if self.corners.is_empty() || self.order.is_empty() {
             return false;
         }
         let (t, x) = (self.t, self.x.clone());
         let weights = self.corner_mixture(t, &x).0.weights;
-        let share = |i: usize| -> f64 { (0..weights.len()).filter(|v| v >> i & 1 == 1).map(|v| weights[v]).sum() };
+        let share = |i: usize| -> f64 {
+            (0..weights.len()).filter(|v| v >> i & 1 == 1).map(|v| weights[v]).sum()
+        };
         (0..self.sliding.len()).map(share).all(|w| !(w <= 1e-6 || w >= 1.0 - 1e-6))
     }
 
@@ -186,7 +202,11 @@ impl Follower<'_> {
                     self.variables[self.n] = self.t;
                     let mut values = vec![0.0; event.set.len()];
                     program.evaluate(&self.variables, &mut values);
-                    event.set.iter().zip(values).for_each(|((state, _), value)| new[*state] = value);
+                    event
+                        .set
+                        .iter()
+                        .zip(values)
+                        .for_each(|((state, _), value)| new[*state] = value);
                 }
                 None => {
                     for (state, value) in &event.set {
@@ -208,8 +228,10 @@ impl Follower<'_> {
             }
         }
         if !new.iter().all(|v| v.is_finite()) {
-            let names: Vec<&str> = fired.iter().map(|i| definition.events()[*i].name.as_str()).collect();
-            let why = format!("`set` of {} gives {new:?}, which is no finite state", names.join(", "));
+            let names: Vec<&str> =
+                fired.iter().map(|i| definition.events()[*i].name.as_str()).collect();
+            let why =
+                format!("`set` of {} gives {new:?}, which is no finite state", names.join(", "));
             return Err(HybridError::Stuck { t: self.t, x: old, why });
         }
         let changed = new != old;
@@ -224,8 +246,11 @@ impl Follower<'_> {
                 let (a, b) = (value(e, &old), value(e, &self.x));
                 (a - b).abs() <= 1e-12 * self.magnitude(e)
             };
-            let zero: Vec<usize> =
-                zero.iter().copied().filter(|g| stays_zero(&self.equation.guards[*g].expression)).collect();
+            let zero: Vec<usize> = zero
+                .iter()
+                .copied()
+                .filter(|g| stays_zero(&self.equation.guards[*g].expression))
+                .collect();
             let watched: Vec<usize> = (0..self.watch_side.len())
                 .filter(|i| self.fresh_watch[*i] && stays_zero(&self.equation.watched[*i]))
                 .collect();
@@ -241,13 +266,15 @@ impl Follower<'_> {
             for i in &watched {
                 let Some(event) = self.event_of[*i] else { continue };
                 let When::Zero(_, direction) = definition.events()[event].when else { continue };
-                // Pressed back into the surface at once: infinitely many in no time. What passes through with a speed does not come back.
+                // Pressed back into the surface at once: infinitely many in no time. What passes
+                // through with a speed does not come back.
                 let into = match direction {
                     Direction::Down => self.watch_side[*i] < 0.0,
                     Direction::Up => self.watch_side[*i] > 0.0,
                     Direction::Both => false,
                 };
-                let asked = definition.events()[event].from.is_none_or(|mode| mode == self.config.mode);
+                let asked =
+                    definition.events()[event].from.is_none_or(|mode| mode == self.config.mode);
                 if into
                     && asked
                     && fired.contains(&event)
@@ -295,9 +322,12 @@ impl Follower<'_> {
         self.happen(definition, &newly, &[], observe)
     }
 
-    /// The time of a flight over an event's surface whose height is a thousand roundings of the event's expression: shorter ones are not resolved.
+    /// The time of a flight over an event's surface whose height is a thousand roundings of the
+    /// event's expression: shorter ones are not resolved.
     fn grain(&mut self, event: usize) -> f64 {
-        let Some(watched) = self.event_of.iter().position(|e| *e == Some(event)) else { return 0.0 };
+        let Some(watched) = self.event_of.iter().position(|e| *e == Some(event)) else {
+            return 0.0;
+        };
         self.variables[..self.n].copy_from_slice(&self.x);
         self.variables[self.n] = self.t;
         let mut field = vec![0.0; self.n];
@@ -313,7 +343,9 @@ impl Follower<'_> {
         let definition = self.model.definition().clone();
         let config = self.config.clone();
         for i in 0..self.watch_side.len() {
-            let Some(event) = self.event_of[i].filter(|e| definition.events()[*e].sticks) else { continue };
+            let Some(event) = self.event_of[i].filter(|e| definition.events()[*e].sticks) else {
+                continue;
+            };
             let When::Zero(_, direction) = definition.events()[event].when else { continue };
             let into = match direction {
                 Direction::Down => -1.0,
@@ -322,7 +354,8 @@ impl Follower<'_> {
             };
             let (compiled, rates) = self.rates(&config);
             let place = compiled.active.len() + i;
-            let rests = self.fresh_watch[i] && rates.first[place].abs() <= 1e-14 * rates.terms[place];
+            let rests =
+                self.fresh_watch[i] && rates.first[place].abs() <= 1e-14 * rates.terms[place];
             if rests && rates.second[place] * into > 0.0 {
                 self.stick(&definition, event, self.t);
                 return;
@@ -340,17 +373,22 @@ impl Follower<'_> {
         let contacts = std::mem::take(&mut self.contacts);
         let rests = |c: &Contact| {
             let e = &self.equation.watched[c.watched];
-            let change = self.equation.value(e, self.t, old) - self.equation.value(e, self.t, &self.x);
+            let change =
+                self.equation.value(e, self.t, old) - self.equation.value(e, self.t, &self.x);
             let place = compiled.active.len() + c.watched;
-            change.abs() <= 1e-12 * self.magnitude(e) && rates.first[place].abs() <= 1e-9 * rates.terms[place]
+            change.abs() <= 1e-12 * self.magnitude(e)
+                && rates.first[place].abs() <= 1e-9 * rates.terms[place]
         };
         let (kept, _): (Vec<Contact>, Vec<Contact>) = contacts.into_iter().partition(|c| rests(c));
         self.contacts = kept;
     }
 
-    /// Puts motion at rest on an event's surface from `t` on; false if the set state does not move the expression's derivative.
+    /// Puts motion at rest on an event's surface from `t` on; false if the set state does not move
+    /// the expression's derivative.
     pub(super) fn stick(&mut self, definition: &crate::Definition, event: usize, t: f64) -> bool {
-        let Some(watched) = self.event_of.iter().position(|e| *e == Some(event)) else { return false };
+        let Some(watched) = self.event_of.iter().position(|e| *e == Some(event)) else {
+            return false;
+        };
         let When::Zero(_, direction) = definition.events()[event].when else { return false };
         let Some((state, _)) = definition.events()[event].set.first() else { return false };
         let above = match direction {
@@ -387,7 +425,8 @@ impl Follower<'_> {
         true
     }
 
-    /// Puts the state back onto the surfaces that are slid upon, and a contact's derivative to zero.
+    /// Puts the state back onto the surfaces that are slid upon, and a contact's derivative to
+    /// zero.
     pub(super) fn project(&mut self) {
         if !self.contacts.is_empty() {
             self.variables[..self.n].copy_from_slice(&self.x);
@@ -395,9 +434,15 @@ impl Follower<'_> {
             let mut field = vec![0.0; self.n];
             self.compiled.field.evaluate(&self.variables, &mut field);
             let all = Self::along(&self.compiled, &self.variables, &field);
-            let slopes: Vec<f64> = self.contacts.iter().map(|c| -all[self.compiled.active.len() + c.watched]).collect();
-            for (contact, change) in
-                self.contacts.iter().zip(solve_any(&self.grips(&field), &slopes, 0.0).unwrap_or_default())
+            let slopes: Vec<f64> = self
+                .contacts
+                .iter()
+                .map(|c| -all[self.compiled.active.len() + c.watched])
+                .collect();
+            for (contact, change) in self
+                .contacts
+                .iter()
+                .zip(solve_any(&self.grips(&field), &slopes, 0.0).unwrap_or_default())
             {
                 self.x[contact.state] += change;
             }
@@ -416,8 +461,12 @@ impl Follower<'_> {
             .iter()
             .map(|g| if self.equation.guards[*g].whole { self.config.sides[*g] + 1.0 } else { 0.0 })
             .collect();
-        let off: Vec<f64> =
-            self.sliding.iter().zip(&boundary).map(|(g, b)| active_value(&self.compiled, &values, *g) - b).collect();
+        let off: Vec<f64> = self
+            .sliding
+            .iter()
+            .zip(&boundary)
+            .map(|(g, b)| active_value(&self.compiled, &values, *g) - b)
+            .collect();
         if off.iter().all(|v| *v == 0.0) && self.tangents.is_none() {
             return;
         }
@@ -428,12 +477,16 @@ impl Follower<'_> {
             .iter()
             .map(|guard| {
                 let Some(place) = self.compiled.place(*guard) else { return Vec::new() };
-                let entries = self.compiled.touches[place].iter().copied().zip(gradients[place].iter().copied());
+                let entries = self.compiled.touches[place]
+                    .iter()
+                    .copied()
+                    .zip(gradients[place].iter().copied());
                 entries.filter(|(state, _)| *state < self.n).collect()
             })
             .collect();
         // Surfaces that depend on a state together are met together.
-        let (mut owner, mut part): (Vec<Option<usize>>, Vec<usize>) = (vec![None; self.n], (0..k).collect());
+        let (mut owner, mut part): (Vec<Option<usize>>, Vec<usize>) =
+            (vec![None; self.n], (0..k).collect());
         for (i, row) in rows.iter().enumerate() {
             for (state, _) in row {
                 let other = part[*owner[*state].get_or_insert(i)];
@@ -445,7 +498,9 @@ impl Follower<'_> {
         }
         let mut parts: Vec<Vec<usize>> = vec![Vec::new(); k];
         part.iter().enumerate().for_each(|(i, p)| parts[*p].push(i));
-        let dot = |a: &[(usize, f64)], v: &[f64]| a.iter().map(|(state, slope)| slope * v[*state]).sum::<f64>();
+        let dot = |a: &[(usize, f64)], v: &[f64]| {
+            a.iter().map(|(state, slope)| slope * v[*state]).sum::<f64>()
+        };
         let mut dense = vec![0.0; self.n];
         let mut onto = |v: &mut [f64], off: &[f64]| {
             for part in parts.iter().filter(|part| !part.is_empty()) {
@@ -456,7 +511,8 @@ impl Follower<'_> {
                     rows[*i].iter().for_each(|(state, _)| dense[*state] = 0.0);
                 }
                 let off: Vec<f64> = part.iter().map(|i| off[*i]).collect();
-                for (i, weight) in part.iter().zip(solve_any(&gram, &off, 0.0).unwrap_or_default()) {
+                for (i, weight) in part.iter().zip(solve_any(&gram, &off, 0.0).unwrap_or_default())
+                {
                     rows[*i].iter().for_each(|(state, slope)| v[*state] -= weight * slope);
                 }
             }
@@ -469,8 +525,9 @@ impl Follower<'_> {
         }
     }
 
-    /// Whether the motion rests from `t` on at the point that it has come to: all functions that are nearly zero there are zero, a mixture of the fields
-    /// around it vanishes, and none of the fields leads away on its own side. If so the state is put there.
+    /// Whether the motion rests from `t` on at the point that it has come to: all functions that
+    /// are nearly zero there are zero, a mixture of the fields around it vanishes, and none of the
+    /// fields leads away on its own side. If so the state is put there.
     pub(super) fn comes_to_rest(&mut self, t: f64) -> bool {
         if self.equation.depends_on_time() || self.equation.events_see_time() {
             return false;
@@ -484,13 +541,16 @@ impl Follower<'_> {
             .iter()
             .enumerate()
             // On the wrong side of another a function may have no value.
-            .filter(|(place, guard)| !self.equation.guards[**guard].whole && !(values[*place].abs() > 1e-6 * largest))
+            .filter(|(place, guard)| {
+                !self.equation.guards[**guard].whole && !(values[*place].abs() > 1e-6 * largest)
+            })
             .map(|(place, guard)| (place, *guard))
             .collect();
         if near.is_empty() || near.len() > MOST_TOGETHER {
             return false;
         }
-        let known: Vec<(usize, usize)> = near.iter().copied().filter(|(place, _)| values[*place].is_finite()).collect();
+        let known: Vec<(usize, usize)> =
+            near.iter().copied().filter(|(place, _)| values[*place].is_finite()).collect();
         let x = self.nearest_meeting(&known, &values);
         let of_sides = |vertex: usize, follower: &Self| {
             let mut config = follower.config.clone();
@@ -506,17 +566,21 @@ impl Follower<'_> {
             follower.equation.compiled(config).field.evaluate(&v, &mut f);
             f
         };
-        let fields: Vec<Vec<f64>> =
-            (0..1 << near.len()).map(|vertex| velocity(&of_sides(vertex, self), &x, self)).collect();
+        let fields: Vec<Vec<f64>> = (0..1 << near.len())
+            .map(|vertex| velocity(&of_sides(vertex, self), &x, self))
+            .collect();
         // States that hardly move on any side until the run ends rest.
         let left = self.options.t_end - t;
-        let fastest: Vec<f64> = (0..n).map(|i| fields.iter().fold(0.0_f64, |most, f| most.max(f[i].abs()))).collect();
-        let moves: Vec<usize> =
-            (0..n).filter(|i| fastest[*i] * left > 1e-8 * self.size[*i].max(1e-3 * largest)).collect();
+        let fastest: Vec<f64> =
+            (0..n).map(|i| fields.iter().fold(0.0_f64, |most, f| most.max(f[i].abs()))).collect();
+        let moves: Vec<usize> = (0..n)
+            .filter(|i| fastest[*i] * left > 1e-8 * self.size[*i].max(1e-3 * largest))
+            .collect();
         if !moves.iter().all(|i| fastest[*i].is_finite()) {
             return false;
         }
-        let parts: Vec<Vec<f64>> = fields.iter().map(|f| moves.iter().map(|i| f[*i] / fastest[*i]).collect()).collect();
+        let parts: Vec<Vec<f64>> =
+            fields.iter().map(|f| moves.iter().map(|i| f[*i] / fastest[*i]).collect()).collect();
         // Where mixtures differ only one that all surfaces hold is known to stay.
         if settling::mixtures_differ(&parts) && !self.holds_still(&near, &moves) {
             return false;
@@ -566,10 +630,14 @@ impl Follower<'_> {
         near.iter().map(dense).collect()
     }
 
-    /// Whether these functions cannot all stay zero while one of these states moves: their gradients span the states' directions.
+    /// Whether these functions cannot all stay zero while one of these states moves: their
+    /// gradients span the states' directions.
     fn holds_still(&self, near: &[(usize, usize)], moves: &[usize]) -> bool {
-        let mut rows: Vec<Vec<f64>> =
-            self.gradients_of(near).iter().map(|row| moves.iter().map(|i| row[*i] * self.size[*i]).collect()).collect();
+        let mut rows: Vec<Vec<f64>> = self
+            .gradients_of(near)
+            .iter()
+            .map(|row| moves.iter().map(|i| row[*i] * self.size[*i]).collect())
+            .collect();
         for column in 0..moves.len() {
             let size = |row: &Vec<f64>| row.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
             rows.retain(|row| size(row) > 0.0);
@@ -577,7 +645,8 @@ impl Follower<'_> {
                 let size = size(row);
                 row.iter_mut().for_each(|v| *v /= size);
             });
-            let Some(at) = (0..rows.len()).max_by(|a, b| rows[*a][column].abs().total_cmp(&rows[*b][column].abs()))
+            let Some(at) = (0..rows.len())
+                .max_by(|a, b| rows[*a][column].abs().total_cmp(&rows[*b][column].abs()))
             else {
                 return false;
             };
@@ -593,11 +662,13 @@ impl Follower<'_> {
         true
     }
 
-    /// The point where the functions in `near`, by place and guard, are zero, that is nearest to the state; the state itself where that is not to be had.
+    /// The point where the functions in `near`, by place and guard, are zero, that is nearest to
+    /// the state; the state itself where that is not to be had.
     fn nearest_meeting(&mut self, near: &[(usize, usize)], values: &[f64]) -> Vec<f64> {
         let rows = self.gradients_of(near);
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let gram: Vec<f64> = rows.iter().flat_map(|a| rows.iter().map(|b| dot(a, b)).collect::<Vec<_>>()).collect();
+        let gram: Vec<f64> =
+            rows.iter().flat_map(|a| rows.iter().map(|b| dot(a, b)).collect::<Vec<_>>()).collect();
         let off: Vec<f64> = near.iter().map(|(place, _)| values[*place]).collect();
         let mut x = self.x.clone();
         for (row, weight) in rows.iter().zip(solve_any(&gram, &off, 0.0).unwrap_or_default()) {
@@ -615,7 +686,9 @@ impl Follower<'_> {
         observe: &mut dyn FnMut(&Point) -> bool,
     ) -> Result<bool, HybridError> {
         if self.tangents.is_some() {
-            return Err(self.no_tangents("the motion comes to rest, where neighbours have no common linear motion"));
+            return Err(self.no_tangents(
+                "the motion comes to rest, where neighbours have no common linear motion",
+            ));
         }
         match self.options.record {
             Record::Section(_) => {}

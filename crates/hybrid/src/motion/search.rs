@@ -10,9 +10,11 @@ const MOST_PARTS: usize = 4096;
 pub(super) const SHORTER: f64 = 0.25;
 /// How often a step is halved in search of where it is smooth.
 const DEEPEST: usize = 16;
-/// By so much of what its error is measured by the derivative of the continuous extension, which is of lower order than the step, may miss the field.
+/// By so much of what its error is measured by the derivative of the continuous extension, which is
+/// of lower order than the step, may miss the field.
 const LARGEST_DEFECT: f64 = 1e3;
-/// A weight of sliding that is zero because a field runs along the surface is so up to this rounding; one that grows beyond its root is none.
+/// A weight of sliding that is zero because a field runs along the surface is so up to this
+/// rounding; one that grows beyond its root is none.
 const ALONG: f64 = 1e-10;
 
 impl Follower<'_> {
@@ -36,7 +38,10 @@ impl Follower<'_> {
         }
         let watched = self.compiled.active.len();
         for (i, side) in self.watch_side.iter().enumerate() {
-            if *side != 0.0 && !self.fresh_watch[i] && self.stays_away(step, watched + i, 0.0, *side) {
+            if *side != 0.0
+                && !self.fresh_watch[i]
+                && self.stays_away(step, watched + i, 0.0, *side)
+            {
                 continue;
             }
             if *side != 0.0 && !self.contacts.iter().any(|c| c.watched == i) {
@@ -53,8 +58,9 @@ impl Follower<'_> {
         list.extend((0..self.contacts.len()).map(|place| (Sought::Release(place), 1.0)));
     }
 
-    /// Whether a watched value stays on its side of `boundary` in a step, as can be told without evaluating it: a sum of states is a polynomial along the
-    /// step's continuous extension, and lies between its Bernstein coefficients.
+    /// Whether a watched value stays on its side of `boundary` in a step, as can be told without
+    /// evaluating it: a sum of states is a polynomial along the step's continuous extension, and
+    /// lies between its Bernstein coefficients.
     fn stays_away(&self, step: &Step, place: usize, boundary: f64, side: f64) -> bool {
         if step.series.is_some() {
             return false;
@@ -72,7 +78,9 @@ impl Follower<'_> {
         for (variable, factor) in &sum.factors {
             let part = match *variable {
                 i if i < self.n => step.bernstein(i),
-                i if i == self.n => [0.0, 0.25, 0.5, 0.75, 1.0].map(|theta| step.t + theta * step.h),
+                i if i == self.n => {
+                    [0.0, 0.25, 0.5, 0.75, 1.0].map(|theta| step.t + theta * step.h)
+                }
                 i => [self.variables[i]; 5],
             };
             size += (factor * part[0]).abs();
@@ -98,7 +106,9 @@ impl Follower<'_> {
     /// The place of a sign or a watched value.
     fn plain_place(&self, sought: Sought) -> Option<usize> {
         match sought {
-            Sought::Guard { guard, .. } if !self.equation.guards[guard].whole => self.compiled.place(guard),
+            Sought::Guard { guard, .. } if !self.equation.guards[guard].whole => {
+                self.compiled.place(guard)
+            }
             Sought::Watched(i) => Some(self.compiled.active.len() + i),
             _ => None,
         }
@@ -106,7 +116,9 @@ impl Follower<'_> {
 
     /// The value of what is sought at a point.
     fn value_of(&mut self, sought: Sought, t: f64, x: &[f64]) -> f64 {
-        let Some(sum) = self.plain_place(sought).and_then(|place| self.compiled.affine[place].as_ref()) else {
+        let Some(sum) =
+            self.plain_place(sought).and_then(|place| self.compiled.affine[place].as_ref())
+        else {
             let mut value = Vec::new();
             self.measure(&[(sought, 1.0)], t, x, &mut value);
             return value[0];
@@ -125,7 +137,13 @@ impl Follower<'_> {
     }
 
     /// The values of all that is sought at a point.
-    pub(super) fn measure(&mut self, list: &[(Sought, f64)], t: f64, x: &[f64], out: &mut Vec<f64>) {
+    pub(super) fn measure(
+        &mut self,
+        list: &[(Sought, f64)],
+        t: f64,
+        x: &[f64],
+        out: &mut Vec<f64>,
+    ) {
         let n = self.n;
         self.variables[..n].copy_from_slice(x);
         self.variables[n] = t;
@@ -147,14 +165,16 @@ impl Follower<'_> {
                 determinant = jumps.iter().map(|j| -j).fold(f64::INFINITY, f64::min);
             } else if !self.corners.is_empty() {
                 let (found, _) = self.corner_mixture(t, x);
-                (weights, others) = found.margins.iter().map(|[plus, minus]| (*plus, *minus)).unzip();
+                (weights, others) =
+                    found.margins.iter().map(|[plus, minus]| (*plus, *minus)).unzip();
                 determinant = 1.0;
             } else {
                 let (a, matrix) = self.sliding_equations(t, x, &field0);
                 let k = a.len();
                 let b: Vec<f64> = a.iter().map(|v| -v).collect();
                 weights = solve_any(&matrix, &b, 0.0).unwrap_or_else(|| vec![f64::NAN; k]);
-                // Attracting where minus the matrix has a positive determinant, which a single surface's jump of speed is.
+                // Attracting where minus the matrix has a positive determinant, which a single
+                // surface's jump of speed is.
                 determinant = determinant_of_negative(matrix, k);
             }
         }
@@ -171,8 +191,11 @@ impl Follower<'_> {
                 }
                 Sought::Watched(i) | Sought::Pole(i) => values[active + i],
                 Sought::Leave { place, plus } => {
-                    let weight =
-                        if plus { others.get(place).map_or(1.0 - weights[place], |w| *w) } else { weights[place] };
+                    let weight = if plus {
+                        others.get(place).map_or(1.0 - weights[place], |w| *w)
+                    } else {
+                        weights[place]
+                    };
                     weight + self.rounding_along(place, plus)
                 }
                 Sought::Repelling => determinant,
@@ -198,8 +221,8 @@ impl Follower<'_> {
         out
     }
 
-    /// Parts of a step in each of which what is sought is smooth: no operation in it is flat at five places and steep between them. None if they
-    /// are too many to be searched.
+    /// Parts of a step in each of which what is sought is smooth: no operation in it is flat at
+    /// five places and steep between them. None if they are too many to be searched.
     pub(super) fn parts(&mut self, step: &Step) -> Option<Vec<(f64, f64)>> {
         if step.series.is_none() {
             return self.smooth_parts(step, 1, false);
@@ -229,8 +252,14 @@ impl Follower<'_> {
         Some(cuts.windows(2).map(|w| (w[0], w[1])).collect())
     }
 
-    /// Parts of `equal` parts of a step in which no gate of the watched values, or of the field, hides anything.
-    fn smooth_parts(&mut self, step: &Step, equal: usize, of_field: bool) -> Option<Vec<(f64, f64)>> {
+    /// Parts of `equal` parts of a step in which no gate of the watched values, or of the field,
+    /// hides anything.
+    fn smooth_parts(
+        &mut self,
+        step: &Step,
+        equal: usize,
+        of_field: bool,
+    ) -> Option<Vec<(f64, f64)>> {
         let compiled = self.compiled.clone();
         let (gates, program) = match of_field {
             true => (&compiled.gates, &compiled.gate_arguments),
@@ -239,7 +268,8 @@ impl Follower<'_> {
         if gates.is_empty() && equal == 1 {
             return Some(Vec::new());
         }
-        let arguments = |follower: &mut Self, theta: f64| follower.arguments(program, gates.len(), step, theta);
+        let arguments =
+            |follower: &mut Self, theta: f64| follower.arguments(program, gates.len(), step, theta);
         let mut open = Vec::new();
         for i in (0..equal).rev() {
             let [a, b] = [i, i + 1].map(|i| i as f64 / equal as f64);
@@ -264,9 +294,10 @@ impl Follower<'_> {
         Some(parts)
     }
 
-    /// The place in a step before which all is as the step saw it, if there is something that it did not see: an operation that is flat at the step's stages
-    /// and steep between them. Where arguments move far, the field along the continuous extension is compared with the extension's own derivative (the
-    /// defect: Enright 1989).
+    /// The place in a step before which all is as the step saw it, if there is something that it
+    /// did not see: an operation that is flat at the step's stages and steep between them. Where
+    /// arguments move far, the field along the continuous extension is compared with the
+    /// extension's own derivative (the defect: Enright 1989).
     pub(super) fn unseen(&mut self, step: &Step, scale: &[f64]) -> Option<f64> {
         let compiled = self.compiled.clone();
         if compiled.gates.is_empty() || step.h == 0.0 {
@@ -290,8 +321,9 @@ impl Follower<'_> {
             step.slope_at(middle, &mut slope);
             self.rhs(step.t + middle * step.h, &at, &mut field);
             looked += 1;
-            let defect =
-                (0..n).map(|i| ((field[i] - slope[i]) * step.h * (b - a) / scale[i]).abs()).fold(0.0, f64::max);
+            let defect = (0..n)
+                .map(|i| ((field[i] - slope[i]) * step.h * (b - a) / scale[i]).abs())
+                .fold(0.0, f64::max);
             if !(defect <= LARGEST_DEFECT) {
                 return Some(a);
             }
@@ -309,8 +341,9 @@ impl Follower<'_> {
         None
     }
 
-    /// Whether the field, which has this value at a place of a step where a divisor is as good as zero, has a pole there, integrable or not: it grows
-    /// towards it. What is continued through such a place, as sin(x)/x is, has none.
+    /// Whether the field, which has this value at a place of a step where a divisor is as good as
+    /// zero, has a pole there, integrable or not: it grows towards it. What is continued through
+    /// such a place, as sin(x)/x is, has none.
     fn has_pole(&mut self, step: &Step, theta: f64, there: &[f64]) -> bool {
         const DISTANCE: f64 = 1.0 / 256.0;
         const GROWTH: f64 = 3.0;
@@ -329,7 +362,8 @@ impl Follower<'_> {
         (0..self.n).any(|i| there[i].abs() > GROWTH * least[i])
     }
 
-    /// The division by a number that comes to zero at once, if the motion from this point meets one: the equation that it is in.
+    /// The division by a number that comes to zero at once, if the motion from this point meets
+    /// one: the equation that it is in.
     fn division_ahead(&mut self, t: f64, x: &[f64]) -> Option<String> {
         let compiled = self.compiled.clone();
         let mut field = vec![0.0; self.n];
@@ -352,18 +386,24 @@ impl Follower<'_> {
             let left = 1e-3 * moved * now[i] / (now[i] - d);
             left > 0.0 && left <= longest
         };
-        let divisors: Vec<usize> = (0..now.len()).filter(|i| compiled.gates[*i] == Gate::Divisor).collect();
+        let divisors: Vec<usize> =
+            (0..now.len()).filter(|i| compiled.gates[*i] == Gate::Divisor).collect();
         divisors.into_iter().find(|i| comes(self, *i))?;
         let worst = (0..self.n).max_by(|i, j| {
             let share = |i: usize| field[i].abs() / self.size[i].max(f64::MIN_POSITIVE);
             share(*i).total_cmp(&share(*j))
         })?;
         let definition = self.model.definition();
-        let (name, mode) = (&definition.states()[worst].name, &definition.modes()[self.config.mode]);
-        Some(format!("a division by a number that comes to zero, in the equation of {name}, `{}`", mode.field[worst]))
+        let (name, mode) =
+            (&definition.states()[worst].name, &definition.modes()[self.config.mode]);
+        Some(format!(
+            "a division by a number that comes to zero, in the equation of {name}, `{}`",
+            mode.field[worst]
+        ))
     }
 
-    /// Makes the step end where `sought` is zero, near `h`: Newton's method on steps of their own length.
+    /// Makes the step end where `sought` is zero, near `h`: Newton's method on steps of their own
+    /// length.
     pub(super) fn land(&mut self, step: &mut Step, h: f64, longest: f64, sought: Sought) {
         let mut room = std::mem::take(&mut self.room);
         room.resize(self.n, 0.0);
@@ -400,9 +440,17 @@ impl Follower<'_> {
         }
     }
 
-    /// A zero of higher order is flat, and Newton's method ends before it: where the function's slope has gone from what it is nearby, and its value is still
-    /// on the side of `before`, the step is made longer until it is not.
-    fn land_beyond(&mut self, step: &mut Step, longest: f64, sought: Sought, before: f64, nearby: f64) {
+    /// A zero of higher order is flat, and Newton's method ends before it: where the function's
+    /// slope has gone from what it is nearby, and its value is still on the side of `before`, the
+    /// step is made longer until it is not.
+    fn land_beyond(
+        &mut self,
+        step: &mut Step,
+        longest: f64,
+        sought: Sought,
+        before: f64,
+        nearby: f64,
+    ) {
         const FLAT: f64 = 0.1;
         const MOST_DOUBLINGS: usize = 48;
         let Some(place) = self.place_of(sought) else { return };
@@ -427,7 +475,8 @@ impl Follower<'_> {
         }
     }
 
-    /// Tells zeros of watched expressions at a place of a step from poles, which they change their sign at, too: towards a pole they grow.
+    /// Tells zeros of watched expressions at a place of a step from poles, which they change their
+    /// sign at, too: towards a pole they grow.
     pub(super) fn tell_poles(&mut self, step: &Step, theta: f64, met: &mut [Sought]) {
         const NEAR: f64 = 1e-9;
         const GROWTH: f64 = 100.0;
@@ -465,11 +514,14 @@ impl Follower<'_> {
             .zip(field)
             .zip(&self.size)
             .map(|((x, f), size)| {
-                atol + rtol * x.abs().max(0.01 * size).max(1e-3 * f.abs() * span.min(1.0)) + f64::MIN_POSITIVE
+                atol + rtol * x.abs().max(0.01 * size).max(1e-3 * f.abs() * span.min(1.0))
+                    + f64::MIN_POSITIVE
             })
             .collect();
-        let norm =
-            |v: &[f64]| (v.iter().zip(&scale).map(|(v, s)| (v / s) * (v / s)).sum::<f64>() / v.len() as f64).sqrt();
+        let norm = |v: &[f64]| {
+            (v.iter().zip(&scale).map(|(v, s)| (v / s) * (v / s)).sum::<f64>() / v.len() as f64)
+                .sqrt()
+        };
         let (d0, d1) = (norm(&self.x), norm(field));
         let h0 = if d0 < 1e-5 || d1 < 1e-5 { 1e-6 * span } else { 0.01 * d0 / d1 }.min(0.01 * span);
         let ahead: Vec<f64> = self.x.iter().zip(field).map(|(x, f)| x + h0 * f).collect();
@@ -484,8 +536,9 @@ impl Follower<'_> {
         h.max(1e3 * f64::EPSILON * self.t.abs()).min(span)
     }
 
-    /// Where an expression's domain ends at a switch, as that of |x|^0.5 does on either side, no step goes across. Very near to it the state is put
-    /// onto the switch, and what holds there is decided; false if no switch is so near.
+    /// Where an expression's domain ends at a switch, as that of |x|^0.5 does on either side, no
+    /// step goes across. Very near to it the state is put onto the switch, and what holds there is
+    /// decided; false if no switch is so near.
     pub(super) fn land_at_an_edge(&mut self) -> Result<bool, HybridError> {
         let n = self.n;
         let (t, x) = (self.t, self.x.clone());
@@ -498,7 +551,11 @@ impl Follower<'_> {
             let left = -values[place] / rates[place];
             let closer = nearest.is_none_or(|(best, ..)| left < best);
             let open = !self.sliding.contains(guard) && !self.equation.guards[*guard].whole;
-            if open && left > 0.0 && left <= 1e-9 * (self.options.t_end - self.options.t_start) && closer {
+            if open
+                && left > 0.0
+                && left <= 1e-9 * (self.options.t_end - self.options.t_start)
+                && closer
+            {
                 nearest = Some((left, place, *guard));
             }
         }
@@ -538,7 +595,8 @@ impl Follower<'_> {
             .collect()
     }
 
-    /// The surface slid upon, if both fields are tangent to it there: a two-fold, where the sliding motion ends.
+    /// The surface slid upon, if both fields are tangent to it there: a two-fold, where the sliding
+    /// motion ends.
     fn two_fold(&mut self, t: f64, x: &[f64]) -> Option<String> {
         let [guard] = self.sliding[..] else { return None };
         let place = self.compiled.place(guard)?;
@@ -549,7 +607,9 @@ impl Follower<'_> {
         let tangent = 1e-9 * norm(&self.gradient(t, place)) * norm(&negative);
         (below[0].abs() <= tangent && (below[0] + added[0]).abs() <= tangent).then(|| {
             format!(
-                "the motion slides on {} into a two-fold, where both fields are tangent to the surface and sliding is not defined: what follows is not unique. End the run before that time (--t-end), start elsewhere (--start), or smooth the switch",
+                "the motion slides on {} into a two-fold, where both fields are tangent to the \
+                    surface and sliding is not defined: what follows is not unique. End the run \
+                    before that time (--t-end), start elsewhere (--start), or smooth the switch",
                 self.names(&[guard])
             )
         })
@@ -563,8 +623,11 @@ impl Follower<'_> {
         if what.is_none() {
             let mut field = vec![0.0; self.n];
             self.compiled.field.evaluate(&self.variables, &mut field);
-            let longest =
-                x.iter().zip(&field).map(|(x, f)| x.abs() / f.abs().max(f64::MIN_POSITIVE)).fold(1.0, f64::max);
+            let longest = x
+                .iter()
+                .zip(&field)
+                .map(|(x, f)| x.abs() / f.abs().max(f64::MIN_POSITIVE))
+                .fold(1.0, f64::max);
             let mut ahead = 1e-12 * longest;
             while what.is_none() && ahead < 10.0 * longest {
                 for i in 0..self.n {
@@ -583,7 +646,9 @@ impl Follower<'_> {
         }
         let what = what.or_else(|| self.division_ahead(t, x));
         let what = what.unwrap_or_else(|| {
-            "steps become too short to move: a singularity, or a solution that grows without bound".into()
+            "steps become too short to move: a singularity, or a solution that grows without \
+                bound"
+                .into()
         });
         HybridError::Domain { t, x: x.to_vec(), what }
     }
@@ -614,7 +679,8 @@ impl Follower<'_> {
 
     pub(super) fn clear_fresh(&mut self, list: &[(Sought, f64)], end: &[f64], cut: bool) {
         if cut {
-            // Time has passed: what left zero at the step's beginning is away from it, but for what is met here, which is marked anew.
+            // Time has passed: what left zero at the step's beginning is away from it, but for what
+            // is met here, which is marked anew.
             self.fresh_guard.fill(false);
             self.fresh_watch.fill(false);
             return;
@@ -635,7 +701,9 @@ impl Follower<'_> {
             self.compiled.watched.evaluate(&self.variables, &mut values);
             for i in 0..self.watch_side.len() {
                 let value = values[n + i];
-                if self.watch_side[i] == 0.0 && value.abs() > 1e-13 * self.magnitude(&self.equation.watched[i]) {
+                if self.watch_side[i] == 0.0
+                    && value.abs() > 1e-13 * self.magnitude(&self.equation.watched[i])
+                {
                     self.watch_side[i] = value.signum();
                 }
             }
@@ -643,7 +711,8 @@ impl Follower<'_> {
     }
 }
 
-/// Whether gates do nothing that could be missed between three equidistant places, by their arguments there.
+/// Whether gates do nothing that could be missed between three equidistant places, by their
+/// arguments there.
 fn are_quiet(gates: &[Gate], first: &[f64], between: &[f64], last: &[f64]) -> bool {
     gates.iter().enumerate().all(|(i, gate)| {
         let (p, q, r) = (first[i], between[i], last[i]);

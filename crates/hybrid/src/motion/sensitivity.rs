@@ -1,8 +1,9 @@
 //! How the state at the end of a run changes with the start and with parameters.
 //!
-//! Parameters become states that do not move, so that one set of tangent vectors, with the same saltation matrices, carries both. Everything that happens
-//! at a switch or reset is in them: that it comes earlier or later, and that the reset itself depends on the parameter (the jumps of parametric
-//! sensitivities: Galán, Feehery & Barton 1999, Applied Numerical Mathematics 31, 17).
+//! Parameters become states that do not move, so that one set of tangent vectors, with the same
+//! saltation matrices, carries both. Everything that happens at a switch or reset is in them: that
+//! it comes earlier or later, and that the reset itself depends on the parameter (the jumps of
+//! parametric sensitivities: Galán, Feehery & Barton 1999, Applied Numerical Mathematics 31, 17).
 
 use super::tangent::explicit;
 use super::{Ending, Follower, HybridError, Options, Record};
@@ -21,28 +22,37 @@ pub struct Sensitivities {
     pub x: Vec<f64>,
     /// A row a state: its derivatives by the components of the start.
     pub by_start: Vec<Vec<f64>>,
-    /// A row a state: its derivatives by the parameters, in the order in which they were asked for. The start is held fixed.
+    /// A row a state: its derivatives by the parameters, in the order in which they were asked for.
+    /// The start is held fixed.
     pub by_parameter: Vec<Vec<f64>>,
 }
 
 /// The derivatives of the state at `options.t_end` by the start and by these parameters.
 ///
 /// # Errors
-/// As [`follow`](super::follow); also where there is no derivative: at a grazing, at two surfaces at once, at rest after accumulated impacts, if an event ends
-/// the run, and for a parameter that sets the times of events.
-pub fn sensitivities(model: &Model, options: &Options, parameters: &[&str]) -> Result<Sensitivities, HybridError> {
+/// As [`follow`](super::follow); also where there is no derivative: at a grazing, at two surfaces
+/// at once, at rest after accumulated impacts, if an event ends the run, and for a parameter that
+/// sets the times of events.
+pub fn sensitivities(
+    model: &Model,
+    options: &Options,
+    parameters: &[&str],
+) -> Result<Sensitivities, HybridError> {
     explicit(options)?;
     let n = model.coordinates().len();
     let (model, values) = with_states(model, parameters)?;
     let start = match &options.start {
         Some(start) => start.clone(),
-        None => {
-            model.1.clone().ok_or_else(|| HybridError::Start("the file has no start: give one (--start)".into()))?
-        }
+        None => model.1.clone().ok_or_else(|| {
+            HybridError::Start("the file has no start: give one (--start)".into())
+        })?,
     };
     let whole: Vec<f64> = start.into_iter().chain(values).collect();
-    let settings =
-        Options { start: Some(whole.clone()), record: Record::Times { every: f64::INFINITY }, ..options.clone() };
+    let settings = Options {
+        start: Some(whole.clone()),
+        record: Record::Times { every: f64::INFINITY },
+        ..options.clone()
+    };
     let mut follower = Follower::new(&model.0, &settings)?;
     let unit = |i: usize| {
         let mut v = vec![0.0; whole.len()];
@@ -52,11 +62,13 @@ pub fn sensitivities(model: &Model, options: &Options, parameters: &[&str]) -> R
     follower.begin_tangents((0..whole.len()).map(unit).collect())?;
     let (outcome, follower) = follower.run_whole(&mut |_| true)?;
     if outcome.ending != Ending::Finished {
-        let why = format!("the run ends at t = {}, before --t-end: give a time before it", outcome.t);
+        let why =
+            format!("the run ends at t = {}, before --t-end: give a time before it", outcome.t);
         return Err(HybridError::Stuck { t: outcome.t, x: outcome.x, why });
     }
     let vectors = follower.tangents.map_or_else(Vec::new, |t| t.vectors);
-    let rows = |columns: &[Vec<f64>]| (0..n).map(|i| columns.iter().map(|c| c[i]).collect()).collect();
+    let rows =
+        |columns: &[Vec<f64>]| (0..n).map(|i| columns.iter().map(|c| c[i]).collect()).collect();
     Ok(Sensitivities {
         t: outcome.t,
         x: outcome.x[..n].to_vec(),
@@ -94,14 +106,19 @@ pub fn parameters(model: &Model) -> Vec<String> {
 /// The model and the start that its file gives.
 type Extended = (Model, Option<Vec<f64>>);
 
-/// The model with these parameters as states that do not move, and their values. What depends on them becomes a term.
+/// The model with these parameters as states that do not move, and their values. What depends on
+/// them becomes a term.
 fn with_states(model: &Model, parameters: &[&str]) -> Result<(Extended, Vec<f64>), HybridError> {
     let bad = |why: String| HybridError::Bad(why);
     let values = model.values().map_err(|e| bad(e.to_string()))?;
-    let known: Vec<&str> = model.definition().parameters().iter().map(|p| p.name.as_str()).collect();
+    let known: Vec<&str> =
+        model.definition().parameters().iter().map(|p| p.name.as_str()).collect();
     for (i, name) in parameters.iter().enumerate() {
         if !known.contains(name) {
-            return Err(bad(format!("there is no parameter `{name}`; the system has {}", known.join(", "))));
+            return Err(bad(format!(
+                "there is no parameter `{name}`; the system has {}",
+                known.join(", ")
+            )));
         }
         if parameters[..i].contains(name) {
             return Err(bad(format!("the parameter `{name}` is named twice")));
@@ -109,13 +126,17 @@ fn with_states(model: &Model, parameters: &[&str]) -> Result<(Extended, Vec<f64>
     }
     let derivable = self::parameters(model);
     if let Some(name) = parameters.iter().find(|p| !derivable.iter().any(|d| d == *p)) {
-        return Err(bad(format!("no derivative by {name}, which sets the times of events; leave it out (--by)")));
+        return Err(bad(format!(
+            "no derivative by {name}, which sets the times of events; leave it out (--by)"
+        )));
     }
     let start = model.start().map_err(|e| bad(e.to_string()))?;
     let mut document = model.definition().document().clone();
     document.start = None;
     let names: Vec<String> = parameters.iter().map(|p| (*p).to_owned()).collect();
-    document.states.extend(names.iter().map(|name| StateEntry { name: name.clone(), about: About::default() }));
+    document.states.extend(
+        names.iter().map(|name| StateEntry { name: name.clone(), about: About::default() }),
+    );
     let fields = [&mut document.f, &mut document.plus, &mut document.minus].into_iter().flatten();
     for field in fields.chain(document.modes.0.iter_mut().map(|(_, mode)| &mut mode.f)) {
         field.extend(names.iter().map(|_| Constant::Number(0.0)));
@@ -129,7 +150,8 @@ fn with_states(model: &Model, parameters: &[&str]) -> Result<(Extended, Vec<f64>
         };
         let parameter = model.definition().parameters().iter().find(|p| p.name == name);
         let depends = !model.is_given(&name)
-            && parameter.is_some_and(|p| p.value.names().iter().any(|n| moving.iter().any(|m| m == n)));
+            && parameter
+                .is_some_and(|p| p.value.names().iter().any(|n| moving.iter().any(|m| m == n)));
         if names.contains(&name) {
             continue;
         }
@@ -143,8 +165,9 @@ fn with_states(model: &Model, parameters: &[&str]) -> Result<(Extended, Vec<f64>
         }
     }
     document.parameters.0 = kept;
-    let extended =
-        model.redefined(document).map_err(|why| bad(format!("no derivative by {}: {why}", names.join(", "))))?;
+    let extended = model
+        .redefined(document)
+        .map_err(|why| bad(format!("no derivative by {}: {why}", names.join(", "))))?;
     Ok(((extended, start), names.iter().map(|n| values[n]).collect()))
 }
 
@@ -186,8 +209,10 @@ mod tests {
         let by_height = [r * g * earlier * s - speed * earlier, r * g * earlier + g * earlier];
         let t1_by_g = -0.5 * t1 / g;
         let by_r = [g * t1 * s, g * t1];
-        let by_g =
-            [r * (t1 + g * t1_by_g) * s - 0.5 * s * s - speed * t1_by_g, r * (t1 + g * t1_by_g) - s + g * t1_by_g];
+        let by_g = [
+            r * (t1 + g * t1_by_g) * s - 0.5 * s * s - speed * t1_by_g,
+            r * (t1 + g * t1_by_g) - s + g * t1_by_g,
+        ];
         for i in 0..2 {
             let of = [found.by_start[i][0], found.by_parameter[i][0], found.by_parameter[i][1]];
             for (a, b) in of.into_iter().zip([by_height[i], by_r[i], by_g[i]]) {
@@ -212,20 +237,33 @@ mod tests {
             let options = Options { start: Some(vec![x, 0.0]), rtol: 1e-12, ..at(17.0) };
             follow(&m, &options, &mut |_| true).unwrap().x
         };
-        let found = sensitivities(&model(text), &Options { rtol: 1e-12, ..at(17.0) }, &["friction"]).unwrap();
+        let found =
+            sensitivities(&model(text), &Options { rtol: 1e-12, ..at(17.0) }, &["friction"])
+                .unwrap();
         let d = 1e-4;
-        let by_x: Vec<f64> =
-            end(0.5 + d, 1.0).iter().zip(end(0.5 - d, 1.0)).map(|(a, b)| (a - b) / (2.0 * d)).collect();
-        let by_f: Vec<f64> =
-            end(0.5, 1.0 + d).iter().zip(end(0.5, 1.0 - d)).map(|(a, b)| (a - b) / (2.0 * d)).collect();
+        let by_x: Vec<f64> = end(0.5 + d, 1.0)
+            .iter()
+            .zip(end(0.5 - d, 1.0))
+            .map(|(a, b)| (a - b) / (2.0 * d))
+            .collect();
+        let by_f: Vec<f64> = end(0.5, 1.0 + d)
+            .iter()
+            .zip(end(0.5, 1.0 - d))
+            .map(|(a, b)| (a - b) / (2.0 * d))
+            .collect();
         assert!(by_f.iter().any(|v| v.abs() > 1e-3));
         for i in 0..2 {
             assert!((found.by_start[i][0] - by_x[i]).abs() < 1e-5, "{:?} {by_x:?}", found.by_start);
-            assert!((found.by_parameter[i][0] - by_f[i]).abs() < 1e-5, "{:?} {by_f:?}", found.by_parameter);
+            assert!(
+                (found.by_parameter[i][0] - by_f[i]).abs() < 1e-5,
+                "{:?} {by_f:?}",
+                found.by_parameter
+            );
         }
     }
 
-    /// Two blocks that hold independently, each at its own belt: what is normal to both surfaces goes, what is along them stays.
+    /// Two blocks that hold independently, each at its own belt: what is normal to both surfaces
+    /// goes, what is along them stays.
     #[test]
     fn a_start_in_sliding_is_projected_to_the_surfaces() {
         let text = r#"
@@ -238,11 +276,16 @@ mod tests {
         "#;
         let found = sensitivities(&model(text), &at(2.0), &["p", "c"]).unwrap();
         for (i, want) in [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]].iter().enumerate() {
-            assert!(found.by_start[i].iter().zip(want).all(|(a, b)| (a - b).abs() < 1e-12), "{:?}", found.by_start);
+            assert!(
+                found.by_start[i].iter().zip(want).all(|(a, b)| (a - b).abs() < 1e-12),
+                "{:?}",
+                found.by_start
+            );
         }
         assert_eq!(found.by_parameter, [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]);
         // One surface that is not a coordinate's: the same for both of its sides.
-        let oblique = "states = ['x', 'y']\nstart = [1, -1]\nf = ['1 - 2*sign(x + y)', '-sign(x + y)']";
+        let oblique =
+            "states = ['x', 'y']\nstart = [1, -1]\nf = ['1 - 2*sign(x + y)', '-sign(x + y)']";
         let found = sensitivities(&model(oblique), &at(1.0), &[]).unwrap();
         let back = |side: f64| {
             let options = Options { start: Some(vec![1.0 + side, -1.0]), ..at(1.0) };
@@ -251,7 +294,11 @@ mod tests {
         for side in [1e-3, -1e-3] {
             let (moved, x) = (back(side), back(0.0));
             for i in 0..2 {
-                assert!((found.by_start[i][0] - (moved[i] - x[i]) / side).abs() < 1e-9, "{:?}", found.by_start);
+                assert!(
+                    (found.by_start[i][0] - (moved[i] - x[i]) / side).abs() < 1e-9,
+                    "{:?}",
+                    found.by_start
+                );
             }
         }
     }
@@ -264,17 +311,20 @@ mod tests {
         };
         says(BALL, &at(1.5), &["q"], "no parameter `q`; the system has g, r, twice");
         says(BALL, &at(1.5), &["g", "g"], "named twice");
-        let timed =
-            "states = ['x']\nstart = [1]\nf = ['-x']\n[parameters]\np = 1\n[[event]]\nevery = 'p'\nset = { x = '2*x' }";
+        let timed = "states = ['x']\nstart = [1]\nf = ['-x']\n[parameters]\np = \
+            1\n[[event]]\nevery = 'p'\nset = { x = '2*x' }";
         says(timed, &at(1.5), &["p"], "no derivative by p, which sets the times of events");
         let stops = "states = ['x']\nstart = [1]\nf = ['-1']\n[[event]]\nwhen = 'x'\nstop = true";
         says(stops, &at(3.0), &[], "before --t-end: give a time before it");
-        let corner = "states = ['x', 'y']\nstart = [-1, -1]\nf = ['1 + 0.5*sign(x)', '1 + 0.5*sign(y)']";
+        let corner =
+            "states = ['x', 'y']\nstart = [-1, -1]\nf = ['1 + 0.5*sign(x)', '1 + 0.5*sign(y)']";
         says(corner, &at(3.0), &[], "two surfaces are met at one moment");
-        // Thrown up to a ceiling that it just reaches, and a little faster: then the derivative is large, and one.
+        // Thrown up to a ceiling that it just reaches, and a little faster: then the derivative is
+        // large, and one.
         let up = |v: &str| {
             format!(
-                "states = ['x', 'v']\nstart = [0, {v}]\nf = ['v', '-1']\n[[event]]\nwhen = 'x - 0.5'\ndirection = 'up'\nset = {{ v = '-v' }}"
+                "states = ['x', 'v']\nstart = [0, {v}]\nf = ['v', '-1']\n[[event]]\nwhen = 'x - \
+                    0.5'\ndirection = 'up'\nset = {{ v = '-v' }}"
             )
         };
         says(&up("1"), &at(1.5), &[], "only touched (grazing)");

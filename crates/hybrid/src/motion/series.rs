@@ -1,4 +1,5 @@
-//! Taylor series of the motion between switches (Jorba & Zou 2005): the field that moves the state, sliding and contacts included, as one function on a tape.
+//! Taylor series of the motion between switches (Jorba & Zou 2005): the field that moves the state,
+//! sliding and contacts included, as one function on a tape.
 
 use std::collections::HashMap;
 use std::rc::Rc;
@@ -16,12 +17,14 @@ const MOST_KNOWN: usize = 256;
 const MOST_TANH: usize = 64;
 /// Jorba & Zou (2005), sec. 3: the step is shortened by exp(-0.7/(p - 1)) for safety.
 const SAFETY_EXPONENT: f64 = -0.7;
-/// A step of the motion is searched in parts about as long as a step of order 5 would be at this tolerance, at the least.
+/// A step of the motion is searched in parts about as long as a step of order 5 would be at this
+/// tolerance, at the least.
 const LEAST_SEARCHED: f64 = 1e-8;
 const MOST_SEARCHED: f64 = 64.0;
 /// By so much of its size a function that is followed beside the states may be off its series.
 const LARGEST_MISS: f64 = 1e-6;
-/// What is followed beside the states may ask for steps shorter than theirs down to this part; a pole asks for shorter ones still.
+/// What is followed beside the states may ask for steps shorter than theirs down to this part; a
+/// pole asks for shorter ones still.
 const LEAST_FOLLOWED: f64 = 1e-7;
 
 /// What decides the equation that moves the state.
@@ -35,7 +38,8 @@ struct Key {
     pivots: Vec<usize>,
 }
 
-/// What a step is searched for beside sums of states: its series is made along with those of the states.
+/// What a step is searched for beside sums of states: its series is made along with those of the
+/// states.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Followed {
     /// A guard or watched value, by its place.
@@ -71,7 +75,8 @@ pub(super) struct Expansions {
 
 /// The order at which the work for a unit of time is least (Jorba & Zou 2005, sec. 3).
 pub(super) fn order(options: &Options) -> usize {
-    let least = options.rtol.min(options.atol.unwrap_or(options.rtol)).clamp(f64::EPSILON / 16.0, 1e-2);
+    let least =
+        options.rtol.min(options.atol.unwrap_or(options.rtol)).clamp(f64::EPSILON / 16.0, 1e-2);
     (1.0 - 0.5 * ln(least)).ceil() as usize
 }
 
@@ -84,7 +89,12 @@ impl Follower<'_> {
         let n = self.n;
         let stuck = |why: String| HybridError::Stuck { t: step.t, x: step.x.clone(), why };
         if !self.corners.is_empty() {
-            return Err(stuck("the motion follows a mixture of more fields than their surfaces decide, which is chosen at every point anew and has no Taylor series: follow it by --method dopri5".into()));
+            return Err(stuck(
+                "the motion follows a mixture of more fields than their surfaces \
+                decide, which is chosen at every point anew and has no Taylor series: follow it by \
+                --method dopri5"
+                    .into(),
+            ));
         }
         let low = {
             self.variables[..n].copy_from_slice(&step.x);
@@ -165,9 +175,11 @@ impl Follower<'_> {
             Some(i) if series.terms[i][2].is_finite() => Err(self.left_domain(step.t, &step.x)),
             Some(i) => {
                 let definition = self.model.definition();
-                let (name, field) = (&definition.states[i].name, &definition.modes[self.config.mode].field[i]);
+                let (name, field) =
+                    (&definition.states[i].name, &definition.modes[self.config.mode].field[i]);
                 Err(stuck(format!(
-                    "the motion has no Taylor series in {name}, `{field}`, as at a root of zero: follow it by --method dopri5 or radau5"
+                    "the motion has no Taylor series in {name}, `{field}`, as at a root of zero: \
+                        follow it by --method dopri5 or radau5"
                 )))
             }
         }
@@ -210,8 +222,9 @@ impl Follower<'_> {
                     continue;
                 }
                 // What is smaller than numbers are counts for nothing, as in the scale of a step.
-                let by =
-                    |size: f64, power: usize| rough_pow((size + f64::MIN_POSITIVE) / c[k].abs(), 1.0 / power as f64);
+                let by = |size: f64, power: usize| {
+                    rough_pow((size + f64::MIN_POSITIVE) / c[k].abs(), 1.0 / power as f64)
+                };
                 let mut h = if is_state {
                     let size = c[0].abs().max(0.01 * self.size[i]).max(1e-6 * span * c[1].abs());
                     by(self.options.atol.unwrap_or(0.0) + rtol * size, k)
@@ -224,7 +237,8 @@ impl Follower<'_> {
                 if !is_state || self.options.atol.is_none() {
                     // By what it moves, as in the scale of a step.
                     for j in 1..k.min(4) {
-                        h = h.max(rough_pow(0.1 * rtol * (c[j] / c[k]).abs(), 1.0 / (k - j) as f64));
+                        h = h
+                            .max(rough_pow(0.1 * rtol * (c[j] / c[k]).abs(), 1.0 / (k - j) as f64));
                     }
                 }
                 if is_state {
@@ -238,7 +252,8 @@ impl Follower<'_> {
             return Err(self.not_followed(step, first));
         }
         let longest = longest.min(others);
-        Ok(longest * twofold_num::elementary::exp(SAFETY_EXPONENT / (order(self.options) - 1) as f64))
+        Ok(longest
+            * twofold_num::elementary::exp(SAFETY_EXPONENT / (order(self.options) - 1) as f64))
     }
 
     /// What is said where a series of what is sought ends.
@@ -253,7 +268,8 @@ impl Follower<'_> {
             _ => format!("the sliding motion on {}", self.names(&self.sliding)),
         };
         let why = format!(
-            "{what} has no Taylor series that reaches far enough, as near a pole or at a root of zero: follow it by --method dopri5 or radau5"
+            "{what} has no Taylor series that reaches far enough, as near a pole or at a root of \
+                zero: follow it by --method dopri5 or radau5"
         );
         HybridError::Stuck { t: step.t, x: step.x.clone(), why }
     }
@@ -267,7 +283,10 @@ impl Follower<'_> {
             let size = c.iter().fold(0.0_f64, |most, c| most.max(c.abs()));
             for k in 6..c.len() {
                 // Of k = 6 alone little is seen where it vanishes.
-                most = most.max(rough_pow(c[k].abs() / (tolerance * size + f64::MIN_POSITIVE), 1.0 / k as f64));
+                most = most.max(rough_pow(
+                    c[k].abs() / (tolerance * size + f64::MIN_POSITIVE),
+                    1.0 / k as f64,
+                ));
             }
         }
         most.min(MOST_SEARCHED).ceil() as usize
@@ -279,7 +298,8 @@ impl Follower<'_> {
         known.map_or(&[], |known| &known.followed)
     }
 
-    /// Whether the series of what is followed beside the states are what it is in the middle of a step and at its end.
+    /// Whether the series of what is followed beside the states are what it is in the middle of a
+    /// step and at its end.
     pub(super) fn is_followed(&mut self, step: &Step) -> bool {
         let Some(series) = &step.series else { return true };
         let known = self.expansions.present.as_ref().and_then(|key| self.expansions.known.get(key));
@@ -289,7 +309,9 @@ impl Follower<'_> {
             step.at(theta, &mut self.variables[..self.n]);
             self.variables[self.n] = step.t + theta * step.h;
             known.values.evaluate(&self.variables, &mut values);
-            for ((value, c), rounding) in values.iter().zip(&series.scaled[self.n..]).zip(&series.rounding) {
+            for ((value, c), rounding) in
+                values.iter().zip(&series.scaled[self.n..]).zip(&series.rounding)
+            {
                 let size = c.iter().fold(0.0_f64, |most, c| most.max(c.abs()));
                 let series = c.iter().rev().fold(0.0, |sum, c| sum * theta + c);
                 if (value - series).abs() > LARGEST_MISS * size + rounding {
@@ -300,8 +322,14 @@ impl Follower<'_> {
         true
     }
 
-    /// The coefficients, by powers of the fraction of a step, of what is sought. `followed`: also if it is no sum of states.
-    pub(super) fn series_of(&self, step: &Step, sought: Sought, followed: bool) -> Option<Vec<f64>> {
+    /// The coefficients, by powers of the fraction of a step, of what is sought. `followed`: also
+    /// if it is no sum of states.
+    pub(super) fn series_of(
+        &self,
+        step: &Step,
+        sought: Sought,
+        followed: bool,
+    ) -> Option<Vec<f64>> {
         let series = step.series.as_ref()?;
         let own = |wanted: Followed| {
             let place = self.followed().iter().position(|f| followed && *f == wanted)?;
@@ -341,7 +369,9 @@ impl Follower<'_> {
         out[0] = sum.constant - boundary;
         for (variable, factor) in &sum.factors {
             match *variable {
-                i if i < self.n => out.iter_mut().zip(&series.scaled[i]).for_each(|(out, c)| *out += factor * c),
+                i if i < self.n => {
+                    out.iter_mut().zip(&series.scaled[i]).for_each(|(out, c)| *out += factor * c)
+                }
                 i if i == self.n => {
                     out[0] += factor * step.t;
                     out[1] += factor * step.h;
@@ -357,10 +387,13 @@ impl Follower<'_> {
     fn equation_of_motion(&self, pivots: &[usize]) -> Result<Known, String> {
         let n = self.n;
         let mut followed = Vec::new();
-        let whole = Tape::record(self.equation.variables(), |v| self.written_field(v, pivots, &mut followed));
+        let whole = Tape::record(self.equation.variables(), |v| {
+            self.written_field(v, pivots, &mut followed)
+        });
         if whole.tanh_count() > MOST_TANH {
             return Err(format!(
-                "the equations have more than {MOST_TANH} different tanh, which --method taylor does not follow: use dopri5 or radau5"
+                "the equations have more than {MOST_TANH} different tanh, which --method taylor \
+                    does not follow: use dopri5 or radau5"
             ));
         }
         let depends = crate::equation::dependencies(&whole);
@@ -383,11 +416,23 @@ impl Follower<'_> {
             out
         });
         let solution = Solution::new(order(self.options), &tape, Constants::Binary);
-        Ok(Known { _compiled: self.compiled.clone(), inputs, followed, values: Program::new(&others), solution })
+        Ok(Known {
+            _compiled: self.compiled.clone(),
+            inputs,
+            followed,
+            values: Program::new(&others),
+            solution,
+        })
     }
 
-    /// The derivatives of the states on the tape that is being recorded, as [`Follower::rhs`], and behind them what is `followed`.
-    fn written_field(&self, v: &[Recorded], pivots: &[usize], followed: &mut Vec<Followed>) -> Vec<Recorded> {
+    /// The derivatives of the states on the tape that is being recorded, as [`Follower::rhs`], and
+    /// behind them what is `followed`.
+    fn written_field(
+        &self,
+        v: &[Recorded],
+        pivots: &[usize],
+        followed: &mut Vec<Followed>,
+    ) -> Vec<Recorded> {
         let n = self.n;
         // Signs are numbers, and a mixture has those of both sides.
         let answers = |high: &[usize]| -> Vec<Recorded> {
@@ -413,7 +458,11 @@ impl Follower<'_> {
             direction[n] = Some(Recorded::one());
             direction
         };
-        let rate = |compiled: &Compiled, v: &[Recorded], field: &[Recorded], guard: usize| -> Recorded {
+        let rate = |compiled: &Compiled,
+                    v: &[Recorded],
+                    field: &[Recorded],
+                    guard: usize|
+         -> Recorded {
             let Some(place) = compiled.place(guard) else { return Recorded::from_f64(f64::NAN) };
             let function = compiled.tape.select([n + place]);
             Replay::new(&function, v).derivatives(&direction(field))[0].unwrap_or(Recorded::zero())
@@ -424,7 +473,8 @@ impl Follower<'_> {
         let mut others = Vec::new();
         let places = (0..self.compiled.outputs).filter(|place| {
             let slides = self.compiled.active.get(*place).is_some_and(|guard| self.slides[*guard]);
-            let rests = self.contacts.iter().any(|c| self.compiled.active.len() + c.watched == *place);
+            let rests =
+                self.contacts.iter().any(|c| self.compiled.active.len() + c.watched == *place);
             !slides && !rests && self.compiled.affine[*place].is_none()
         });
         for place in places {
@@ -448,7 +498,8 @@ impl Follower<'_> {
             }
         } else if !self.sliding.is_empty() {
             let k = self.sliding.len();
-            let a: Vec<Recorded> = self.sliding.iter().map(|g| rate(&self.compiled, &below, &low, *g)).collect();
+            let a: Vec<Recorded> =
+                self.sliding.iter().map(|g| rate(&self.compiled, &below, &low, *g)).collect();
             let mut matrix = vec![Recorded::zero(); k * k];
             let mut fields = Vec::new();
             for column in 0..k {
@@ -456,11 +507,13 @@ impl Follower<'_> {
                 let above = answers(&self.sliding[column..=column]);
                 let high = field(compiled, &above);
                 for row in 0..k {
-                    matrix[row * k + column] = rate(compiled, &above, &high, self.sliding[row]) - a[row];
+                    matrix[row * k + column] =
+                        rate(compiled, &above, &high, self.sliding[row]) - a[row];
                 }
                 fields.push(high);
             }
-            let (weights, determinant) = solved(matrix, a.iter().map(|a| -*a).collect(), &pivots[..k]);
+            let (weights, determinant) =
+                solved(matrix, a.iter().map(|a| -*a).collect(), &pivots[..k]);
             followed.extend((0..k).map(Followed::Weight));
             others.extend(&weights);
             followed.push(Followed::Attraction);
@@ -544,7 +597,11 @@ fn pivots(mut a: Vec<f64>, k: usize) -> Vec<usize> {
 }
 
 /// The solution of a x = b by elimination that takes these rows, and the determinant of -a.
-fn solved(mut a: Vec<Recorded>, mut b: Vec<Recorded>, pivots: &[usize]) -> (Vec<Recorded>, Recorded) {
+fn solved(
+    mut a: Vec<Recorded>,
+    mut b: Vec<Recorded>,
+    pivots: &[usize],
+) -> (Vec<Recorded>, Recorded) {
     let k = b.len();
     let mut determinant = Recorded::one();
     for c in 0..k {

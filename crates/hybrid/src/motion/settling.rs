@@ -11,16 +11,19 @@ const MOST_CORNERS: usize = 3;
 type Vertex = (Configuration, Vec<Option<usize>>, Rates);
 
 impl Follower<'_> {
-    /// The size of the terms that an expression is a sum of, with states as large as they have been in this run: what rounding is measured by.
+    /// The size of the terms that an expression is a sum of, with states as large as they have been
+    /// in this run: what rounding is measured by.
     pub(super) fn magnitude(&self, e: &Expression) -> f64 {
         match e {
             Expression::Add(a, b) | Expression::Sub(a, b) => self.magnitude(a) + self.magnitude(b),
             Expression::Neg(a) => self.magnitude(a),
             Expression::Mul(a, b) => self.magnitude(a) * self.magnitude(b),
-            Expression::Name(name) => match self.model.definition().states().iter().position(|s| s.name == *name) {
-                Some(i) => self.size[i].max(self.x[i].abs()),
-                None => self.equation.value(e, self.t, &self.x).abs(),
-            },
+            Expression::Name(name) => {
+                match self.model.definition().states().iter().position(|s| s.name == *name) {
+                    Some(i) => self.size[i].max(self.x[i].abs()),
+                    None => self.equation.value(e, self.t, &self.x).abs(),
+                }
+            }
             other => self.equation.value(other, self.t, &self.x).abs(),
         }
     }
@@ -111,11 +114,16 @@ impl Follower<'_> {
     }
 
     pub(super) fn undecided(&self, zero: &[usize], ways: &str) -> HybridError {
-        HybridError::Undecided { t: self.t, x: self.x.clone(), surfaces: self.names(zero), ways: ways.into() }
+        HybridError::Undecided {
+            t: self.t,
+            x: self.x.clone(),
+            surfaces: self.names(zero),
+            ways: ways.into(),
+        }
     }
 
-    /// Decides where motion goes from a point at which the functions in `zero` are zero. Those that are slid upon and depend on none that is met anew
-    /// go on as they did.
+    /// Decides where motion goes from a point at which the functions in `zero` are zero. Those that
+    /// are slid upon and depend on none that is met anew go on as they did.
     pub(super) fn settle(&mut self, zero: &[usize]) -> Result<(), HybridError> {
         let kept = self.slides.clone();
         self.decide(zero, &kept)
@@ -125,7 +133,8 @@ impl Follower<'_> {
     pub(super) fn decide(&mut self, zero: &[usize], kept: &[bool]) -> Result<(), HybridError> {
         self.rests = false;
         // Only what the equations ask here; what they do not ask keeps its side until it is asked.
-        let zero: Vec<usize> = zero.iter().copied().filter(|g| self.compiled.place(*g).is_some()).collect();
+        let zero: Vec<usize> =
+            zero.iter().copied().filter(|g| self.compiled.place(*g).is_some()).collect();
         if zero.is_empty() {
             let config = self.config.clone();
             self.adopt(config, Vec::new());
@@ -157,7 +166,8 @@ impl Follower<'_> {
                 let acts = |place: &Option<usize>| {
                     place.is_none_or(|p| {
                         let through = |v: &usize| *v < self.n && compiled.depends(*v, side);
-                        compiled.depends(self.n + p, side) || compiled.touches[p].iter().any(through)
+                        compiled.depends(self.n + p, side)
+                            || compiled.touches[p].iter().any(through)
                     })
                 };
                 let other = |i: usize| i != j && acts(&place0[i]);
@@ -171,7 +181,8 @@ impl Follower<'_> {
                         continue;
                     };
                     let scale = base.terms[a] + rates.terms[b];
-                    coupled[i * k + j] = i != j && (base.first[a] - rates.first[b]).abs() > 1e-12 * scale;
+                    coupled[i * k + j] =
+                        i != j && (base.first[a] - rates.first[b]).abs() > 1e-12 * scale;
                 }
             }
             groups(k, |i, j| coupled[i * k + j])
@@ -185,7 +196,8 @@ impl Follower<'_> {
             if set.len() > MOST_TOGETHER {
                 let names: Vec<usize> = set.iter().map(|i| zero[*i]).collect();
                 let why = format!(
-                    "{} surfaces that depend on each other meet ({}); up to {MOST_TOGETHER} are resolved",
+                    "{} surfaces that depend on each other meet ({}); up to {MOST_TOGETHER} are \
+                        resolved",
                     set.len(),
                     self.names(&names)
                 );
@@ -199,8 +211,10 @@ impl Follower<'_> {
                     cache.insert(plus.clone(), made);
                 }
                 let (_, place, rates) = &cache[&plus];
-                let first: Vec<f64> = set.iter().map(|i| place[*i].map_or(f64::NAN, |p| rates.first[p])).collect();
-                let direction: Vec<f64> = set.iter().map(|i| place[*i].map_or(0.0, |p| rates.direction(p))).collect();
+                let first: Vec<f64> =
+                    set.iter().map(|i| place[*i].map_or(f64::NAN, |p| rates.first[p])).collect();
+                let direction: Vec<f64> =
+                    set.iter().map(|i| place[*i].map_or(0.0, |p| rates.direction(p))).collect();
                 (rates.field.clone(), first, direction)
             };
             // Fields that are the same on both sides decide nothing and need nothing decided.
@@ -227,7 +241,8 @@ impl Follower<'_> {
                 }
             }
             let found = possibilities(set.len(), |assignment| {
-                let slides: Vec<usize> = (0..set.len()).filter(|i| assignment[*i] == Way::Stay).collect();
+                let slides: Vec<usize> =
+                    (0..set.len()).filter(|i| assignment[*i] == Way::Stay).collect();
                 let plus: Vec<bool> = assignment.iter().map(|w| *w == Way::Plus).collect();
                 let (_, base, direction) = at(self, plus.clone());
                 let goes = |i: usize, d: f64| match assignment[i] {
@@ -254,7 +269,8 @@ impl Follower<'_> {
                 let b: Vec<f64> = slides.iter().map(|s| -base[*s]).collect();
                 let weights = solve_any(&matrix, &b, 0.0);
                 if m == 1 {
-                    // On both sides towards or away from the surface, to second order; or along it on one side and towards it on the other.
+                    // On both sides towards or away from the surface, to second order; or along it
+                    // on one side and towards it on the other.
                     let (d0, d1) = (direction[slides[0]], columns[0].2[slides[0]]);
                     let along_one = d0 == 0.0 && d1 < 0.0 || d1 == 0.0 && d0 > 0.0;
                     if d0 * d1 >= 0.0 && !along_one {
@@ -272,16 +288,24 @@ impl Follower<'_> {
                     // Where all mixtures have one velocity there is nothing to choose.
                     if mixtures_differ(&fields) {
                         let guards: Vec<usize> = slides.iter().map(|s| zero[set[*s]]).collect();
-                        let own: Vec<Vec<f64>> =
-                            speeds.iter().map(|rates| slides.iter().map(|s| rates[*s]).collect()).collect();
+                        let own: Vec<Vec<f64>> = speeds
+                            .iter()
+                            .map(|rates| slides.iter().map(|s| rates[*s]).collect())
+                            .collect();
                         let order = self.order_of(&guards);
-                        let Some(found) = mixture(&self.options.intersection, &order, &fields, &own) else {
+                        let Some(found) =
+                            mixture(&self.options.intersection, &order, &fields, &own)
+                        else {
                             return false;
                         };
-                        let rate = |i: usize| found.weights.iter().zip(&speeds).map(|(w, r)| w * r[i]).sum::<f64>();
+                        let rate = |i: usize| {
+                            found.weights.iter().zip(&speeds).map(|(w, r)| w * r[i]).sum::<f64>()
+                        };
                         return found.margins.iter().flatten().all(|w| *w >= -1e-12)
                             && found.weights.iter().all(|w| (0.0..=1.0).contains(w))
-                            && (0..set.len()).filter(|i| !slides.contains(i)).all(|i| goes(i, rate(i)));
+                            && (0..set.len())
+                                .filter(|i| !slides.contains(i))
+                                .all(|i| goes(i, rate(i)));
                     }
                 }
                 let Some(weights) = weights else { return false };
@@ -289,22 +313,29 @@ impl Follower<'_> {
                     return false;
                 }
                 (0..set.len()).filter(|i| !slides.contains(i)).all(|i| {
-                    let added = || columns.iter().zip(&weights).map(|((_, r, _), w)| w * (r[i] - base[i]));
-                    let (rate, size) =
-                        (base[i] + added().sum::<f64>(), added().fold(base[i].abs(), |a, v| a + v.abs()));
+                    let added =
+                        || columns.iter().zip(&weights).map(|((_, r, _), w)| w * (r[i] - base[i]));
+                    let (rate, size) = (
+                        base[i] + added().sum::<f64>(),
+                        added().fold(base[i].abs(), |a, v| a + v.abs()),
+                    );
                     // What is zero to rounding goes nowhere.
                     goes(i, if rate.abs() <= 1e-13 * size { 0.0 } else { rate })
                 })
             });
             let chosen = match found.as_slice() {
-                [] if self.options.intersection == Intersection::Undecided && self.comes_to_rest(self.t) => {
+                [] if self.options.intersection == Intersection::Undecided
+                    && self.comes_to_rest(self.t) =>
+                {
                     return Ok(());
                 }
                 [] => {
                     let names: Vec<usize> = set.iter().map(|i| zero[*i]).collect();
                     return Err(match self.options.intersection {
                         Intersection::Order(_) if names.len() > 1 => self.no_mixture(&names),
-                        _ => self.undecided(&names, "no way is consistent to first and second order"),
+                        _ => {
+                            self.undecided(&names, "no way is consistent to first and second order")
+                        }
                     });
                 }
                 [one] => one.clone(),
@@ -318,8 +349,10 @@ impl Follower<'_> {
                         Some(chosen) => chosen.clone(),
                         None => {
                             let names: Vec<usize> = set.iter().map(|i| zero[*i]).collect();
-                            let words: Vec<String> =
-                                several.iter().map(|w| w.iter().map(|w| w.sign()).collect()).collect();
+                            let words: Vec<String> = several
+                                .iter()
+                                .map(|w| w.iter().map(|w| w.sign()).collect())
+                                .collect();
                             let all = format!("signs {}", words.join(" or "));
                             return Err(self.undecided(&names, &all));
                         }
@@ -350,20 +383,25 @@ impl Follower<'_> {
         let chooses = stay.iter().any(|i| self.equation.chooses(zero[*i]));
         if stay.len() > 1 && (chooses || (0..self.n).any(on_one_state)) {
             let fields = |follower: &mut Self, on: &dyn Fn(usize) -> bool| {
-                vertex(follower, &|i| ways[i] == Way::Plus || (ways[i] == Way::Stay && on(i))).2.field
+                vertex(follower, &|i| ways[i] == Way::Plus || (ways[i] == Way::Stay && on(i)))
+                    .2
+                    .field
             };
             let base = fields(self, &|_| false);
             let corner = fields(self, &|_| true);
             let mut sum = base.clone();
             for s in &stay {
                 let one = fields(self, &|i| i == *s);
-                sum.iter_mut().zip(one.iter().zip(&base)).for_each(|(sum, (one, base))| *sum += one - base);
+                sum.iter_mut()
+                    .zip(one.iter().zip(&base))
+                    .for_each(|(sum, (one, base))| *sum += one - base);
             }
             let size = corner.iter().chain(&base).fold(0.0_f64, |most, v| most.max(v.abs()));
             differ = sum.iter().zip(&corner).any(|(p, c)| (p - c).abs() > 1e-9 * size);
             if differ && self.options.intersection == Intersection::Undecided {
                 let names: Vec<usize> = stay.iter().map(|i| zero[*i]).collect();
-                let ways = "sliding on all of them, where mixtures of the fields have different velocities";
+                let ways = "sliding on all of them, where mixtures of the fields have different \
+                    velocities";
                 return Err(self.undecided(&names, ways));
             }
         }
@@ -386,7 +424,8 @@ impl Follower<'_> {
         if differ {
             if self.sliding.len() > MOST_CORNERS {
                 let why = format!(
-                    "more than {MOST_CORNERS} surfaces meet, where mixtures of the fields have different velocities"
+                    "more than {MOST_CORNERS} surfaces meet, where mixtures of the fields have \
+                        different velocities"
                 );
                 return Err(HybridError::Stuck { t: self.t, x: self.x.clone(), why });
             }
@@ -402,8 +441,8 @@ impl Follower<'_> {
         self.follow_jumps(&zero)
     }
 
-    /// A function that stays zero while the motion slides on another's zero has no side that the equations decide: so has x*z on x = 0. What its side
-    /// changes nothing of may stay open.
+    /// A function that stays zero while the motion slides on another's zero has no side that the
+    /// equations decide: so has x*z on x = 0. What its side changes nothing of may stay open.
     fn no_side_is_left_open(&mut self, zero: &[usize]) -> Result<(), HybridError> {
         if self.sliding.is_empty() {
             return Ok(());
@@ -419,19 +458,24 @@ impl Follower<'_> {
             let mut other = self.config.clone();
             other.sides[guard] = -side;
             self.ask_new(&mut other);
-            let (here, there) = (self.rates(&self.config.clone()).1.field, self.rates(&other).1.field);
+            let (here, there) =
+                (self.rates(&self.config.clone()).1.field, self.rates(&other).1.field);
             let gradient = self.gradient(t, place);
             let rate = Self::along(&self.compiled, &self.variables, &field)[place];
             let terms: f64 = gradient.iter().zip(&here).map(|(g, f)| (g * f).abs()).sum();
             // Away from zero on its side, or moved by the time alone.
-            if self.equation.guards[guard].whole || rate * side > 1e-11 * terms || terms == 0.0 && rate != 0.0 {
+            if self.equation.guards[guard].whole
+                || rate * side > 1e-11 * terms
+                || terms == 0.0 && rate != 0.0
+            {
                 continue;
             }
             if same(&here, &there) {
                 continue;
             }
             let why = format!(
-                "{} stays zero there while the motion slides on {}: write both switches by one function",
+                "{} stays zero there while the motion slides on {}: write both switches by one \
+                    function",
                 self.equation.guards[guard].expression,
                 self.names(&self.sliding)
             );
@@ -440,20 +484,24 @@ impl Follower<'_> {
         Ok(())
     }
 
-    /// Surfaces by their places among `guards` in the order of the rule; those that it does not name are missing.
+    /// Surfaces by their places among `guards` in the order of the rule; those that it does not
+    /// name are missing.
     pub(super) fn order_of(&self, guards: &[usize]) -> Vec<usize> {
         self.order.iter().filter_map(|named| guards.iter().position(|g| g == named)).collect()
     }
 
     /// The rule has no mixture on these surfaces.
     pub(super) fn no_mixture(&self, guards: &[usize]) -> HybridError {
-        let unnamed: Vec<usize> = guards.iter().copied().filter(|g| !self.order.contains(g)).collect();
+        let unnamed: Vec<usize> =
+            guards.iter().copied().filter(|g| !self.order.contains(g)).collect();
         let why = match self.options.intersection {
             Intersection::Order(_) if !unnamed.is_empty() => {
                 format!("--intersection order does not name {}", self.names(&unnamed))
             }
             Intersection::Order(_) => {
-                "in the order of --intersection a surface does not attract for each side of the slower ones".into()
+                "in the order of --intersection a surface does not attract for each side of the \
+                    slower ones"
+                    .into()
             }
             _ => "the rule of --intersection has no mixture there".into(),
         };
@@ -474,7 +522,8 @@ impl Follower<'_> {
                 let g = &self.equation.guards[guard];
                 let side = if g.whole { values[i].floor() } else { values[i].signum() };
                 let small = 1e-12 * self.magnitude(&g.expression);
-                let off = if g.whole { (values[i] - values[i].round()).abs() } else { values[i].abs() };
+                let off =
+                    if g.whole { (values[i] - values[i].round()).abs() } else { values[i].abs() };
                 if side != config.sides[guard] && off > small && side.is_finite() {
                     config.sides[guard] = side;
                     jumped = true;
@@ -487,7 +536,8 @@ impl Follower<'_> {
             let sliding = self.sliding.clone();
             self.adopt(config, sliding);
         }
-        let why = "switches make each other jump without end: no side of theirs is consistent".into();
+        let why =
+            "switches make each other jump without end: no side of theirs is consistent".into();
         Err(HybridError::Stuck { t: self.t, x: self.x.clone(), why })
     }
 
@@ -503,8 +553,12 @@ impl Follower<'_> {
         let active = self.compiled.active.len();
         for i in 0..self.watch_side.len() {
             let (value, side) = (values[active + i], self.watch_side[i]);
-            let rests = self.contacts.iter().any(|c| c.watched == i) || passed.contains(&i) || side == 0.0;
-            if rests || value * side >= 0.0 || value.abs() <= 1e-12 * self.magnitude(&self.equation.watched[i]) {
+            let rests =
+                self.contacts.iter().any(|c| c.watched == i) || passed.contains(&i) || side == 0.0;
+            if rests
+                || value * side >= 0.0
+                || value.abs() <= 1e-12 * self.magnitude(&self.equation.watched[i])
+            {
                 continue;
             }
             passed.push(i);
@@ -552,13 +606,15 @@ impl Follower<'_> {
         self.watch_side[i] = if direction == 0.0 { self.side_ahead(place) } else { direction };
     }
 
-    /// The side to which a watched value of third order or more leaves zero: it grows by more than a square. 0 if it stays.
+    /// The side to which a watched value of third order or more leaves zero: it grows by more than
+    /// a square. 0 if it stays.
     fn side_ahead(&mut self, place: usize) -> f64 {
         const BRIEF: f64 = 0.005;
         let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; self.n]);
         self.rhs(t, &x, &mut field);
         let moves = field.iter().zip(&self.size).filter(|(f, size)| **f != 0.0 && **size != 0.0);
-        let brief = BRIEF * moves.map(|(f, size)| size / f.abs()).fold(self.options.t_end - t, f64::min);
+        let brief =
+            BRIEF * moves.map(|(f, size)| size / f.abs()).fold(self.options.t_end - t, f64::min);
         let [near, far] = [brief, 2.0 * brief].map(|h| {
             let mut rhs = |t: f64, x: &[f64]| {
                 let mut out = vec![0.0; x.len()];
@@ -608,7 +664,8 @@ impl Follower<'_> {
     }
 }
 
-/// Whether mixtures of 2^k fields have more than one velocity on their surfaces: the fields are not sums of what each side adds.
+/// Whether mixtures of 2^k fields have more than one velocity on their surfaces: the fields are not
+/// sums of what each side adds.
 pub(super) fn mixtures_differ(fields: &[Vec<f64>]) -> bool {
     let n = fields[0].len();
     let size = fields.iter().flatten().fold(0.0_f64, |most, v| most.max(v.abs()));
@@ -618,5 +675,6 @@ pub(super) fn mixtures_differ(fields: &[Vec<f64>]) -> bool {
             .map(|bit| fields[1 << bit][i] - fields[0][i])
             .sum()
     };
-    (0..fields.len()).any(|v| (0..n).any(|i| (fields[0][i] + added(v, i) - fields[v][i]).abs() > 1e-9 * size))
+    (0..fields.len())
+        .any(|v| (0..n).any(|i| (fields[0][i] + added(v, i) - fields[v][i]).abs() > 1e-9 * size))
 }

@@ -1,4 +1,5 @@
-//! The field that moves a state: one side's, a mixture on surfaces that are slid upon, or that of a contact; and its derivatives.
+//! The field that moves a state: one side's, a mixture on surfaces that are slid upon, or that of a
+//! contact; and its derivatives.
 
 use std::rc::Rc;
 
@@ -57,7 +58,8 @@ impl Follower<'_> {
             .collect();
     }
 
-    /// For several surfaces slid upon of which none changes another's speed: which of them each derivative depends on.
+    /// For several surfaces slid upon of which none changes another's speed: which of them each
+    /// derivative depends on.
     pub(super) fn separate(&self) -> Option<Vec<Option<usize>>> {
         let k = self.sliding.len();
         if k < 2 || self.sliding.iter().any(|g| self.equation.chooses(*g)) {
@@ -75,7 +77,9 @@ impl Follower<'_> {
         }
         for place in 0..k {
             let active = self.compiled.place(self.sliding[place])?;
-            let strange = (0..n).any(|i| self.compiled.depends(n + active, i) && owner[i].is_some_and(|o| o != place));
+            let strange = (0..n).any(|i| {
+                self.compiled.depends(n + active, i) && owner[i].is_some_and(|o| o != place)
+            });
             let asks = (0..k).any(|other| self.compiled.depends(n + active, variable(other)));
             if strange || asks {
                 return None;
@@ -84,8 +88,14 @@ impl Follower<'_> {
         Some(owner)
     }
 
-    /// Weights of surfaces that know nothing of each other, what each adds to its own speed, and the field on all positive sides.
-    pub(super) fn separate_weights(&mut self, t: f64, x: &[f64], field0: &[f64]) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+    /// Weights of surfaces that know nothing of each other, what each adds to its own speed, and
+    /// the field on all positive sides.
+    pub(super) fn separate_weights(
+        &mut self,
+        t: f64,
+        x: &[f64],
+        field0: &[f64],
+    ) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
         let n = self.n;
         self.variables[..n].copy_from_slice(x);
         self.variables[n] = t;
@@ -104,7 +114,8 @@ impl Follower<'_> {
         sides(self, -2.0);
         let mut jumps = Vec::with_capacity(self.sliding.len());
         let weight = |guard: &usize| {
-            let (a, b) = self.compiled.place(*guard).map_or((f64::NAN, f64::NAN), |p| (low[p], high[p]));
+            let (a, b) =
+                self.compiled.place(*guard).map_or((f64::NAN, f64::NAN), |p| (low[p], high[p]));
             jumps.push(b - a);
             -a / (b - a)
         };
@@ -146,16 +157,21 @@ impl Follower<'_> {
             }
         } else if !self.sliding.is_empty() {
             let weights = self.weights(t, x, out);
-            let others: Vec<Vec<f64>> = (0..weights.len()).map(|place| self.positive_field(place, t, x)).collect();
+            let others: Vec<Vec<f64>> =
+                (0..weights.len()).map(|place| self.positive_field(place, t, x)).collect();
             for i in 0..n {
                 let low = out[i];
-                let added = weights.iter().zip(&others).map(|(weight, other)| weight * (other[i] - low));
+                let added =
+                    weights.iter().zip(&others).map(|(weight, other)| weight * (other[i] - low));
                 out[i] = sum(std::iter::once(low).chain(added));
             }
         }
         if !self.contacts.is_empty() {
             let forces = self.contact_forces(out);
-            self.contacts.iter().zip(forces).for_each(|(contact, force)| out[contact.state] += force);
+            self.contacts
+                .iter()
+                .zip(forces)
+                .for_each(|(contact, force)| out[contact.state] += force);
         }
     }
 
@@ -166,14 +182,16 @@ impl Follower<'_> {
         for vertex in 0..1_usize << k {
             let mut config = self.config.clone();
             for (i, guard) in self.sliding.iter().enumerate() {
-                config.sides[*guard] = if vertex >> i & 1 == 1 { self.high(*guard) } else { self.low(*guard) };
+                config.sides[*guard] =
+                    if vertex >> i & 1 == 1 { self.high(*guard) } else { self.low(*guard) };
             }
             corners.push((self.equation.compiled(&config), self.load(&config)));
         }
         self.corners = corners;
     }
 
-    /// The mixture that the rule makes of the fields on all sides, not-a-number where there is none, and those fields.
+    /// The mixture that the rule makes of the fields on all sides, not-a-number where there is
+    /// none, and those fields.
     pub(super) fn corner_mixture(&mut self, t: f64, x: &[f64]) -> (Mixture, Vec<Vec<f64>>) {
         let n = self.n;
         let (mut fields, mut rates) = (Vec::new(), Vec::new());
@@ -188,8 +206,10 @@ impl Follower<'_> {
             fields.push(field);
         }
         let order = self.order_of(&self.sliding);
-        let none =
-            || Mixture { weights: vec![f64::NAN; fields.len()], margins: vec![[f64::NAN; 2]; self.sliding.len()] };
+        let none = || Mixture {
+            weights: vec![f64::NAN; fields.len()],
+            margins: vec![[f64::NAN; 2]; self.sliding.len()],
+        };
         (mixture(&self.options.intersection, &order, &fields, &rates).unwrap_or_else(none), fields)
     }
 
@@ -235,15 +255,22 @@ impl Follower<'_> {
         solve_any(&matrix, &b, 0.0).unwrap_or_else(|| vec![f64::NAN; b.len()])
     }
 
-    /// The derivatives of the functions slid upon on all negative sides, and what each positive side adds, row by row.
-    pub(super) fn sliding_equations(&mut self, t: f64, x: &[f64], field0: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    /// The derivatives of the functions slid upon on all negative sides, and what each positive
+    /// side adds, row by row.
+    pub(super) fn sliding_equations(
+        &mut self,
+        t: f64,
+        x: &[f64],
+        field0: &[f64],
+    ) -> (Vec<f64>, Vec<f64>) {
         let k = self.sliding.len();
         let n = self.n;
         self.variables[..n].copy_from_slice(x);
         self.variables[n] = t;
         let rates = Self::along(&self.compiled, &self.variables, field0);
-        let of =
-            |rates: &[f64], compiled: &Compiled, guard: usize| compiled.place(guard).map_or(f64::NAN, |i| rates[i]);
+        let of = |rates: &[f64], compiled: &Compiled, guard: usize| {
+            compiled.place(guard).map_or(f64::NAN, |i| rates[i])
+        };
         let a: Vec<f64> = self.sliding.iter().map(|g| of(&rates, &self.compiled, *g)).collect();
         let mut matrix = vec![0.0; k * k];
         for column in 0..k {
@@ -259,19 +286,26 @@ impl Follower<'_> {
 
     /// How the contacts' states move the derivatives of their expressions, row by row.
     pub(super) fn grips(&self, field: &[f64]) -> Vec<f64> {
-        let columns: Vec<Vec<f64>> = self.contacts.iter().map(|c| self.second_along(field, Some(c.state))).collect();
+        let columns: Vec<Vec<f64>> =
+            self.contacts.iter().map(|c| self.second_along(field, Some(c.state))).collect();
         let place = |c: &Contact| self.compiled.active.len() + c.watched;
-        self.contacts.iter().flat_map(|c| columns.iter().map(|column| column[place(c)]).collect::<Vec<_>>()).collect()
+        self.contacts
+            .iter()
+            .flat_map(|c| columns.iter().map(|column| column[place(c)]).collect::<Vec<_>>())
+            .collect()
     }
 
-    /// What is added to the speed of each contact's state under `field`, so that its expression stays at zero; not-a-number where nothing does.
+    /// What is added to the speed of each contact's state under `field`, so that its expression
+    /// stays at zero; not-a-number where nothing does.
     pub(super) fn contact_forces(&self, field: &[f64]) -> Vec<f64> {
         let rates = self.second_along(field, None);
-        let pulls: Vec<f64> = self.contacts.iter().map(|c| -rates[self.compiled.active.len() + c.watched]).collect();
+        let pulls: Vec<f64> =
+            self.contacts.iter().map(|c| -rates[self.compiled.active.len() + c.watched]).collect();
         solve_any(&self.grips(field), &pulls, 0.0).unwrap_or_else(|| vec![f64::NAN; pulls.len()])
     }
 
-    /// Second derivatives of the watched values along the field; or the derivatives of their first ones by a state.
+    /// Second derivatives of the watched values along the field; or the derivatives of their first
+    /// ones by a state.
     pub(super) fn second_along(&self, field: &[f64], by: Option<usize>) -> Vec<f64> {
         let n = self.n;
         let mut direction = vec![0.0; self.variables.len()];
@@ -282,8 +316,12 @@ impl Follower<'_> {
                 direction[n] = 1.0;
             }
         }
-        let duals: Vec<Dual<f64, 1>> =
-            self.variables.iter().zip(&direction).map(|(v, d)| Dual { value: *v, partials: [*d] }).collect();
+        let duals: Vec<Dual<f64, 1>> = self
+            .variables
+            .iter()
+            .zip(&direction)
+            .map(|(v, d)| Dual { value: *v, partials: [*d] })
+            .collect();
         let mut slopes = vec![Dual::constant(0.0); n];
         self.compiled.field.evaluate(&duals, &mut slopes);
         let nested: Vec<Nested> = (0..self.variables.len())
@@ -331,7 +369,9 @@ impl Follower<'_> {
             // What the field's bends add, and the rest, may cancel to rounding.
             for (o, gradient) in compiled.gradients(&self.variables).iter().enumerate() {
                 let (mut by_bends, mut size) = (0.0, 0.0);
-                for (variable, slope) in compiled.touches[o].iter().zip(gradient).filter(|(v, _)| **v < n) {
+                for (variable, slope) in
+                    compiled.touches[o].iter().zip(gradient).filter(|(v, _)| **v < n)
+                {
                     by_bends += slope * bends[*variable];
                     size += (slope * bends[*variable]).abs();
                 }
@@ -346,7 +386,8 @@ impl Follower<'_> {
     }
 }
 
-/// A sum, zero where only rounding is left: a speed of a state that stays at zero would be resolved as a motion.
+/// A sum, zero where only rounding is left: a speed of a state that stays at zero would be resolved
+/// as a motion.
 fn sum(terms: impl Iterator<Item = f64>) -> f64 {
     let (sum, size) = terms.fold((0.0, 0.0), |(sum, size), v| (sum + v, size + v.abs()));
     if sum.abs() <= 4.0 * f64::EPSILON * size { 0.0 } else { sum }

@@ -1,11 +1,14 @@
 //! Tangent vectors along a motion, and what they say: Lyapunov exponents and Floquet multipliers.
 //!
-//! Between switches a tangent vector is carried by the derivative of the method's own step. Where a surface is met at the speed m' of its function, with
-//! fields f- before and f+ behind and a reset R, it is multiplied by the *saltation matrix* (Aizerman & Gantmakher 1958; Leine & Nijmeijer 2004, ch. 7)
+//! Between switches a tangent vector is carried by the derivative of the method's own step. Where a
+//! surface is met at the speed m' of its function, with fields f- before and f+ behind and a reset
+//! R, it is multiplied by the *saltation matrix* (Aizerman & Gantmakher 1958; Leine & Nijmeijer
+//! 2004, ch. 7)
 //!
 //! S = DR + (f+ - DR f- - dR/dt) (grad m)^T / m'.
 //!
-//! Behind it f+ may be a sliding field: S then takes away what is normal to the surface. Where sliding ends the field is continuous, and S = 1.
+//! Behind it f+ may be a sliding field: S then takes away what is normal to the surface. Where
+//! sliding ends the field is continuous, and S = 1.
 
 use super::{Ending, Follower, HybridError, Options, Record, Sought};
 use crate::Model;
@@ -39,8 +42,8 @@ pub(super) struct Before {
 }
 
 impl Follower<'_> {
-    /// Carries the tangent vectors through a step, by the derivative of its stages; gives the largest error that the embedded formula estimates,
-    /// relative to the vector.
+    /// Carries the tangent vectors through a step, by the derivative of its stages; gives the
+    /// largest error that the embedded formula estimates, relative to the vector.
     pub(super) fn carry(&mut self, step: &Step) -> f64 {
         let Some(mut tangents) = self.tangents.take() else { return 0.0 };
         let n = self.n;
@@ -108,23 +111,24 @@ impl Follower<'_> {
             compiled.field.evaluate(variables, &mut out);
             out
         };
-        let along = |compiled: &crate::equation::Compiled, variables: &[D], field: &[D]| -> Vec<D> {
-            let nested: Vec<DD> = variables
-                .iter()
-                .enumerate()
-                .map(|(i, value)| {
-                    let partial = match i {
-                        i if i < n => field[i],
-                        i if i == n => D::constant(1.0),
-                        _ => D::constant(0.0),
-                    };
-                    Dual { value: *value, partials: [partial] }
-                })
-                .collect();
-            let mut out = vec![DD::constant(D::constant(0.0)); compiled.outputs];
-            compiled.watched.evaluate(&nested, &mut out);
-            out.iter().map(|d| d.partials[0]).collect()
-        };
+        let along =
+            |compiled: &crate::equation::Compiled, variables: &[D], field: &[D]| -> Vec<D> {
+                let nested: Vec<DD> = variables
+                    .iter()
+                    .enumerate()
+                    .map(|(i, value)| {
+                        let partial = match i {
+                            i if i < n => field[i],
+                            i if i == n => D::constant(1.0),
+                            _ => D::constant(0.0),
+                        };
+                        Dual { value: *value, partials: [partial] }
+                    })
+                    .collect();
+                let mut out = vec![DD::constant(D::constant(0.0)); compiled.outputs];
+                compiled.watched.evaluate(&nested, &mut out);
+                out.iter().map(|d| d.partials[0]).collect()
+            };
         let variables = load(&self.variables);
         let low = field(&self.compiled, &variables);
         let k = self.sliding.len();
@@ -167,8 +171,9 @@ impl Follower<'_> {
         out.iter().map(|d| d.partials[0]).collect()
     }
 
-    /// Begins to carry these vectors. Of a motion that begins in sliding they lose what is normal to the surfaces at once: a neighbour off a surface
-    /// comes back to it in a time that is proportional to its distance, whichever side it is on.
+    /// Begins to carry these vectors. Of a motion that begins in sliding they lose what is normal
+    /// to the surfaces at once: a neighbour off a surface comes back to it in a time that is
+    /// proportional to its distance, whichever side it is on.
     pub(super) fn begin_tangents(&mut self, mut vectors: Vec<Vec<f64>>) -> Result<(), HybridError> {
         let (n, k) = (self.n, self.sliding.len());
         if k > 0 {
@@ -183,7 +188,9 @@ impl Follower<'_> {
                 Some(owners) => {
                     let (_, jumps, field1) = self.separate_weights(t, &x, &field0);
                     let of = |place: usize| {
-                        let own = |i: usize| if owners[i] == Some(place) { field1[i] - field0[i] } else { 0.0 };
+                        let own = |i: usize| {
+                            if owners[i] == Some(place) { field1[i] - field0[i] } else { 0.0 }
+                        };
                         (0..n).map(own).collect()
                     };
                     let diagonal = |i: usize| if i / k == i % k { jumps[i / k] } else { 0.0 };
@@ -191,8 +198,12 @@ impl Follower<'_> {
                 }
                 None => {
                     let matrix = self.sliding_equations(t, &x, &field0).1;
-                    let difference = |high: Vec<f64>| high.iter().zip(&field0).map(|(a, b)| a - b).collect();
-                    ((0..k).map(|place| difference(self.positive_field(place, t, &x))).collect(), matrix)
+                    let difference =
+                        |high: Vec<f64>| high.iter().zip(&field0).map(|(a, b)| a - b).collect();
+                    (
+                        (0..k).map(|place| difference(self.positive_field(place, t, &x))).collect(),
+                        matrix,
+                    )
                 }
             };
             self.variables[..n].copy_from_slice(&x);
@@ -201,7 +212,9 @@ impl Follower<'_> {
             let in_time = Self::along(&compiled, &self.variables, &vec![0.0; n]);
             for y in &mut vectors {
                 let moved = Self::along(&compiled, &self.variables, y);
-                let off = |guard: &usize| compiled.place(*guard).map_or(f64::NAN, |p| in_time[p] - moved[p]);
+                let off = |guard: &usize| {
+                    compiled.place(*guard).map_or(f64::NAN, |p| in_time[p] - moved[p])
+                };
                 let off: Vec<f64> = self.sliding.iter().map(off).collect();
                 let Some(weights) = solve_any(&matrix, &off, 0.0) else {
                     return Err(self.no_tangents("motion begins where sliding is not defined"));
@@ -230,7 +243,9 @@ impl Follower<'_> {
         let mut found: Option<(Vec<f64>, f64)> = None;
         for sought in met {
             let place = match *sought {
-                Sought::Guard { guard, .. } => self.compiled.active.iter().position(|g| *g == guard),
+                Sought::Guard { guard, .. } => {
+                    self.compiled.active.iter().position(|g| *g == guard)
+                }
                 Sought::Watched(i) => Some(self.compiled.active.len() + i),
                 _ => None,
             };
@@ -246,20 +261,27 @@ impl Follower<'_> {
                 *slope = out[place].partials[0];
             }
             let in_time = gradient.pop().unwrap_or(0.0);
-            let terms: f64 = gradient.iter().zip(&field).map(|(g, f)| (g * f).abs()).sum::<f64>() + in_time.abs();
+            let terms: f64 = gradient.iter().zip(&field).map(|(g, f)| (g * f).abs()).sum::<f64>()
+                + in_time.abs();
             let speed: f64 = gradient.iter().zip(&field).map(|(g, f)| g * f).sum::<f64>() + in_time;
-            if !(speed.abs() > 1e-9 * terms) || self.only_touches(place, &gradient, &x, &field, speed) {
+            if !(speed.abs() > 1e-9 * terms)
+                || self.only_touches(place, &gradient, &x, &field, speed)
+            {
                 return Err(self.no_tangents(
-                    "a surface is only touched (grazing), where neighbours have no common linear motion",
+                    "a surface is only touched (grazing), where neighbours have no common linear \
+                        motion",
                 ));
             }
             let scaled: Vec<f64> = gradient.iter().map(|g| g / speed).collect();
             if let Some((other, s)) = &found {
-                let differ =
-                    other.iter().zip(&scaled).any(|(a, b)| (a / s - b).abs() > 1e-6 * (b.abs() + (a / s).abs()));
+                let differ = other
+                    .iter()
+                    .zip(&scaled)
+                    .any(|(a, b)| (a / s - b).abs() > 1e-6 * (b.abs() + (a / s).abs()));
                 if differ {
                     return Err(self.no_tangents(
-                        "two surfaces are met at one moment, where neighbours have no common linear motion",
+                        "two surfaces are met at one moment, where neighbours have no common \
+                            linear motion",
                     ));
                 }
                 continue;
@@ -268,20 +290,35 @@ impl Follower<'_> {
         }
         Ok(Some(match found {
             Some((gradient, speed)) => Before { field, gradient, speed },
-            // The field is continuous, or the time is fixed: nothing is met earlier or later by a neighbour.
+            // The field is continuous, or the time is fixed: nothing is met earlier or later by a
+            // neighbour.
             None => Before { field, gradient: vec![0.0; n], speed: 1.0 },
         }))
     }
 
-    /// Whether motion that meets a surface at this speed turns back behind it by no more than rounding: the depth is speed^2/(2 acceleration).
-    fn only_touches(&self, place: usize, gradient: &[f64], x: &[f64], field: &[f64], speed: f64) -> bool {
+    /// Whether motion that meets a surface at this speed turns back behind it by no more than
+    /// rounding: the depth is speed^2/(2 acceleration).
+    fn only_touches(
+        &self,
+        place: usize,
+        gradient: &[f64],
+        x: &[f64],
+        field: &[f64],
+        speed: f64,
+    ) -> bool {
         // Sliding ends where its field meets a surface, which it may do as slowly as it likes.
         if !self.sliding.is_empty() {
             return false;
         }
         let n = self.n;
-        let size: f64 = gradient.iter().zip(&self.size).zip(x).map(|((g, s), x)| g.abs() * s.max(x.abs())).sum();
-        let shares = field.iter().zip(&self.size).zip(x).map(|((f, s), x)| f.abs() / s.max(x.abs()));
+        let size: f64 = gradient
+            .iter()
+            .zip(&self.size)
+            .zip(x)
+            .map(|((g, s), x)| g.abs() * s.max(x.abs()))
+            .sum();
+        let shares =
+            field.iter().zip(&self.size).zip(x).map(|((f, s), x)| f.abs() / s.max(x.abs()));
         let ahead = 1e-6 / shares.filter(|s| s.is_finite()).fold(f64::MIN_POSITIVE, f64::max);
         let mut there = self.variables.clone();
         (0..n).for_each(|i| there[i] = x[i] + ahead * field[i]);
@@ -293,10 +330,15 @@ impl Follower<'_> {
     }
 
     pub(super) fn no_tangents(&self, why: &str) -> HybridError {
-        HybridError::Stuck { t: self.t, x: self.x.clone(), why: format!("tangent vectors end: {why}") }
+        HybridError::Stuck {
+            t: self.t,
+            x: self.x.clone(),
+            why: format!("tangent vectors end: {why}"),
+        }
     }
 
-    /// Notes the derivative of a reset, for tangent vectors, after those of this moment that were noted before.
+    /// Notes the derivative of a reset, for tangent vectors, after those of this moment that were
+    /// noted before.
     pub(super) fn note_reset(&mut self, set: &[(usize, Expression)], old: &[f64]) {
         if self.tangents.is_none() {
             return;
@@ -307,7 +349,8 @@ impl Follower<'_> {
         let mut by_time = vec![0.0; n];
         for (state, e) in set {
             let value = |t: f64, x: &[f64]| self.equation.value(e, t, x);
-            // Central differences with a step for each state's own size, by Richardson's extrapolation of two.
+            // Central differences with a step for each state's own size, by Richardson's
+            // extrapolation of two.
             let slope = |f: &dyn Fn(f64) -> f64, h: f64| {
                 let d = |h: f64| (f(h) - f(-h)) / (2.0 * h);
                 (4.0 * d(0.5 * h) - d(h)) / 3.0
@@ -326,8 +369,9 @@ impl Follower<'_> {
         }
         let Some(tangents) = &mut self.tangents else { return };
         if let Some((first, first_by_time)) = &tangents.reset {
-            let times =
-                |column: &dyn Fn(usize) -> f64, i: usize| (0..n).map(|k| by_state[i * n + k] * column(k)).sum::<f64>();
+            let times = |column: &dyn Fn(usize) -> f64, i: usize| {
+                (0..n).map(|k| by_state[i * n + k] * column(k)).sum::<f64>()
+            };
             let both = (0..n * n).map(|at| times(&|k| first[k * n + at % n], at / n)).collect();
             let late = (0..n).map(|i| times(&|k| first_by_time[k], i) + by_time[i]).collect();
             (by_state, by_time) = (both, late);
@@ -351,11 +395,13 @@ impl Follower<'_> {
             (0..n).for_each(|i| one[i * n + i] = 1.0);
             (one, vec![0.0; n])
         });
-        let times =
-            |v: &[f64]| -> Vec<f64> { (0..n).map(|i| (0..n).map(|j| by_state[i * n + j] * v[j]).sum()).collect() };
+        let times = |v: &[f64]| -> Vec<f64> {
+            (0..n).map(|i| (0..n).map(|j| by_state[i * n + j] * v[j]).sum()).collect()
+        };
         let moved = times(&before.field);
         for y in &mut tangents.vectors {
-            let later = before.gradient.iter().zip(y.iter()).map(|(g, y)| g * y).sum::<f64>() / before.speed;
+            let later = before.gradient.iter().zip(y.iter()).map(|(g, y)| g * y).sum::<f64>()
+                / before.speed;
             let new = times(y);
             for i in 0..n {
                 y[i] = new[i] + (field[i] - moved[i] - by_time[i]) * later;
@@ -397,24 +443,29 @@ fn solve_duals(mut a: Vec<D>, mut b: Vec<D>) -> Vec<D> {
 /// Tangent vectors are carried by the stages of explicit steps.
 pub(super) fn explicit(options: &Options) -> Result<(), HybridError> {
     if options.intersection != crate::selection::Intersection::Undecided {
-        let why = "tangent vectors are not carried through mixtures that a rule chooses; leave --intersection out";
+        let why = "tangent vectors are not carried through mixtures that a rule chooses; leave \
+            --intersection out";
         return Err(HybridError::Bad(why.into()));
     }
     match options.method {
         super::Method::Dopri5 => Ok(()),
-        other => {
-            Err(HybridError::Bad(format!("tangent vectors are carried by dopri5; leave --method {} out", other.name())))
-        }
+        other => Err(HybridError::Bad(format!(
+            "tangent vectors are carried by dopri5; leave --method {} out",
+            other.name()
+        ))),
     }
 }
 
 /// Lyapunov exponents.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Exponents {
-    /// The exponents, largest first, per unit time; minus infinity for directions that sliding takes away.
+    /// The exponents, largest first, per unit time; minus infinity for directions that sliding
+    /// takes away.
     pub values: Vec<f64>,
-    /// Half the width of a 95 % interval of each: the scatter of twenty parts of the run, or how far the growth swings about its line if that is more (in
-    /// regular motion parts are alike, and the mean over no whole number of periods is off); what growth like a power of time adds; and the method's errors.
+    /// Half the width of a 95 % interval of each: the scatter of twenty parts of the run, or how
+    /// far the growth swings about its line if that is more (in regular motion parts are alike, and
+    /// the mean over no whole number of periods is off); what growth like a power of time adds; and
+    /// the method's errors.
     pub errors: Vec<f64>,
     /// From when to when the mean was taken.
     pub times: (f64, f64),
@@ -425,12 +476,18 @@ const PARTS: usize = 20;
 /// Student's t for 19 degrees of freedom, 95 %.
 const STUDENT: f64 = 2.093;
 
-/// The `count` largest Lyapunov exponents of the orbit from the start, after `transient`: Benettin, Galgani, Giorgilli & Strelcyn (1980), with saltation
-/// matrices at every switch and reset.
+/// The `count` largest Lyapunov exponents of the orbit from the start, after `transient`: Benettin,
+/// Galgani, Giorgilli & Strelcyn (1980), with saltation matrices at every switch and reset.
 ///
 /// # Errors
-/// As [`follow`](super::follow); also where tangent vectors end: at a grazing, at two surfaces at once, at rest after accumulated impacts.
-pub fn exponents(model: &Model, options: &Options, transient: f64, count: usize) -> Result<Exponents, HybridError> {
+/// As [`follow`](super::follow); also where tangent vectors end: at a grazing, at two surfaces at
+/// once, at rest after accumulated impacts.
+pub fn exponents(
+    model: &Model,
+    options: &Options,
+    transient: f64,
+    count: usize,
+) -> Result<Exponents, HybridError> {
     explicit(options)?;
     let begin = options.t_start + transient;
     if !(transient >= 0.0 && begin < options.t_end) {
@@ -459,7 +516,8 @@ pub fn exponents(model: &Model, options: &Options, transient: f64, count: usize)
     let (outcome, follower) = follower.run_whole(&mut |_| true)?;
     if outcome.ending != Ending::Finished {
         return Err(HybridError::Bad(format!(
-            "the run ends at t = {}, before its end time, and there is no mean: end it before that (--t-end)",
+            "the run ends at t = {}, before its end time, and there is no mean: end it before that \
+                (--t-end)",
             outcome.t
         )));
     }
@@ -470,7 +528,8 @@ pub fn exponents(model: &Model, options: &Options, transient: f64, count: usize)
         let rates: Vec<f64> = sums.iter().map(|s| s / part).collect();
         let from = growth.from.unwrap_or(begin);
         let mean = sums.iter().sum::<f64>() / (options.t_end - from);
-        let half_width = if mean.is_finite() { growth.half_width(k, mean, &rates, part, options) } else { 0.0 };
+        let half_width =
+            if mean.is_finite() { growth.half_width(k, mean, &rates, part, options) } else { 0.0 };
         found.push((mean, half_width));
     }
     // Sliding takes away the direction that it takes away, whichever vector that is.
@@ -535,8 +594,8 @@ impl Follower<'_> {
     /// Makes the tangent vectors orthonormal again and notes by how much they grew until `t`.
     pub(super) fn note_growth(&mut self, t: f64) {
         let (Some(growth), Some(tangents)) = (&mut self.growth, &mut self.tangents) else { return };
-        let part =
-            ((t - growth.begin) / (growth.end - growth.begin) * PARTS as f64).clamp(0.0, PARTS as f64 - 1.0) as usize;
+        let part = ((t - growth.begin) / (growth.end - growth.begin) * PARTS as f64)
+            .clamp(0.0, PARTS as f64 - 1.0) as usize;
         for i in 0..tangents.vectors.len() {
             let (done, open) = tangents.vectors.split_at_mut(i);
             let y = &mut open[0];
@@ -583,17 +642,23 @@ pub struct ClosedOrbit {
     pub x: Vec<f64>,
     /// Its period.
     pub period: f64,
-    /// Its Floquet multipliers, largest first (real and imaginary parts); of an autonomous system without the one that is 1.
+    /// Its Floquet multipliers, largest first (real and imaginary parts); of an autonomous system
+    /// without the one that is 1.
     pub multipliers: Vec<[f64; 2]>,
     /// How far it is from closed, in the largest of its states' sizes.
     pub gap: f64,
 }
 
-/// Finds a closed orbit near the start of `options` by Newton's method on the return map, whose derivative is carried along with saltation matrices.
+/// Finds a closed orbit near the start of `options` by Newton's method on the return map, whose
+/// derivative is carried along with saltation matrices.
 ///
 /// # Errors
 /// As [`follow`](super::follow); also if there is no return, or the iteration does not settle.
-pub fn closed_orbit(model: &Model, options: &Options, after: &Return) -> Result<ClosedOrbit, HybridError> {
+pub fn closed_orbit(
+    model: &Model,
+    options: &Options,
+    after: &Return,
+) -> Result<ClosedOrbit, HybridError> {
     explicit(options)?;
     let mut options = options.clone();
     let n = model.coordinates().len();
@@ -609,7 +674,8 @@ pub fn closed_orbit(model: &Model, options: &Options, after: &Return) -> Result<
     let mut best: Option<ClosedOrbit> = None;
     let gap_of = |best: &Option<ClosedOrbit>| best.as_ref().map_or(f64::INFINITY, |b| b.gap);
     for _ in 0..30 {
-        let Turn { time, end, mode, mut matrix, section, size } = turn(model, &options, after, &x, true)?;
+        let Turn { time, end, mode, mut matrix, section, size } =
+            turn(model, &options, after, &x, true)?;
         // The same state in another mode is another point.
         if mode != options.mode {
             (x, options.mode) = (end, mode);
@@ -619,7 +685,8 @@ pub fn closed_orbit(model: &Model, options: &Options, after: &Return) -> Result<
         if let Some((gradient, field)) = &section {
             let speed: f64 = gradient.iter().zip(field).map(|(g, f)| g * f).sum();
             for j in 0..n {
-                let late: f64 = (0..n).map(|i| gradient[i] * matrix[i * n + j]).sum::<f64>() / speed;
+                let late: f64 =
+                    (0..n).map(|i| gradient[i] * matrix[i * n + j]).sum::<f64>() / speed;
                 (0..n).for_each(|i| matrix[i * n + j] -= field[i] * late);
             }
         }
@@ -629,12 +696,15 @@ pub fn closed_orbit(model: &Model, options: &Options, after: &Return) -> Result<
             && gap_of(&best) <= 1e-8
             && let Some(best) = best
         {
-            // As near as rounding lets it come. Where orbits are not isolated the next step may lead anywhere.
+            // As near as rounding lets it come. Where orbits are not isolated the next step may
+            // lead anywhere.
             return Ok(best);
         }
         if off < gap_of(&best) {
             let mut multipliers = eigenvalues(&matrix, n).unwrap_or_default();
-            multipliers.sort_by(|a, b| (b[0] * b[0] + b[1] * b[1]).total_cmp(&(a[0] * a[0] + a[1] * a[1])));
+            multipliers.sort_by(|a, b| {
+                (b[0] * b[0] + b[1] * b[1]).total_cmp(&(a[0] * a[0] + a[1] * a[1]))
+            });
             if section.is_some() {
                 // The return map has an eigenvalue 0 along the field, which is none of the orbit's.
                 multipliers.pop();
@@ -655,7 +725,8 @@ pub fn closed_orbit(model: &Model, options: &Options, after: &Return) -> Result<
         x.iter_mut().zip(&change).for_each(|(x, c)| *x += c);
     }
     Err(HybridError::NoOrbit(format!(
-        "Newton's method found no closed orbit (the best return was {:e} off): start nearer (--start), or let the motion settle longer",
+        "Newton's method found no closed orbit (the best return was {:e} off): start nearer \
+            (--start), or let the motion settle longer",
         gap_of(&best)
     )))
 }
@@ -674,7 +745,13 @@ struct Turn {
 }
 
 /// `on_section`: the start is on the section, whatever rounding says.
-fn turn(model: &Model, options: &Options, after: &Return, x: &[f64], on_section: bool) -> Result<Turn, HybridError> {
+fn turn(
+    model: &Model,
+    options: &Options,
+    after: &Return,
+    x: &[f64],
+    on_section: bool,
+) -> Result<Turn, HybridError> {
     let n = x.len();
     let mut settings = Options { start: Some(x.to_vec()), ..options.clone() };
     let mut wanted = usize::MAX;
@@ -711,7 +788,8 @@ fn turn(model: &Model, options: &Options, after: &Return, x: &[f64], on_section:
             Ending::Finished | Ending::Interrupted => "and is not followed further".to_owned(),
         };
         let why = format!(
-            "the orbit does not come back to the section by t = {}, state {:?}, {ending}: follow it longer (--longest-return), or give another section or start",
+            "the orbit does not come back to the section by t = {}, state {:?}, {ending}: follow \
+                it longer (--longest-return), or give another section or start",
             outcome.t, outcome.x
         );
         return Err(HybridError::NoOrbit(why));
@@ -733,5 +811,12 @@ fn turn(model: &Model, options: &Options, after: &Return, x: &[f64], on_section:
         }
     };
     let size = follower.size.iter().fold(0.0_f64, |most, s| most.max(*s));
-    Ok(Turn { time: outcome.t - settings.t_start, end: outcome.x, mode: outcome.mode, matrix, section, size })
+    Ok(Turn {
+        time: outcome.t - settings.t_start,
+        end: outcome.x,
+        mode: outcome.mode,
+        matrix,
+        section,
+        size,
+    })
 }

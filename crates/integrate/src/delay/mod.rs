@@ -2,18 +2,20 @@
 //! limit eps -> 0, f+ while h(x(t - delay)) > 0 and f- otherwise. A relay with memory: f+ until h
 //! falls to -band, f- until it rises to band.
 //!
-//! Jeffrey (2013), end of sec. 4.3, names the delay as a fourth way to resolve a discontinuity and leaves it out. The relay is the sharp form of the
-//! hysteresis there (Tsypkin 1984).
+//! Jeffrey (2013), end of sec. 4.3, names the delay as a fourth way to resolve a discontinuity and
+//! leaves it out. The relay is the sharp form of the hysteresis there (Tsypkin 1984).
 //!
 //! - The sharp rule: between switches the motion follows a smooth field. Zeros of h are located on
 //! dense output, and each causes a switch one delay later, so the only past that is kept is a queue
 //! of pending switches. Every switch ends a step.
 //! - The relay: the same with passages of the band's far edge, each of which is a switch at once.
-//! - The smooth rule: the method of steps (Bellman 1961; Hairer, Norsett & Wanner 1993, sec. II.17; Bellen & Zennaro 2003). No step is longer than the delay, so
-//!   that its stages ask only for a past that is known: the continuous extensions of the steps in the last delay. Where a jump of a derivative
-//!   arrives that the method's order can see, a step ends.
+//! - The smooth rule: the method of steps (Bellman 1961; Hairer, Norsett & Wanner 1993, sec. II.17;
+//!   Bellen & Zennaro 2003). No step is longer than the delay, so that its stages ask only for a
+//!   past that is known: the continuous extensions of the steps in the last delay. Where a jump of
+//!   a derivative arrives that the method's order can see, a step ends.
 //!
-//! All are followed by [`Stepper`](super::Stepper)s with the equation inside: the field that a driver hands them is not looked at ([`Own`]).
+//! All are followed by [`Stepper`](super::Stepper)s with the equation inside: the field that a
+//! driver hands them is not looked at ([`Own`]).
 
 mod past;
 mod sharp;
@@ -121,7 +123,8 @@ pub const SHARP_METHODS: [Method; 3] = [Method::Dopri5, Method::Taylor, Method::
 /// Methods that follow the smooth rule.
 pub const SMOOTH_METHODS: [Method; 2] = [Method::Dopri5, Method::Radau5];
 
-/// The field that is handed to a driver whose stepper has the equation inside. Never evaluated by it.
+/// The field that is handed to a driver whose stepper has the equation inside. Never evaluated by
+/// it.
 #[derive(Clone, Copy, Debug)]
 pub struct Own;
 
@@ -224,7 +227,12 @@ impl<'a, P> Sides<'a, P> {
     }
 
     /// Where the orbit passes h = `level` in `step`.
-    fn passages<const N: usize>(&self, passages: &mut CrossingFinder, step: &Step<'_, N>, level: f64) -> Vec<Crossing>
+    fn passages<const N: usize>(
+        &self,
+        passages: &mut CrossingFinder,
+        step: &Step<'_, N>,
+        level: f64,
+    ) -> Vec<Crossing>
     where
         P: PiecewiseSmooth<N>,
     {
@@ -243,7 +251,8 @@ pub(super) trait Cuttable<const N: usize> {
     const CUTS_EXACTLY: bool;
     /// A time and a state as they are meant.
     fn exactly(&self, t: f64, x: SVector<f64, N>) -> (Self::Number, SVector<Self::Number, N>);
-    /// Starts towards `end` with steps no longer than `longest`; `again` says that the field is the last one.
+    /// Starts towards `end` with steps no longer than `longest`; `again` says that the field is the
+    /// last one.
     fn begin<F: VectorField<N>>(
         &mut self,
         field: &F,
@@ -271,7 +280,8 @@ pub(super) trait Cuttable<const N: usize> {
 /// Times nearer to each other than this part of them are one.
 const ONE_TIME: f64 = 4.0 * f64::EPSILON;
 
-/// The least delay, as a part of the time at which a run ends: f64 tells the times of one delay apart to a part in a thousand.
+/// The least delay, as a part of the time at which a run ends: f64 tells the times of one delay
+/// apart to a part in a thousand.
 pub const LEAST_DELAY: f64 = 1024.0 * f64::EPSILON;
 
 /// Whether times until `t_end` can be told apart within a delay.
@@ -279,7 +289,12 @@ pub const LEAST_DELAY: f64 = 1024.0 * f64::EPSILON;
 /// # Errors
 ///
 /// If they cannot.
-fn resolves<const N: usize>(delay: f64, t: f64, x: &SVector<f64, N>, t_end: f64) -> Result<(), Failure> {
+fn resolves<const N: usize>(
+    delay: f64,
+    t: f64,
+    x: &SVector<f64, N>,
+    t_end: f64,
+) -> Result<(), Failure> {
     if delay > 0.0 && delay < LEAST_DELAY * t_end {
         return Err(Failure::StepUnderflow { t, h: delay, state: x.as_slice().to_vec() });
     }
@@ -399,7 +414,9 @@ impl<'a, P: PiecewiseSmooth<N> + Clone, const N: usize> Delayed<'a, P, N> {
     /// What the smooth rule is described by, if this is one.
     fn smooth(&self) -> Option<((Transition, f64), f64, History)> {
         match self.switch {
-            LateSwitch::Delayed { delay, smooth, history } => smooth.map(|layer| (layer, delay, history)),
+            LateSwitch::Delayed { delay, smooth, history } => {
+                smooth.map(|layer| (layer, delay, history))
+            }
             LateSwitch::Relay { .. } => None,
         }
     }
@@ -409,20 +426,26 @@ impl<'a, P: PiecewiseSmooth<N> + Clone, const N: usize> Delayed<'a, P, N> {
         Sharp::new(self, [dopri5(), dopri5()])
     }
 
-    /// Gives a stepper by Dormand and Prince's method that carries a disturbance along to `user`, for a system [with a tangent vector](Varied).
+    /// Gives a stepper by Dormand and Prince's method that carries a disturbance along to `user`,
+    /// for a system [with a tangent vector](Varied).
     ///
     /// # Errors
     ///
     /// If there is no such history.
-    pub fn with_tangent<U: WithTangent<N>>(&self, tolerance: Tolerance, user: U) -> Result<U::Answer, DelayError>
+    pub fn with_tangent<U: WithTangent<N>>(
+        &self,
+        tolerance: Tolerance,
+        user: U,
+    ) -> Result<U::Answer, DelayError>
     where
         P: Carry<N>,
     {
         Ok(match self.smooth() {
             None => user.with(self.sharp_dopri5(tolerance)?.carrying(self.sides.system)),
-            Some(smooth) => {
-                user.with(Smooth::new(self, smooth, Dopri5::new(tolerance), tolerance)?.carrying(self.sides.system))
-            }
+            Some(smooth) => user.with(
+                Smooth::new(self, smooth, Dopri5::new(tolerance), tolerance)?
+                    .carrying(self.sides.system),
+            ),
         })
     }
 }

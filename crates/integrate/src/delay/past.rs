@@ -81,7 +81,9 @@ impl<const N: usize> Interpolant<N> for Polynomial<N> {
     /// So does its distance from the chord, whose coefficients are equidistant.
     fn bend(&self, i: usize) -> f64 {
         let c = self.coefficients.each_ref().map(|c| c[i]);
-        (1..4).fold(0.0_f64, |bend, k| bend.max((c[k] - (c[0] + 0.25 * k as f64 * (c[4] - c[0]))).abs()))
+        (1..4).fold(0.0_f64, |bend, k| {
+            bend.max((c[k] - (c[0] + 0.25 * k as f64 * (c[4] - c[0]))).abs())
+        })
     }
     /// Differences of coefficients are those of the derivative.
     fn is_monotone(&self, i: usize) -> bool {
@@ -136,12 +138,19 @@ impl<M: Stepper<N>, const N: usize> Cuttable<N> for Cut<M, N> {
     fn advance<F: VectorField<N>>(&mut self, field: &F) -> Result<(), Failure> {
         let step = self.method.step(field)?;
         (self.t0, self.t1, self.x1) = (step.t0, step.t1, step.x1);
-        self.polynomial = Polynomial::of(&step).expect("this method's interpolant is a polynomial of degree 4 or less");
+        self.polynomial = Polynomial::of(&step)
+            .expect("this method's interpolant is a polynomial of degree 4 or less");
         Ok(())
     }
 
     fn last(&self) -> Step<'_, N> {
-        Step { t0: self.t0, t1: self.t1, x0: self.polynomial.x0, x1: self.x1, interpolant: &self.polynomial }
+        Step {
+            t0: self.t0,
+            t1: self.t1,
+            x0: self.polynomial.x0,
+            x1: self.x1,
+            interpolant: &self.polynomial,
+        }
     }
 
     fn start(&self) -> f64 {
@@ -200,7 +209,11 @@ impl<const N: usize> Past<N> {
     pub(super) fn put_before(&mut self, step: &Step<'_, N>) {
         let Some(polynomial) = Polynomial::of(step) else { return };
         self.before = step.x1;
-        self.pieces.push_front(Piece { t0: -step.t1, t1: -step.t0, polynomial: polynomial.backwards() });
+        self.pieces.push_front(Piece {
+            t0: -step.t1,
+            t1: -step.t0,
+            polynomial: polynomial.backwards(),
+        });
     }
 
     /// Adds a step, and forgets what was over at the time `until`.
@@ -222,7 +235,9 @@ impl<const N: usize> Past<N> {
             Look::Before => self.pieces.partition_point(|p| p.t1 < t - slack),
             Look::After => self.pieces.partition_point(|p| p.t0 <= t + slack).wrapping_sub(1),
         };
-        let Some(piece) = self.pieces.get(index).or(if index == usize::MAX { None } else { self.pieces.back() }) else {
+        let Some(piece) =
+            self.pieces.get(index).or(if index == usize::MAX { None } else { self.pieces.back() })
+        else {
             return self.before;
         };
         if t < piece.t0 - slack && index == 0 {

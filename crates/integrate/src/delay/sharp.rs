@@ -1,4 +1,5 @@
-//! The sharp rule, f+ while h(x(t - delay)) > 0, f- otherwise, and the relay, f+ until h falls to -band, f- until it rises to band.
+//! The sharp rule, f+ while h(x(t - delay)) > 0, f- otherwise, and the relay, f+ until h falls to
+//! -band, f- until it rises to band.
 
 use std::collections::VecDeque;
 
@@ -6,7 +7,8 @@ use nalgebra::SVector;
 
 use super::tangent::{Carry, Shift, TangentStepper, shortened, square};
 use super::{
-    Backwards, Cuttable, DelayError, Delayed, History, LEAST_DELAY, LateSwitch, ONE_TIME, Sides, is_due, resolves,
+    Backwards, Cuttable, DelayError, Delayed, History, LEAST_DELAY, LateSwitch, ONE_TIME, Sides,
+    is_due, resolves,
 };
 use crate::roots::{Crossing, CrossingFinder};
 use crate::step::{Failure, Statistics, Step, Stepper};
@@ -26,7 +28,8 @@ struct Coming<S> {
     shift: Shift,
 }
 
-/// The stepper of the sharp rule, which has one method for each mode. A relay is one whose passages are those of the band's far edge, and switch at once.
+/// The stepper of the sharp rule, which has one method for each mode. A relay is one whose passages
+/// are those of the band's far edge, and switch at once.
 pub(super) struct Sharp<'a, P, M: Cuttable<N>, const N: usize> {
     sides: Sides<'a, P>,
     /// What is carried along.
@@ -58,7 +61,8 @@ pub(super) struct Sharp<'a, P, M: Cuttable<N>, const N: usize> {
     again: u64,
 }
 
-/// A step that was cut to less than this part of itself is made again, shorter, by a method whose dense output is less exact than its steps.
+/// A step that was cut to less than this part of itself is made again, shorter, by a method whose
+/// dense output is less exact than its steps.
 const KEPT: f64 = 0.5;
 /// So much longer than need be a step is asked to be.
 const LONGER: f64 = 1.02;
@@ -71,7 +75,9 @@ impl<'a, P: PiecewiseSmooth<N> + Clone, M: Cuttable<N>, const N: usize> Sharp<'a
         let h = sides.h(x0);
         let (delay, band, history, positive) = match *switch {
             LateSwitch::Delayed { delay, history, .. } => (delay, 0.0, history, h > 0.0),
-            LateSwitch::Relay { band, inside } => (0.0, band, History::Constant, inside.begins_with_plus(h, band)),
+            LateSwitch::Relay { band, inside } => {
+                (0.0, band, History::Constant, inside.begins_with_plus(h, band))
+            }
         };
         let mut sharp = Self {
             reached: methods[0].exactly(0.0, *x0),
@@ -102,8 +108,11 @@ impl<'a, P: PiecewiseSmooth<N> + Clone, M: Cuttable<N>, const N: usize> Sharp<'a
     /// With these switches to come, having just passed the surface.
     #[cfg(test)]
     pub(super) fn with_queue(mut self, plus: bool, positive: bool, queue: &[(f64, bool)]) -> Self {
-        let coming =
-            |(at, plus): &(f64, bool)| Coming { at: M::Number::from_f64(*at), plus: *plus, shift: Shift::default() };
+        let coming = |(at, plus): &(f64, bool)| Coming {
+            at: M::Number::from_f64(*at),
+            plus: *plus,
+            shift: Shift::default(),
+        };
         self.queue = queue.iter().map(coming).collect();
         (self.plus, self.positive) = (plus, positive);
         self
@@ -116,20 +125,24 @@ impl<'a, P: PiecewiseSmooth<N> + Clone, M: Cuttable<N>, const N: usize> Sharp<'a
 }
 
 impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
-    /// Follows the orbit without delay backwards from the start for one delay: the switches that its passages cause, and the first mode.
+    /// Follows the orbit without delay backwards from the start for one delay: the switches that
+    /// its passages cause, and the first mode.
     fn look_back(&mut self) -> Result<(), DelayError> {
         let none = |t: f64, what: String| DelayError::NoHistory { t: 0.0 - t, what };
         let delay = M::Number::from_f64(self.delay);
         let mut from = self.reached;
         let (x0, mut positive) = (from.1.map(M::Number::to_f64), self.positive);
         if self.sides.h(&x0) == 0.0 {
-            positive = !self.crosses(&x0).ok_or_else(|| none(0.0, "is on the surface where it may slide".into()))?;
+            positive = !self
+                .crosses(&x0)
+                .ok_or_else(|| none(0.0, "is on the surface where it may slide".into()))?;
         }
         let mut crossed_at: Option<f64> = None;
         while !is_due(self.delay, from.0.to_f64()) {
             let field = Backwards(self.sides.field(positive));
             let method = &mut self.methods[usize::from(positive)];
-            let failed = |failure: Failure| none(from.0.to_f64(), format!("cannot be followed ({failure})"));
+            let failed =
+                |failure: Failure| none(from.0.to_f64(), format!("cannot be followed ({failure})"));
             method.begin(&field, from, delay, f64::INFINITY, false).map_err(failed)?;
             let mut passages = CrossingFinder::starting(positive);
             let next = loop {
@@ -138,7 +151,9 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
                 let step = method.last();
                 let found = self.sides.passages(&mut passages, &step, 0.0);
                 // Of the passage that it has just come from it must not be seen again.
-                let is_new = |theta: f64| crossed_at.is_none_or(|t| step.time(theta) - t > SAME_PASSAGE * self.delay);
+                let is_new = |theta: f64| {
+                    crossed_at.is_none_or(|t| step.time(theta) - t > SAME_PASSAGE * self.delay)
+                };
                 if let Some(passage) = found.into_iter().find(|p| is_new(p.theta)) {
                     let at = self.refined(positive, passage.theta);
                     let method = &mut self.methods[usize::from(positive)];
@@ -152,9 +167,16 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
             let Some((t, x)) = next else { break };
             let point = x.map(M::Number::to_f64);
             if self.crosses(&point) != Some(positive) {
-                return Err(none(t.to_f64(), "comes to a part of the surface that is not crossed".into()));
+                return Err(none(
+                    t.to_f64(),
+                    "comes to a part of the surface that is not crossed".into(),
+                ));
             }
-            self.queue.push_front(Coming { at: delay - t, plus: positive, shift: Shift::default() });
+            self.queue.push_front(Coming {
+                at: delay - t,
+                plus: positive,
+                shift: Shift::default(),
+            });
             positive = !positive;
             (from, crossed_at) = ((t, x), Some(t.to_f64()));
         }
@@ -179,7 +201,8 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
         }
     }
 
-    /// The time at which h passes the edge near the fraction `theta` of the last step, in the method's numbers: by the secant method.
+    /// The time at which h passes the edge near the fraction `theta` of the last step, in the
+    /// method's numbers: by the secant method.
     fn refined(&self, plus: bool, theta: f64) -> M::Number {
         let method = &self.methods[usize::from(plus)];
         let (from, to) = (method.start(), method.reached().0);
@@ -189,7 +212,8 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
             return time(first);
         }
         let edge = M::Number::from_f64(self.edge());
-        let h = |theta: M::Number| self.sides.h.evaluate_decimal(method.at(theta).as_slice())[0] - edge;
+        let h =
+            |theta: M::Number| self.sides.h.evaluate_decimal(method.at(theta).as_slice())[0] - edge;
         let mut a = M::Number::from_f64(if theta > 0.5 { theta - NEAR } else { theta + NEAR });
         let (mut b, mut ha, mut hb) = (first, h(a), h(first));
         for _ in 0..8 {
@@ -212,11 +236,13 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
         self.carry.map_or_else(Shift::default, |carry| carry.shift(&at(), self.plus))
     }
 
-    /// Passages of the edge in the last step. An orbit that begins the step beyond the edge has passed it: where a passage and a switch come at one
-    /// time, rounding may put it behind the end of the step before.
+    /// Passages of the edge in the last step. An orbit that begins the step beyond the edge has
+    /// passed it: where a passage and a switch come at one time, rounding may put it behind the end
+    /// of the step before.
     fn passages(&self) -> Vec<Crossing> {
         let step = self.methods[usize::from(self.plus)].last();
-        let mut found = self.sides.passages(&mut CrossingFinder::starting(self.positive), &step, self.edge());
+        let mut found =
+            self.sides.passages(&mut CrossingFinder::starting(self.positive), &step, self.edge());
         let beyond = self.sides.h(&step.x0) - self.edge();
         if beyond != 0.0 && (beyond > 0.0) != self.positive {
             found.insert(0, Crossing { theta: 0.0, upward: !self.positive });
@@ -229,9 +255,19 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
         let i = usize::from(self.plus);
         let t_end = M::Number::from_f64(self.t_end);
         // A switch that is at the end for a step is left for what comes then.
-        let next = self.queue.front().map(|next| next.at).filter(|at| (t_end - *at).to_f64() > ONE_TIME * self.t_end);
+        let next = self
+            .queue
+            .front()
+            .map(|next| next.at)
+            .filter(|at| (t_end - *at).to_f64() > ONE_TIME * self.t_end);
         let end = next.unwrap_or(t_end);
-        self.methods[i].begin(self.sides.field(self.plus), self.reached, end, longest, self.met[i])?;
+        self.methods[i].begin(
+            self.sides.field(self.plus),
+            self.reached,
+            end,
+            longest,
+            self.met[i],
+        )?;
         (self.met[i], self.end) = (true, Some(end));
         Ok(())
     }
@@ -247,7 +283,8 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
                 self.lasted[usize::from(self.plus)] = t - self.since;
             }
             if let Some(carry) = self.carry.filter(|_| next.plus != self.plus) {
-                let x = carry.switched(&self.reached.1.map(M::Number::to_f64), next.plus, next.shift);
+                let x =
+                    carry.switched(&self.reached.1.map(M::Number::to_f64), next.plus, next.shift);
                 self.reached.1 = self.methods[0].exactly(t, x).1;
             }
             (self.plus, self.since, self.end) = (next.plus, t, None);
@@ -261,7 +298,8 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
         if self.end.is_none() {
             let i = usize::from(self.plus);
             let guess = AS_BEFORE * self.lasted[i];
-            let alone = self.queue.is_empty() && !M::CUTS_EXACTLY && self.since == self.reached.0.to_f64();
+            let alone =
+                self.queue.is_empty() && !M::CUTS_EXACTLY && self.since == self.reached.0.to_f64();
             self.begin(if alone { self.max_step.min(guess) } else { self.max_step })?;
             if alone && guess < self.max_step {
                 // What follows this step is not short because the mode was.
@@ -280,11 +318,16 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
             let Some(first) = found.first() else { return Ok(()) };
             let (from, (to, _)) = (self.methods[i].start(), self.methods[i].reached());
             let due = self.refined(self.plus, first.theta) + delay;
-            // What a passage causes is the first switch to come, if none is known: it may be due within this very step.
+            // What a passage causes is the first switch to come, if none is known: it may be due
+            // within this very step.
             let cut = self.queue.is_empty() && (to - due).to_f64() > ONE_TIME * to.to_f64().abs();
             if cut && is_due(due.to_f64(), from.to_f64()) {
                 // A relay on the edge of its band: the switch comes before the step.
-                self.queue.push_back(Coming { at: from, plus: first.upward, shift: self.shift(first.theta) });
+                self.queue.push_back(Coming {
+                    at: from,
+                    plus: first.upward,
+                    shift: self.shift(first.theta),
+                });
                 self.positive = first.upward;
                 self.switch();
                 self.begin(self.max_step)?;
@@ -319,7 +362,8 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
 
 /// Fraction of a step within which a zero is refined.
 const NEAR: f64 = 1e-6;
-/// Part of the delay after a passage in which that passage is still seen, by the rounding of its place.
+/// Part of the delay after a passage in which that passage is still seen, by the rounding of its
+/// place.
 const SAME_PASSAGE: f64 = 1e-6;
 
 impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Stepper<N> for Sharp<'_, P, M, N> {
@@ -332,14 +376,19 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Stepper<N> for Sharp
         max_step: f64,
     ) -> Result<(), Failure> {
         resolves(self.delay, t, &x, t_end)?;
-        // The past stays: it is part of the equation's state, not of the method's. Who moves the state across the surface moves it for the switch, too.
+        // The past stays: it is part of the equation's state, not of the method's. Who moves the
+        // state across the surface moves it for the switch, too.
         let (h, edge) = (self.sides.h(&x), self.edge());
         let positive = h > edge || (h == edge && edge < 0.0);
         let here = self.methods[0].exactly(t, x);
         if t > 0.0 && x != self.reached.1.map(M::Number::to_f64) && positive != self.positive {
             // It is moved when it is, whatever the disturbance.
             let shift = Shift::default();
-            self.queue.push_back(Coming { at: here.0 + M::Number::from_f64(self.delay), plus: positive, shift });
+            self.queue.push_back(Coming {
+                at: here.0 + M::Number::from_f64(self.delay),
+                plus: positive,
+                shift,
+            });
             self.positive = positive;
         }
         (self.reached, self.t_end, self.max_step, self.end) = (here, t_end, max_step, None);
@@ -355,7 +404,8 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Stepper<N> for Sharp
         self.steps += 1;
         self.statistics = self.methods[0].statistics().clone();
         self.statistics += self.methods[1].statistics();
-        (self.statistics.steps, self.statistics.rejected) = (self.steps, self.statistics.rejected + self.again);
+        (self.statistics.steps, self.statistics.rejected) =
+            (self.steps, self.statistics.rejected + self.again);
         Ok(method.last())
     }
 
@@ -364,7 +414,9 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Stepper<N> for Sharp
     }
 }
 
-impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> TangentStepper<N> for Sharp<'_, P, M, N> {
+impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> TangentStepper<N>
+    for Sharp<'_, P, M, N>
+{
     fn reached(&self) -> (f64, SVector<f64, N>) {
         (self.reached.0.to_f64(), self.reached.1.map(M::Number::to_f64))
     }

@@ -24,7 +24,8 @@ pub(super) struct Smooth<'a, P, M, const N: usize> {
     eps: f64,
     method: M,
     past: Past<N>,
-    /// Where steps end, in order: jumps of derivatives that arrive, and passages of the delayed orbit through the layer.
+    /// Where steps end, in order: jumps of derivatives that arrive, and passages of the delayed
+    /// orbit through the layer.
     ends: Vec<f64>,
     /// On which side of the surface the orbit was last.
     passages: CrossingFinder,
@@ -41,8 +42,9 @@ const SEEN: u32 = 5;
 const LONGEST: f64 = 0.999;
 /// The layer's half-width in eps: tanh differs from 1 by 4e-9 there.
 const LAYER: f64 = 10.0;
-/// A change of h smaller than this part of eps ends no step: phi feels it less than any step does. Where h is at rest, rounding turns it in every step, and
-/// every turn would end a step one delay later, which would turn again.
+/// A change of h smaller than this part of eps ends no step: phi feels it less than any step does.
+/// Where h is at rest, rounding turns it in every step, and every turn would end a step one delay
+/// later, which would turn again.
 const STILL: f64 = 1e-9;
 /// Places in a step at which its distance from the layer is looked at.
 const LOOKS: usize = 8;
@@ -68,7 +70,10 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Weighted<'_, P, N> {
     }
 
     fn under(&self, past: &SVector<f64, N>) -> Blended<'_, P> {
-        Blended { system: self.system, phi: self.transition.eval(self.system.switching(past), self.eps) }
+        Blended {
+            system: self.system,
+            phi: self.transition.eval(self.system.switching(past), self.eps),
+        }
     }
 }
 
@@ -126,7 +131,8 @@ impl<'a, P: PiecewiseSmooth<N> + Clone, M, const N: usize> Smooth<'a, P, M, N> {
     /// Follows the orbit without delay backwards from the start for one delay.
     fn look_back(&mut self, tolerance: Tolerance) -> Result<(), DelayError> {
         let Self { sides, transition, eps, .. } = self;
-        let smoothed = Smoothed { system: sides.system.clone(), transition: *transition, eps: *eps };
+        let smoothed =
+            Smoothed { system: sides.system.clone(), transition: *transition, eps: *eps };
         let (mut dopri5, mut ends) = (Guarded::new(Dopri5::new(tolerance), tolerance), Vec::new());
         let (past, mut passages) = (&mut self.past, self.passages);
         let mut back = |step: &Step<'_, N>| {
@@ -134,10 +140,19 @@ impl<'a, P: PiecewiseSmooth<N> + Clone, M, const N: usize> Smooth<'a, P, M, N> {
             ends.extend(in_layer(sides, *eps, &mut passages, step));
         };
         let mut back = Each(&mut back);
-        let end =
-            drive(&Backwards(&smoothed), self.reached.1, &DriveOptions::to(self.delay), &mut dopri5, &mut back, &());
+        let end = drive(
+            &Backwards(&smoothed),
+            self.reached.1,
+            &DriveOptions::to(self.delay),
+            &mut dopri5,
+            &mut back,
+            &(),
+        );
         if let Err(failure) = end {
-            return Err(DelayError::NoHistory { t: -self.delay, what: format!("cannot be followed ({failure})") });
+            return Err(DelayError::NoHistory {
+                t: -self.delay,
+                what: format!("cannot be followed ({failure})"),
+            });
         }
         ends.into_iter().for_each(|t| self.end_at(self.delay - t));
         Ok(())
@@ -163,7 +178,10 @@ impl<const N: usize> Observer<N> for Each<'_, N> {
 }
 
 /// What rounding makes of h at `x`, where h is a sum or a product of coordinates.
-fn rounding<P: PiecewiseSmooth<N>, const N: usize>(sides: &Sides<'_, P>, x: &SVector<f64, N>) -> f64 {
+fn rounding<P: PiecewiseSmooth<N>, const N: usize>(
+    sides: &Sides<'_, P>,
+    x: &SVector<f64, N>,
+) -> f64 {
     if sides.plane.is_some() {
         return 0.0;
     }
@@ -177,7 +195,8 @@ fn in_layer<P: PiecewiseSmooth<N>, const N: usize>(
     passages: &mut CrossingFinder,
     step: &Step<'_, N>,
 ) -> Vec<f64> {
-    let mut times: Vec<f64> = sides.passages(passages, step, 0.0).iter().map(|p| step.time(p.theta)).collect();
+    let mut times: Vec<f64> =
+        sides.passages(passages, step, 0.0).iter().map(|p| step.time(p.theta)).collect();
     let edge = LAYER * eps;
     let (h0, h1) = (sides.h(&step.x0), sides.h(&step.x1));
     let is_far = |i: usize| h0.abs().min(h1.abs()) - step.interpolant.reach(i) > edge;
@@ -212,11 +231,20 @@ impl<P: PiecewiseSmooth<N>, M: DrivenStepper<N>, const N: usize> Smooth<'_, P, M
             self.ends.remove(0);
             self.end = None;
         }
-        let next = self.ends.first().copied().filter(|end| self.t_end - end > ONE_TIME * self.t_end);
+        let next =
+            self.ends.first().copied().filter(|end| self.t_end - end > ONE_TIME * self.t_end);
         let end = next.unwrap_or(self.t_end);
         let Self { sides, carry, delay, transition, eps, past, method, .. } = self;
         let (system, carry) = (sides.system, *carry);
-        let field = Weighted { system, carry, transition: *transition, eps: *eps, delay: *delay, past, end };
+        let field = Weighted {
+            system,
+            carry,
+            transition: *transition,
+            eps: *eps,
+            delay: *delay,
+            past,
+            end,
+        };
         if self.end != Some(end) {
             let longest = self.max_step.min(LONGEST * *delay);
             method.restart_driven(&field, t, self.reached.1, end, longest)?;
@@ -232,7 +260,9 @@ impl<P: PiecewiseSmooth<N>, M: DrivenStepper<N>, const N: usize> Smooth<'_, P, M
     }
 }
 
-impl<P: PiecewiseSmooth<N>, M: DrivenStepper<N> + Redoable<N>, const N: usize> Stepper<N> for Smooth<'_, P, M, N> {
+impl<P: PiecewiseSmooth<N>, M: DrivenStepper<N> + Redoable<N>, const N: usize> Stepper<N>
+    for Smooth<'_, P, M, N>
+{
     fn restart<F: VectorField<N>>(
         &mut self,
         _: &F,
@@ -242,8 +272,8 @@ impl<P: PiecewiseSmooth<N>, M: DrivenStepper<N> + Redoable<N>, const N: usize> S
         max_step: f64,
     ) -> Result<(), Failure> {
         resolves(self.delay, t, &x, t_end)?;
-        // The past stays: it is part of the equation's state, not of the method's. A jump of the state is one of the field a delay later, and of each next
-        // derivative at each next delay.
+        // The past stays: it is part of the equation's state, not of the method's. A jump of the
+        // state is one of the field a delay later, and of each next derivative at each next delay.
         if t > 0.0 && x != self.reached.1 {
             for k in 1..=SEEN + 1 {
                 self.end_at(t + f64::from(k) * self.delay);

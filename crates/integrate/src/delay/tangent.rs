@@ -1,12 +1,16 @@
 //! Small disturbances of an orbit whose switch depends on the past.
 //!
-//! Between switches v' = Df v. A neighbour of the orbit makes a passage of the surface later by dt = -(dh v)/(dh f), and the switch that this passage
-//! causes as much later; at the switch v grows by (f before - f after) dt (Aizerman & Gantmakher 1958). So under the sharp rule and a relay the
-//! disturbed state is v and the dt of each switch in the queue: a number for each, no approximation.
+//! Between switches v' = Df v. A neighbour of the orbit makes a passage of the surface later by dt
+//! = -(dh v)/(dh f), and the switch that this passage causes as much later; at the switch v grows
+//! by (f before - f after) dt (Aizerman & Gantmakher 1958). So under the sharp rule and a relay the
+//! disturbed state is v and the dt of each switch in the queue: a number for each, no
+//! approximation.
 //!
-//! Under the smooth rule v' = (phi Df+ + (1 - phi) Df-) v + (f+ - f-) phi' dh v(t - delay): orbit and vector are followed together by the method of
-//! steps. The disturbed state is v during one delay, on the dense output of the steps; its length is read at the present and at
-//! [`NODES`] Chebyshev points of the delay (Farmer 1982, Physica D 4, 366-393; Breda & Van Vleck 2014, Numerische Mathematik 126, 225-257).
+//! Under the smooth rule v' = (phi Df+ + (1 - phi) Df-) v + (f+ - f-) phi' dh v(t - delay): orbit
+//! and vector are followed together by the method of steps. The disturbed state is v during one
+//! delay, on the dense output of the steps; its length is read at the present and at [`NODES`]
+//! Chebyshev points of the delay (Farmer 1982, Physica D 4, 366-393; Breda & Van Vleck 2014,
+//! Numerische Mathematik 126, 225-257).
 
 use std::f64::consts::PI;
 
@@ -19,7 +23,8 @@ use twofold_num::{Dual, Elementary};
 use twofold_system::filippov::gradient;
 use twofold_system::{PiecewiseSmooth, Transition};
 
-/// A system of n states with one tangent vector, in 2 n dimensions: f+ and f- come with Df+ v and Df- v.
+/// A system of n states with one tangent vector, in 2 n dimensions: f+ and f- come with Df+ v and
+/// Df- v.
 #[derive(Clone, Copy, Debug)]
 pub struct Varied<'a, P>(pub &'a P);
 
@@ -85,7 +90,8 @@ macro_rules! varied {
                 let f = if plus { self.0.plus(&x) } else { self.0.minus(&x) };
                 Shift { later: -gradient.dot(&v) / gradient.dot(&f), speed: f.norm() }
             }
-            fn switched(&self, z: &SVector<f64, { 2 * $n }>, to_plus: bool, shift: Shift) -> SVector<f64, { 2 * $n }> {
+            fn switched(&self, z: &SVector<f64, { 2 * $n }>, to_plus: bool,
+                shift: Shift) -> SVector<f64, { 2 * $n }> {
                 let [x, v] = halves::<$n, { 2 * $n }>(z);
                 let [plus, minus] = [self.0.plus(&x), self.0.minus(&x)];
                 let v = v + (if to_plus { minus - plus } else { plus - minus }) * shift.later;
@@ -110,11 +116,15 @@ macro_rules! varied {
 
 varied!(1 2 3 4 5 6 7 8);
 
-fn dual<S: Elementary, const N: usize, const M: usize>(z: &SVector<S, M>) -> SVector<Dual<S, 1>, N> {
+fn dual<S: Elementary, const N: usize, const M: usize>(
+    z: &SVector<S, M>,
+) -> SVector<Dual<S, 1>, N> {
     SVector::from_fn(|i, _| Dual { value: z[i], partials: [z[N + i]] })
 }
 
-fn joined<S: Elementary, const N: usize, const M: usize>(f: &SVector<Dual<S, 1>, N>) -> SVector<S, M> {
+fn joined<S: Elementary, const N: usize, const M: usize>(
+    f: &SVector<Dual<S, 1>, N>,
+) -> SVector<S, M> {
     SVector::from_fn(|i, _| if i < N { f[i].value } else { f[i - N].partials[0] })
 }
 
@@ -135,7 +145,8 @@ pub(super) fn shortened<const M: usize>(z: &SVector<f64, M>, by: f64) -> SVector
 /// Points of the delay at which a disturbance of the past is read.
 const NODES: usize = 16;
 
-/// The square of the length of a disturbed past: the mean of the squares at Chebyshev's points, with equal weights.
+/// The square of the length of a disturbed past: the mean of the squares at Chebyshev's points,
+/// with equal weights.
 pub(super) fn square_of_past<const M: usize>(past: &Past<M>, t: f64, delay: f64) -> f64 {
     let node = |k: usize| 0.5 * (1.0 - cos(PI * (k as f64 + 0.5) / NODES as f64));
     let at = |k: usize| square(&past.at(t - delay * node(k), Look::After, 0.0));

@@ -1,7 +1,9 @@
 use nalgebra::{SVector, vector};
 
 use super::*;
-use crate::{DriveOptions, Flow, Kick, KickLaw, Observer, Schedule, StepCap, Stepper, Summary, drive};
+use crate::{
+    DriveOptions, Flow, Kick, KickLaw, Observer, Schedule, StepCap, Stepper, Summary, drive,
+};
 use twofold_system::{Bound, Caricature, Definition};
 
 /// Takes every step's end, and the passages through x\[coordinate\] = 0 with their senses.
@@ -82,12 +84,20 @@ impl How {
     fn relay(band: f64, t_end: f64) -> Self {
         Self { band: Some((band, Inside::Sign)), ..Self::sharp(0.0, t_end) }
     }
-    fn run<const N: usize>(&self, data: &System, x0: [f64; N]) -> Result<(Seen<N>, Summary<N>), DelayError> {
+    fn run<const N: usize>(
+        &self,
+        data: &System,
+        x0: [f64; N],
+    ) -> Result<(Seen<N>, Summary<N>), DelayError> {
         let (bound, x0): (Bound<N>, _) = (data.bind().unwrap(), SVector::from(x0));
         let sides = Sides::new(&bound, data);
         let switch = match self.band {
             Some((band, inside)) => LateSwitch::Relay { band, inside },
-            None => LateSwitch::Delayed { delay: self.delay, smooth: self.smooth, history: self.history },
+            None => LateSwitch::Delayed {
+                delay: self.delay,
+                smooth: self.smooth,
+                history: self.history,
+            },
         };
         let delayed = Delayed { sides, switch, x0 };
         let run = Recording { options: self.options, coordinate: self.coordinate, x0 };
@@ -100,12 +110,14 @@ fn relay(fall: f64, rise: f64) -> System {
     system(&format!("states = ['x']\nh = 'x'\nplus = ['-{fall}']\nminus = ['{rise}']"))
 }
 
-const SHARP: [(Method, f64); 3] = [(Method::Dopri5, 1e-10), (Method::Taylor, 1e-14), (Method::TaylorExtended, 1e-30)];
+const SHARP: [(Method, f64); 3] =
+    [(Method::Dopri5, 1e-10), (Method::Taylor, 1e-14), (Method::TaylorExtended, 1e-30)];
 
 /// A relay with a delay of 1: from 0.3 it falls to -1 and swings between -1 and 1 with period 4.
 #[test]
 fn a_relay_swings_with_four_delays() {
-    let wave = |t: f64| if t < 1.3 { 0.3 - t } else { 1.0 - ((t - 1.3).rem_euclid(4.0) - 2.0).abs() };
+    let wave =
+        |t: f64| if t < 1.3 { 0.3 - t } else { 1.0 - ((t - 1.3).rem_euclid(4.0) - 2.0).abs() };
     for (method, tolerance) in SHARP {
         let how = How { method, tolerance, ..How::sharp(1.0, 21.0) };
         let (seen, end) = how.run(&relay(1.0, 1.0), [0.3]).unwrap();
@@ -114,13 +126,17 @@ fn a_relay_swings_with_four_delays() {
         }
         assert_eq!(seen.crossings.len(), 11);
         for (k, (t, _, upward)) in seen.crossings.iter().enumerate() {
-            assert!((t - 0.3 - 2.0 * k as f64).abs() < 1e-13 && *upward == (k % 2 == 1), "{method:?}: {t}");
+            assert!(
+                (t - 0.3 - 2.0 * k as f64).abs() < 1e-13 && *upward == (k % 2 == 1),
+                "{method:?}: {t}"
+            );
         }
         assert_eq!(end.t, 21.0);
     }
 }
 
-/// A relay with memory swings between the edges of its band with the period 2 band (1/fall + 1/rise).
+/// A relay with memory swings between the edges of its band with the period 2 band (1/fall +
+/// 1/rise).
 #[test]
 fn a_relay_with_memory_swings_between_its_edges() {
     let (fall, rise, band) = (0.7, 1.9, 0.25);
@@ -145,16 +161,23 @@ fn a_relay_with_memory_swings_between_its_edges() {
             assert!((x[0] - wave(*t)).abs() < 1e-13, "{method:?}: {x} at {t}, not {}", wave(*t));
         }
         let up: Vec<f64> = seen.crossings.iter().filter(|c| c.2).map(|c| c.0).collect();
-        assert!(up.len() > 10 && up.windows(2).all(|u| (u[1] - u[0] - period).abs() < 1e-13), "{method:?}: {up:?}");
+        assert!(
+            up.len() > 10 && up.windows(2).all(|u| (u[1] - u[0] - period).abs() < 1e-13),
+            "{method:?}: {up:?}"
+        );
         assert_eq!(end.t, 12.0);
     }
 }
 
-/// Curved flight between switches: x'' = -x under a relay, whose turns are arcs about (-1, 0) and (1, 0). By a surface that is no coordinate, too.
+/// Curved flight between switches: x'' = -x under a relay, whose turns are arcs about (-1, 0) and
+/// (1, 0). By a surface that is no coordinate, too.
 #[test]
 fn arcs_between_switches_are_right() {
-    let [plane, scaled] = ["x", "x*2 + x"]
-        .map(|h| system(&format!("states = ['x', 'v']\nh = '{h}'\nplus = ['v', '-1 - x']\nminus = ['v', '1 - x']")));
+    let [plane, scaled] = ["x", "x*2 + x"].map(|h| {
+        system(&format!(
+            "states = ['x', 'v']\nh = '{h}'\nplus = ['v', '-1 - x']\nminus = ['v', '1 - x']"
+        ))
+    });
     let band = 0.3_f64;
     // From (1, 0): about (-1, 0) with radius 2 until x = -band, then about (1, 0).
     let first = ((1.0 - band) / 2.0).acos();
@@ -200,24 +223,35 @@ fn a_relay_begins_as_it_is_told_inside_its_band() {
         // On an edge that is left at once the switch comes before any step.
         let at_once = x0.abs() == 0.25 && inside != Inside::Sign;
         let falls = plus != at_once;
-        assert!((end - x0 - if falls { -1e-3 } else { 1e-3 }).abs() < 1e-15, "{x0} {inside:?}: {end}");
+        assert!(
+            (end - x0 - if falls { -1e-3 } else { 1e-3 }).abs() < 1e-15,
+            "{x0} {inside:?}: {end}"
+        );
     }
 }
 
-/// A kick beyond the far edge is a switch at once; one within the band is none; a restart does nothing.
+/// A kick beyond the far edge is a switch at once; one within the band is none; a restart does
+/// nothing.
 #[test]
 fn a_kick_beyond_the_band_switches_a_relay() {
     let kick = |size: f64, seed| Kick { every: 1.0, size, law: KickLaw::Sphere, seed, stream: 0 };
     let options = |schedule| DriveOptions { schedule, kicked_states: 1, ..DriveOptions::to(1.5) };
     let run = |schedule| {
-        How { options: options(schedule), ..How::relay(0.5, 1.5) }.run(&relay(1.0, 1.0), [1.2]).unwrap().1.x[0]
+        How { options: options(schedule), ..How::relay(0.5, 1.5) }
+            .run(&relay(1.0, 1.0), [1.2])
+            .unwrap()
+            .1
+            .x[0]
     };
-    let kicked = |size| (0..10).map(move |seed| run(Schedule { restart_every: None, kick: Some(kick(size, seed)) }));
+    let kicked = |size| {
+        (0..10).map(move |seed| run(Schedule { restart_every: None, kick: Some(kick(size, seed)) }))
+    };
     assert!((run(Schedule { restart_every: Some(0.4), kick: None }) + 0.3).abs() < 1e-14);
     // From 0.2 to 2.2 and on down, or to -1.8 and up.
     let far: Vec<f64> = kicked(2.0).collect();
     assert!(
-        far.iter().all(|x| (x - 1.7).abs() < 1e-14 || (x + 1.3).abs() < 1e-14) && far.iter().any(|x| *x < 0.0),
+        far.iter().all(|x| (x - 1.7).abs() < 1e-14 || (x + 1.3).abs() < 1e-14)
+            && far.iter().any(|x| *x < 0.0),
         "{far:?}"
     );
     // From 0.2 to 0.6 or to -0.2: f+ goes on.
@@ -226,7 +260,8 @@ fn a_kick_beyond_the_band_switches_a_relay() {
     assert!(near.iter().all(goes_on), "{near:?}");
 }
 
-/// The chatter of sliding: x overshoots by what each field does in one delay, and one period is delay (2 + fall/rise + rise/fall).
+/// The chatter of sliding: x overshoots by what each field does in one delay, and one period is
+/// delay (2 + fall/rise + rise/fall).
 #[test]
 fn chatter_has_its_period_and_its_overshoot() {
     let (fall, rise, delay) = (0.7, 1.9, 1e-3);
@@ -239,15 +274,20 @@ fn chatter_has_its_period_and_its_overshoot() {
     }
     let x = seen.ends.iter().filter(|(t, _)| *t > 0.01).map(|(_, x)| x[0]);
     let (low, high) = x.fold((0.0_f64, 0.0_f64), |(low, high), x| (low.min(x), high.max(x)));
-    assert!((high - rise * delay).abs() < 1e-15 && (low + fall * delay).abs() < 1e-15, "{low} {high}");
+    assert!(
+        (high - rise * delay).abs() < 1e-15 && (low + fall * delay).abs() < 1e-15,
+        "{low} {high}"
+    );
 }
 
-/// A switch that turns seven times within one delay: h = cos(2 pi t) decides of x' = +-1 three and a half units of time later.
+/// A switch that turns seven times within one delay: h = cos(2 pi t) decides of x' = +-1 three and
+/// a half units of time later.
 #[test]
 fn passages_wait_in_line() {
     let pi = std::f64::consts::PI;
     let data = system(&format!(
-        "states = ['c', 's', 'x']\nh = 'c'\nplus = ['-w*s', 'w*c', '1']\nminus = ['-w*s', 'w*c', '-1']\n\
+        "states = ['c', 's', 'x']\nh = 'c'\nplus = ['-w*s', 'w*c', '1']\nminus = ['-w*s', 'w*c', \
+            '-1']\n\
          [parameters]\nw = {}",
         2.0 * pi
     ));
@@ -255,7 +295,8 @@ fn passages_wait_in_line() {
         // Before the delay has passed h is 1; then the integral of the sign of cos(2 pi s).
         let s = t - 3.5;
         let whole = (4.0 * s.max(0.0)).floor();
-        let sign = |quarter: f64| if matches!(quarter.rem_euclid(4.0) as u8, 0 | 3) { 1.0 } else { -1.0 };
+        let sign =
+            |quarter: f64| if matches!(quarter.rem_euclid(4.0) as u8, 0 | 3) { 1.0 } else { -1.0 };
         let quarters: f64 = (0..whole as u32).map(|k| 0.25 * sign(f64::from(k))).sum();
         t.min(3.5) + quarters + sign(whole) * (s.max(0.0) - 0.25 * whole)
     };
@@ -267,16 +308,23 @@ fn passages_wait_in_line() {
     }
 }
 
-/// A passage at the very time of a switch, on whichever side of it rounding puts it: h = sin(f u) passes 0 every pi/f, and the delay is an odd multiple of
-/// that. What w' = +-1 makes of it is the integral of the sign of h one delay earlier.
+/// A passage at the very time of a switch, on whichever side of it rounding puts it: h = sin(f u)
+/// passes 0 every pi/f, and the delay is an odd multiple of that. What w' = +-1 makes of it is the
+/// integral of the sign of h one delay earlier.
 #[test]
 fn a_passage_at_the_time_of_a_switch_is_seen() {
     let pi = std::f64::consts::PI;
     let triangle = |y: f64| y.cos().acos();
-    for (f, u0, t_end) in
-        [(1.0, 0.1, 77.7), (1.0, 0.1, 50.5), (2.0, 0.5, 50.5), (3.0, 0.5 / 3.0, 77.7), (7.0, 1.0 / 7.0, 77.7)]
-    {
-        let data = system(&format!("states = ['u', 'w']\nh = 'sin({f}*u)'\nplus = ['1', '1']\nminus = ['1', '-1']"));
+    for (f, u0, t_end) in [
+        (1.0, 0.1, 77.7),
+        (1.0, 0.1, 50.5),
+        (2.0, 0.5, 50.5),
+        (3.0, 0.5 / 3.0, 77.7),
+        (7.0, 1.0 / 7.0, 77.7),
+    ] {
+        let data = system(&format!(
+            "states = ['u', 'w']\nh = 'sin({f}*u)'\nplus = ['1', '1']\nminus = ['1', '-1']"
+        ));
         for odd in [1.0, 3.0] {
             let delay = odd * pi / f;
             let expected = delay + (triangle(f * (u0 + t_end - delay)) - triangle(f * u0)) / f;
@@ -285,13 +333,17 @@ fn a_passage_at_the_time_of_a_switch_is_seen() {
             {
                 let how = How { method, tolerance, ..How::sharp(delay, t_end) };
                 let w = how.run(&data, [u0, 0.0]).unwrap().1.x[1];
-                assert!((w - expected).abs() < 1e-6, "{f} {odd} {method:?} {tolerance}: {w}, not {expected}");
+                assert!(
+                    (w - expected).abs() < 1e-6,
+                    "{f} {odd} {method:?} {tolerance}: {w}, not {expected}"
+                );
             }
         }
     }
 }
 
-/// Below the spacing of the times a switch is lost, and with it the orbit: such a delay is refused, and one above it swings as it should.
+/// Below the spacing of the times a switch is lost, and with it the orbit: such a delay is refused,
+/// and one above it swings as it should.
 #[test]
 fn a_delay_that_times_cannot_tell_apart_is_refused() {
     let run = |delay: f64, smooth| {
@@ -299,12 +351,22 @@ fn a_delay_that_times_cannot_tell_apart_is_refused() {
         let bound: Bound<1> = data.bind().unwrap();
         let switch = LateSwitch::Delayed { delay, smooth, history: History::Constant };
         let delayed = Delayed { sides: Sides::new(&bound, &data), switch, x0 };
-        delayed.with_stepper(Method::Dopri5, None, tolerance(1e-10), Far { x0, t_end: 0.5 + 1e3 * delay }).unwrap()
+        delayed
+            .with_stepper(
+                Method::Dopri5,
+                None,
+                tolerance(1e-10),
+                Far { x0, t_end: 0.5 + 1e3 * delay },
+            )
+            .unwrap()
     };
     for smooth in [None, Some((Transition::Tanh, 1e-2))] {
         for delay in [1e-17, 1e-16, 1e-15, 1e-14] {
             let found = run(delay, smooth);
-            assert!(matches!(found, Err(Failure::StepUnderflow { h, .. }) if h == delay), "{delay} {found:?}");
+            assert!(
+                matches!(found, Err(Failure::StepUnderflow { h, .. }) if h == delay),
+                "{delay} {found:?}"
+            );
         }
     }
     for delay in [2e-13, 1e-11, 1e-8] {
@@ -332,11 +394,13 @@ impl WithStepper<1> for Far {
             }
         }
         let mut farthest = Farthest(0.0);
-        drive(&Own, self.x0, &DriveOptions::to(self.t_end), &mut stepper, &mut farthest, &()).map(|_| farthest.0)
+        drive(&Own, self.x0, &DriveOptions::to(self.t_end), &mut stepper, &mut farthest, &())
+            .map(|_| farthest.0)
     }
 }
 
-/// The start's own zero: on the surface the switch is f-'s, and an orbit that leaves to the other side has passed it at once.
+/// The start's own zero: on the surface the switch is f-'s, and an orbit that leaves to the other
+/// side has passed it at once.
 #[test]
 fn a_start_on_the_surface_counts_as_not_above() {
     let (seen, end) = How::sharp(0.5, 0.75).run(&relay(1.0, 1.0), [0.0]).unwrap();
@@ -350,8 +414,11 @@ fn a_start_on_the_surface_counts_as_not_above() {
 fn a_kick_moves_the_switch_one_delay_later_and_a_restart_does_nothing() {
     let kick = |size: f64| Kick { every: 1.0, size, law: KickLaw::Sphere, seed: 3, stream: 0 };
     let options = |schedule| DriveOptions { schedule, kicked_states: 1, ..DriveOptions::to(1.75) };
-    let run =
-        |schedule| How { options: options(schedule), ..How::sharp(0.5, 1.75) }.run(&relay(1.0, 1.0), [2.0]).unwrap();
+    let run = |schedule| {
+        How { options: options(schedule), ..How::sharp(0.5, 1.75) }
+            .run(&relay(1.0, 1.0), [2.0])
+            .unwrap()
+    };
     let (_, plain) = run(Schedule::default());
     assert!((plain.x[0] - 0.25).abs() < 1e-14);
     let (_, restarted) = run(Schedule { restart_every: Some(0.6), kick: None });
@@ -360,8 +427,9 @@ fn a_kick_moves_the_switch_one_delay_later_and_a_restart_does_nothing() {
     let (_, kicked) = run(Schedule { restart_every: None, kick: Some(kick(3.0)) });
     let ends = [1.0 + 3.0 - 0.75, 1.0 - 3.0 - 0.5 + 0.25];
     assert!(ends.iter().any(|end| (kicked.x[0] - end).abs() < 1e-14), "{}", kicked.x);
-    let seeds =
-        (0..20).map(|seed| run(Schedule { restart_every: None, kick: Some(Kick { seed, ..kick(3.0) }) }).1.x[0]);
+    let seeds = (0..20).map(|seed| {
+        run(Schedule { restart_every: None, kick: Some(Kick { seed, ..kick(3.0) }) }).1.x[0]
+    });
     let below: Vec<f64> = seeds.filter(|x| *x < 0.0).collect();
     assert!(!below.is_empty() && below.iter().all(|x| (x - ends[1]).abs() < 1e-14), "{below:?}");
 }
@@ -374,7 +442,8 @@ fn a_history_on_the_flow_has_its_switches() {
         let how = How { method, tolerance, history: History::Flow, ..How::sharp(0.1, 1.0) };
         let (seen, end) = how.run(&through, [0.05]).unwrap();
         assert!(
-            seen.ends.iter().any(|(t, _)| (t - 0.05).abs() < 1e-15) && (end.x[0] - 1.1).abs() < 1e-14,
+            seen.ends.iter().any(|(t, _)| (t - 0.05).abs() < 1e-15)
+                && (end.x[0] - 1.1).abs() < 1e-14,
             "{method:?}: {}",
             end.x
         );
@@ -388,9 +457,11 @@ fn a_history_on_the_flow_has_its_switches() {
             assert!((t + x0).abs() < 1e-12, "{t}");
         }
     }
-    // Smoothed widely enough the orbit without delay goes through the layer: x' = 2 - phi, once more from the start.
+    // Smoothed widely enough the orbit without delay goes through the layer: x' = 2 - phi, once
+    // more from the start.
     let layer = Some((Transition::Tanh, 0.01));
-    let how = How { smooth: layer, history: History::Flow, tolerance: 1e-12, ..How::sharp(0.1, 0.3) };
+    let how =
+        How { smooth: layer, history: History::Flow, tolerance: 1e-12, ..How::sharp(0.1, 0.3) };
     let (_, end) = how.run(&through, [0.05]).unwrap();
     // By the midpoint rule: backwards, then x(0.1) = 0.05 + integral of 2 - phi(x(s - 0.1)).
     let phi = |x: f64| 0.5 * (1.0 + (x / 0.01).tanh());
@@ -407,23 +478,32 @@ fn a_history_on_the_flow_has_its_switches() {
     assert!((end.x[0] - (first + 0.2)).abs() < 1e-6, "{} {first}", end.x);
 }
 
-/// x' = -x(t - 1) from the constant 1: on [k - 1, k] a polynomial of degree k (Bellman 1961): sum over j of (-1)^j (t - j + 1)^j / j!, j <= k.
-/// As a switch: phi = (1 + x/9)/2 where h = x/sqrt(81 - x^2) and phi(h) is the algebraic transition of width 1, f+- = -+9.
-/// A switch at rest inside its layer, r^2 = 1 and x = 0: what rounding makes of h there ends no steps. A step takes some part of a delay.
+/// x' = -x(t - 1) from the constant 1: on [k - 1, k] a polynomial of degree k (Bellman 1961): sum
+/// over j of (-1)^j (t - j + 1)^j / j!, j <= k. As a switch: phi = (1 + x/9)/2 where h = x/sqrt(81
+/// - x^2) and phi(h) is the algebraic transition of width 1, f+- = -+9. A switch at rest inside its
+/// layer, r^2 = 1 and x = 0: what rounding makes of h there ends no steps. A step takes some part
+/// of a delay.
 #[test]
 fn a_switch_at_rest_ends_no_steps() {
     let ring = system(
-        "states = ['p', 'q']\nh = 'p*p + q*q - 1'\nplus = ['-0.4*p - q', 'p - 0.4*q']\nminus = ['0.3*p - q', 'p + 0.3*q']",
+        "states = ['p', 'q']\nh = 'p*p + q*q - 1'\nplus = ['-0.4*p - q', 'p - 0.4*q']\nminus = \
+            ['0.3*p - q', 'p + 0.3*q']",
     );
     let line = system("states = ['p', 'q']\nh = 'p'\nplus = ['-1', '1']\nminus = ['1', '1']");
     for (data, x0, coordinate) in [(&ring, [1.2, 0.0], 1), (&line, [0.3, 0.0], 0)] {
-        for (method, tolerance) in [(Method::Dopri5, 1e-8), (Method::Dopri5, 1e-11), (Method::Radau5, 1e-10)] {
+        for (method, tolerance) in
+            [(Method::Dopri5, 1e-8), (Method::Dopri5, 1e-11), (Method::Radau5, 1e-10)]
+        {
             let smooth = Some((Transition::Tanh, 0.05));
             let how = How { smooth, method, tolerance, coordinate, ..How::sharp(0.05, 12.0) };
             let (seen, end) = how.run(data, x0).unwrap();
             assert!(seen.ends.len() < 6_000, "{method:?} {tolerance}: {} steps", seen.ends.len());
             // At rest 0.3 (1 - phi) = 0.4 phi on the ring, and phi = 1 - phi on the line.
-            let h = if coordinate == 1 { end.x[0] * end.x[0] + end.x[1] * end.x[1] - 1.0 } else { end.x[0] };
+            let h = if coordinate == 1 {
+                end.x[0] * end.x[0] + end.x[1] * end.x[1] - 1.0
+            } else {
+                end.x[0]
+            };
             let phi = 0.5 * (1.0 + (h / 0.05).tanh());
             let rest = if coordinate == 1 { 3.0 / 7.0 } else { 0.5 };
             assert!((phi - rest).abs() < 1e-4, "{method:?} {tolerance}: {phi}");
@@ -484,18 +564,33 @@ fn a_linear_delay_equation_is_its_polynomials() {
 /// With equal steps: the error falls with their fifth power, at the ends as between.
 #[test]
 fn the_smooth_rule_keeps_the_methods_order() {
-    let oscillating = system("states = ['x', 'v']\nh = 'x'\nplus = ['v', '-1 - x']\nminus = ['v', '1 - x']");
+    let oscillating =
+        system("states = ['x', 'v']\nh = 'x'\nplus = ['v', '-1 - x']\nminus = ['v', '1 - x']");
     let end = |method: Method, steps: u32, tolerance: f64| {
         let cap = 0.7 / f64::from(steps);
-        let options = DriveOptions { step_cap: StepCap::Absolute(cap), kicked_states: 2, ..DriveOptions::to(7.0) };
-        let how = How { delay: 0.7, smooth: Some((Transition::Tanh, 1.0)), method, tolerance, options, ..SMOOTH };
+        let options = DriveOptions {
+            step_cap: StepCap::Absolute(cap),
+            kicked_states: 2,
+            ..DriveOptions::to(7.0)
+        };
+        let how = How {
+            delay: 0.7,
+            smooth: Some((Transition::Tanh, 1.0)),
+            method,
+            tolerance,
+            options,
+            ..SMOOTH
+        };
         how.run(&oscillating, [0.9, 0.2]).unwrap().1.x
     };
     let exact = end(Method::Dopri5, 64, 1e-13);
     for (method, order) in [(Method::Dopri5, 5.0), (Method::Radau5, 4.0)] {
         let errors = [4, 8, 16].map(|n| (end(method, n, 1e3) - exact).amax());
         let orders = [0, 1].map(|i| (errors[i] / errors[i + 1]).log2());
-        assert!(orders.iter().all(|found| *found > order - 0.5), "{method:?}: {errors:?} {orders:?}");
+        assert!(
+            orders.iter().all(|found| *found > order - 0.5),
+            "{method:?}: {errors:?} {orders:?}"
+        );
     }
 }
 
@@ -520,10 +615,14 @@ fn the_past_is_one_delay() {
 
 const START: [f64; 3] = [0.2, 0.0, -1.0];
 
-/// The first rows of references in 113-bit arithmetic by an independent program: `tests/data/delay-sharp.csv` has all of them.
+/// The first rows of references in 113-bit arithmetic by an independent program:
+/// `tests/data/delay-sharp.csv` has all of them.
 #[test]
 fn the_caricature_follows_an_independent_program() {
-    let rows = [(1.170_311_546_805_946, -0.720_921_494_588_762_4), (4.706_130_432_412_76, 1.542_515_130_537_061_6)];
+    let rows = [
+        (1.170_311_546_805_946, -0.720_921_494_588_762_4),
+        (4.706_130_432_412_76, 1.542_515_130_537_061_6),
+    ];
     let data = System::from(Caricature::with_reinjection(1e-1, 1e-5));
     for (method, tolerance) in SHARP {
         let how = How { method, tolerance, coordinate: 1, ..How::sharp(1e-3, 5.0) };
@@ -532,7 +631,10 @@ fn the_caricature_follows_an_independent_program() {
         assert_eq!(found.len(), 2);
         for (a, b) in found.iter().zip(rows) {
             let allowed = if method == Method::Dopri5 { 1e-8 } else { 1e-13 };
-            assert!((a.0 - b.0).abs() < allowed && (a.1 - b.1).abs() < allowed, "{method:?}: {a:?} {b:?}");
+            assert!(
+                (a.0 - b.0).abs() < allowed && (a.1 - b.1).abs() < allowed,
+                "{method:?}: {a:?} {b:?}"
+            );
         }
     }
 }
@@ -541,7 +643,8 @@ fn the_caricature_follows_an_independent_program() {
 fn without_delay_the_rules_are_those_without_it() {
     let data = System::from(Caricature::with_reinjection(1e-1, 1e-5));
     let at = |how: How| how.run(&data, START).unwrap().1.x;
-    // Filippov's sliding motion at t = 3 is what is left of the chatter's mean: the distance falls with the delay.
+    // Filippov's sliding motion at t = 3 is what is left of the chatter's mean: the distance falls
+    // with the delay.
     let sharp = |delay| at(How { tolerance: 1e-9, ..How::sharp(delay, 3.0) });
     let [a, b, c] = [4e-2, 2e-2, 1e-2].map(sharp);
     let ratio = (a - b).norm() / (b - c).norm();
@@ -555,9 +658,15 @@ fn without_delay_the_rules_are_those_without_it() {
         eps: 0.05,
     };
     let mut dopri5 = Dopri5::new(tolerance(1e-11));
-    let limit = drive(&field, START.into(), &DriveOptions::to(3.0), &mut dopri5, &mut crate::Ignore, &()).unwrap().x;
+    let limit =
+        drive(&field, START.into(), &DriveOptions::to(3.0), &mut dopri5, &mut crate::Ignore, &())
+            .unwrap()
+            .x;
     let errors = [4e-3, 2e-3, 1e-3].map(|delay| (smooth(delay) - limit).norm());
-    assert!(errors[2] < 0.01 && errors.windows(2).all(|e| (e[0] / e[1] - 2.0).abs() < 0.5), "{errors:?}");
+    assert!(
+        errors[2] < 0.01 && errors.windows(2).all(|e| (e[0] / e[1] - 2.0).abs() < 0.5),
+        "{errors:?}"
+    );
 }
 
 #[test]
@@ -603,7 +712,8 @@ fn switches() -> [LateSwitch; 4] {
     ]
 }
 
-/// A disturbance carried along is what neighbouring orbits are apart: through chatter, by every rule, from three directions.
+/// A disturbance carried along is what neighbouring orbits are apart: through chatter, by every
+/// rule, from three directions.
 #[test]
 fn disturbances_are_those_of_neighbouring_orbits() {
     let system = Caricature::with_reinjection(1e-1, 1e-5);
@@ -613,30 +723,40 @@ fn disturbances_are_those_of_neighbouring_orbits() {
         let end = |x0: SVector<f64, 3>| {
             let delayed = Delayed { sides: Sides::new(&system, &data), switch, x0 };
             let run = Recording { options: DriveOptions::to(until), coordinate: 0, x0 };
-            let (seen, end) = delayed.with_stepper(Method::Dopri5, None, tolerance(1e-13), run).unwrap();
-            let in_layer = matches!(switch, LateSwitch::Delayed { smooth: Some((Transition::Algebraic, _)), .. });
+            let (seen, end) =
+                delayed.with_stepper(Method::Dopri5, None, tolerance(1e-13), run).unwrap();
+            let in_layer = matches!(
+                switch,
+                LateSwitch::Delayed { smooth: Some((Transition::Algebraic, _)), .. }
+            );
             assert!(in_layer || seen.crossings.len() > 3, "{switch:?}: {}", seen.crossings.len());
             end.x
         };
         for i in 0..3 {
             let direction = SVector::<f64, 3>::ith(i, 1.0);
             let varied = Varied(&system);
-            let start = SVector::<f64, 6>::from_fn(|k, _| if k < 3 { x0[k] } else { direction[k - 3] });
+            let start =
+                SVector::<f64, 6>::from_fn(|k, _| if k < 3 { x0[k] } else { direction[k - 3] });
             let delayed = Delayed { sides: Sides::varied(&varied, &data), switch, x0: start };
             let found = delayed.with_tangent(tolerance(1e-12), To(until)).unwrap();
             let (a, b) = (end(x0 + direction * size), end(x0 - direction * size));
             for k in 0..3 {
                 let apart = (a[k] - b[k]) / (2.0 * size);
                 let allowed = 1e-5 * (1.0 + apart.abs());
-                assert!((found[3 + k] - apart).abs() < allowed, "{switch:?} {i} {k}: {} {apart}", found[3 + k]);
+                assert!(
+                    (found[3 + k] - apart).abs() < allowed,
+                    "{switch:?} {i} {k}: {} {apart}",
+                    found[3 + k]
+                );
             }
         }
     }
 }
 
-/// x' = -sign(x(t - 1)) on its second orbit, of period 4/5, on which three switches are always on their way. A zero t(n) and the switch that the zero
-/// before the last but one causes make the next zero: t(n + 1) = 2 (t(n - 2) + 1) - t(n), so that disturbances of the zeros obey d(n + 1) = 2 d(n - 2) - d(n):
-/// multipliers 1 and -1 +- i.
+/// x' = -sign(x(t - 1)) on its second orbit, of period 4/5, on which three switches are always on
+/// their way. A zero t(n) and the switch that the zero before the last but one causes make the next
+/// zero: t(n + 1) = 2 (t(n - 2) + 1) - t(n), so that disturbances of the zeros obey d(n + 1) = 2
+/// d(n - 2) - d(n): multipliers 1 and -1 +- i.
 #[test]
 fn disturbances_of_rapid_oscillations_grow_by_the_root_of_two() {
     let data = relay(1.0, 1.0);
@@ -645,7 +765,11 @@ fn disturbances_of_rapid_oscillations_grow_by_the_root_of_two() {
     let switch = LateSwitch::Delayed { delay: 1.0, smooth: None, history: History::Constant };
     let delayed = Delayed { sides: Sides::varied(&varied, &data), switch, x0: vector![0.0, 1.0] };
     let queue = [(0.2, true), (0.6, false), (1.0, true)];
-    let mut stepper = delayed.sharp_dopri5(tolerance(1e-12)).unwrap().carrying(&varied).with_queue(false, true, &queue);
+    let mut stepper = delayed
+        .sharp_dopri5(tolerance(1e-12))
+        .unwrap()
+        .carrying(&varied)
+        .with_queue(false, true, &queue);
     stepper.restart(&Own, 0.0, vector![0.0, 1.0], 100.0, f64::INFINITY).unwrap();
     let mut zeros = vec![0.0, 0.0, 0.0, 1.0];
     let mut finder = CrossingFinder::starting(true);

@@ -1,4 +1,5 @@
-//! The method of one piece of the motion: Dormand-Prince, and Radau IIA from where the piece is found to be stiff.
+//! The method of one piece of the motion: Dormand-Prince, and Radau IIA from where the piece is
+//! found to be stiff.
 
 use nalgebra::SVector;
 
@@ -7,7 +8,8 @@ use crate::radau5::Radau5;
 use crate::step::{Failure, Statistics, Step, Stepper, Tolerance};
 use twofold_system::VectorField;
 
-/// Dormand-Prince until its steps are bounded by stability ([`Dopri5::is_stiff`]), Radau IIA from there on.
+/// Dormand-Prince until its steps are bounded by stability ([`Dopri5::is_stiff`]), Radau IIA from
+/// there on.
 #[derive(Clone, Debug)]
 pub(super) struct Automatic<const N: usize> {
     tolerance: Tolerance,

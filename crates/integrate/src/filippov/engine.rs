@@ -6,11 +6,13 @@ use nalgebra::SVector;
 
 use super::automatic::Automatic;
 use super::exit::{Chooser, ExitPlan};
-use super::flow::{FreeFlow, InPhysicalTime, Sided, SlidingFlow, Straight, Truncated, desingularised, project};
+use super::flow::{
+    FreeFlow, InPhysicalTime, Sided, SlidingFlow, Straight, Truncated, desingularised, project,
+};
 use super::two_fold::{AlongCurve, FusedFolds, SlidingAtTwoFold};
 use super::{
-    CHOOSE, Choice, EventKind, ExitRule, FilippovError, FilippovObserver, FilippovOptions, FilippovSummary, Mode,
-    ModeEvent, Side,
+    CHOOSE, Choice, EventKind, ExitRule, FilippovError, FilippovObserver, FilippovOptions,
+    FilippovSummary, Mode, ModeEvent, Side,
 };
 use crate::driver::Monitor;
 use crate::roots::{Enclosed, Start, Zero, brent, first_zero, first_zero_along};
@@ -119,7 +121,9 @@ where
         return Err(FilippovError::Invalid("tolerances and the step cap must be above 0".into()));
     }
     if !(t_end > t0 && t_end.is_finite()) {
-        return Err(FilippovError::Invalid(format!("the end time must be finite and after the start, not {t_end}")));
+        return Err(FilippovError::Invalid(format!(
+            "the end time must be finite and after the start, not {t_end}"
+        )));
     }
     if !finite(&x0) {
         return Err(Failure::NotFinite { t: t0, state: Failure::state(&x0) }.into());
@@ -154,7 +158,9 @@ where
         }
         Departure::Anywhere | Departure::OnSurface => engine.start()?,
         Departure::TwoFold(Some(local)) => State::TwoFold(local),
-        Departure::TwoFold(None) => return Err(engine.non_transversal("the two-fold is degenerate")),
+        Departure::TwoFold(None) => {
+            return Err(engine.non_transversal("the two-fold is degenerate"));
+        }
         Departure::Repelling => engine.enter_repelling(None)?,
         Departure::Decided(mode) => engine.begin(mode),
     };
@@ -183,8 +189,12 @@ where
     }
 }
 
-/// Whether h is zero at `x` as far as the rounding of `x` and of h's evaluation can tell: by interval arithmetic.
-pub(super) fn near_surface<P: PiecewiseSmooth<N>, const N: usize>(system: &P, x: &SVector<f64, N>) -> bool {
+/// Whether h is zero at `x` as far as the rounding of `x` and of h's evaluation can tell: by
+/// interval arithmetic.
+pub(super) fn near_surface<P: PiecewiseSmooth<N>, const N: usize>(
+    system: &P,
+    x: &SVector<f64, N>,
+) -> bool {
     let around = x.map(|v| {
         let (low, high) = if v == 0.0 { (0.0, 0.0) } else { (v.next_down(), v.next_up()) };
         Interval::new(low, high).unwrap_or(Interval::ENTIRE)
@@ -243,7 +253,11 @@ impl Sliding {
     }
 
     /// How far L+h and L-h are from zero; both are positive inside the region.
-    fn margins<P: PiecewiseSmooth<N>, const N: usize>(&self, system: &P, x: &SVector<f64, N>) -> [f64; 2] {
+    fn margins<P: PiecewiseSmooth<N>, const N: usize>(
+        &self,
+        system: &P,
+        x: &SVector<f64, N>,
+    ) -> [f64; 2] {
         let (p, q) = lie_derivatives(system, x);
         [-self.direction() * p, self.direction() * q]
     }
@@ -254,7 +268,8 @@ fn without_clock<const N: usize, const M: usize>(z: &SVector<f64, M>) -> SVector
     SVector::from_fn(|i, _| z[i])
 }
 
-/// Lengths of the chords of the first part, up to the fraction `theta`, of a step of the sliding flow.
+/// Lengths of the chords of the first part, up to the fraction `theta`, of a step of the sliding
+/// flow.
 fn chords<const N: usize, const M: usize>(step: &Step<'_, M>, theta: f64) -> [f64; CHORDS] {
     let mut last = without_clock::<N, M>(&step.x0);
     std::array::from_fn(|k| {
@@ -284,12 +299,12 @@ impl<const N: usize> TwoFoldAhead<N> {
             return;
         }
         self.tried_at = size;
-        // From far away Newton's method may have found another two-fold: trust only the latest answer.
+        // From far away Newton's method may have found another two-fold: trust only the latest
+        // answer.
         if let Ok(TwoFold { point, .. }) = two_fold(system, x)
-            && self
-                .local
-                .as_ref()
-                .is_none_or(|l| (l.point - point).amax() > LIMITS.same_point * x.amax().max(point.amax()))
+            && self.local.as_ref().is_none_or(|l| {
+                (l.point - point).amax() > LIMITS.same_point * x.amax().max(point.amax())
+            })
         {
             self.local = SlidingAtTwoFold::at(system, point);
         }
@@ -321,10 +336,12 @@ impl<const N: usize> State<N> {
     }
 }
 
-/// The flights since the last that was longer than the one before the last: whether they come together in a point.
+/// The flights since the last that was longer than the one before the last: whether they come
+/// together in a point.
 ///
-/// Crossings accumulate at t* if from some flight on the durations fall geometrically, each flight against the last one on its own side
-/// (Goebel, Sanfelice & Teel 2012, sec. 2.2; Or & Ames 2011). Flights near a grazing are short, too, but one at a time.
+/// Crossings accumulate at t* if from some flight on the durations fall geometrically, each flight
+/// against the last one on its own side (Goebel, Sanfelice & Teel 2012, sec. 2.2; Or & Ames 2011).
+/// Flights near a grazing are short, too, but one at a time.
 #[derive(Clone, Debug)]
 struct Accumulation<const N: usize> {
     in_a_row: u64,
@@ -341,9 +358,14 @@ impl<const N: usize> Default for Accumulation<N> {
 }
 
 impl<const N: usize> Accumulation<N> {
-    /// A flight took `duration` and ended at (t, x). The time and the point at which crossings accumulate, if they do and the time left
-    /// until then is below what is resolved.
-    fn flight(&mut self, duration: f64, t: f64, x: SVector<f64, N>) -> Option<(f64, SVector<f64, N>)> {
+    /// A flight took `duration` and ended at (t, x). The time and the point at which crossings
+    /// accumulate, if they do and the time left until then is below what is resolved.
+    fn flight(
+        &mut self,
+        duration: f64,
+        t: f64,
+        x: SVector<f64, N>,
+    ) -> Option<(f64, SVector<f64, N>)> {
         self.last.rotate_right(1);
         self.last[0] = (duration, x);
         if duration < self.last[2].0 {
@@ -358,14 +380,15 @@ impl<const N: usize> Accumulation<N> {
         let (low, high) = ratios.fold((f64::INFINITY, 0.0_f64), |(l, h), r| (l.min(r), h.max(r)));
         let left = (self.last[0].0 + self.last[1].0) * high / (1.0 - high);
         // A NaN is no accumulation.
-        let geometric = high - low <= LIMITS.zeno_spread * (1.0 - high) && left <= LIMITS.zeno_left * t.abs();
+        let geometric =
+            high - low <= LIMITS.zeno_spread * (1.0 - high) && left <= LIMITS.zeno_left * t.abs();
         geometric.then(|| (left, x + (x - self.last[2].1) * (high / (1.0 - high))))
     }
 }
 
 impl<const N: usize> Accumulation<N> {
-    /// The tolerances of the next flight. Its height is of the order of the square of its duration, and may be far below the absolute
-    /// tolerance.
+    /// The tolerances of the next flight. Its height is of the order of the square of its duration,
+    /// and may be far below the absolute tolerance.
     fn tolerance(&self, of_the_run: Tolerance) -> Tolerance {
         let shrunk = self.last[0].0 / self.first;
         if self.in_a_row == 0 || shrunk.is_nan() || shrunk > LIMITS.zeno_shrunk {
@@ -375,7 +398,8 @@ impl<const N: usize> Accumulation<N> {
     }
 }
 
-/// Flights in a row whose durations have one ratio, before it is taken for the ratio of all that follow.
+/// Flights in a row whose durations have one ratio, before it is taken for the ratio of all that
+/// follow.
 const ZENO_FLIGHTS: usize = 8;
 
 /// A motion that does not move.
@@ -403,26 +427,32 @@ const STEPS_BETWEEN_WATCHES: u32 = 4096;
 /// Chords of a step by which its length is measured.
 const CHORDS: usize = 16;
 
-/// The numbers by which the engine decides what rounding blurs. None is a tolerance of the motion; those are in [`FilippovOptions`].
+/// The numbers by which the engine decides what rounding blurs. None is a tolerance of the motion;
+/// those are in [`FilippovOptions`].
 struct Limits {
-    /// A first Lie derivative below this share of its terms, and of its change over the size of the run, is zero: some fifty roundings.
+    /// A first Lie derivative below this share of its terms, and of its change over the size of the
+    /// run, is zero: some fifty roundings.
     lie: f64,
     /// A two-fold is looked for where both Lie derivatives are below so many of those.
     near_two_fold: f64,
-    /// Two-folds within this share of their size are one, and so are a two-fold and the present state.
+    /// Two-folds within this share of their size are one, and so are a two-fold and the present
+    /// state.
     same_point: f64,
-    /// Newton steps that sharpen a touch of the surface, which a root finder knows only to half of the digits.
+    /// Newton steps that sharpen a touch of the surface, which a root finder knows only to half of
+    /// the digits.
     touch_steps: usize,
     /// Largest fraction of the step by which such a Newton step moves the touch.
     touch_range: f64,
-    /// Largest difference of the ratios of durations in an accumulation, as a share of their distance from 1.
+    /// Largest difference of the ratios of durations in an accumulation, as a share of their
+    /// distance from 1.
     zeno_spread: f64,
     /// Largest rest of an accumulation, as a share of the time.
     zeno_left: f64,
-    /// Flights that are shorter than this share of the first of such a row are integrated with smaller absolute tolerances.
+    /// Flights that are shorter than this share of the first of such a row are integrated with
+    /// smaller absolute tolerances.
     zeno_shrunk: f64,
-    /// A field is zero at a point of the surface below this share of the speed of the motion before: a root of the rounding, for fields that
-    /// are no smoother than sqrt(|h|) there.
+    /// A field is zero at a point of the surface below this share of the speed of the motion
+    /// before: a root of the rounding, for fields that are no smoother than sqrt(|h|) there.
     rest: f64,
     /// The end of a run is reached within so many spacings of the numbers there.
     end: f64,
@@ -430,26 +460,30 @@ struct Limits {
     idle: f64,
     /// So many idle steps are the arrival at a degenerate point.
     idle_steps: u32,
-    /// A field without values beyond the surface is asked no nearer to it, where the surface goes through zero.
+    /// A field without values beyond the surface is asked no nearer to it, where the surface goes
+    /// through zero.
     depth: f64,
     /// Parts of a step that are no farther apart are one moment.
     same_moment: f64,
-    /// The first step of sliding out of two folds in one place changes the Lie derivatives by this share of the same.
+    /// The first step of sliding out of two folds in one place changes the Lie derivatives by this
+    /// share of the same.
     departure: f64,
-    /// The rate at which sliding passes two folds in one place changes there by less than this share of it.
+    /// The rate at which sliding passes two folds in one place changes there by less than this
+    /// share of it.
     kink: f64,
     /// Closer to a two-fold than so many tolerances there is nothing to integrate.
     blur: f64,
     /// Where a zero of h is farther from the surface than this share of the state, h jumps.
     jump: f64,
-    /// Sliding restarts on the surface when it has drifted off by this share of the state, or by `drift_in_tolerances`.
+    /// Sliding restarts on the surface when it has drifted off by this share of the state, or by
+    /// `drift_in_tolerances`.
     drift: f64,
     /// Drift in absolute tolerances at which sliding restarts, if that is more.
     drift_in_tolerances: f64,
     /// Chords by which the path out of a two-fold is measured.
     departure_chords: usize,
-    /// Departures shorter than this share of the shortest one are raised to it: closer to the two-fold the signs of the Lie
-    /// derivatives are rounding.
+    /// Departures shorter than this share of the shortest one are raised to it: closer to the
+    /// two-fold the signs of the Lie derivatives are rounding.
     shortest_departure: f64,
 }
 
@@ -478,7 +512,9 @@ const LIMITS: Limits = Limits {
     shortest_departure: 1e-6,
 };
 
-const DEGENERATE_END: &str = "sliding comes to a point where both fields are tangent to the surface, and which is neither a regular two-fold nor two folds in one place with a sliding motion through them";
+const DEGENERATE_END: &str = "sliding comes to a point where both fields are tangent to the \
+    surface, and which is neither a regular two-fold nor two folds in one place with a sliding \
+    motion through them";
 
 /// The ways on, in words.
 const REPELLING: &str = "repelling sliding, which may end at any later moment to either side";
@@ -529,7 +565,8 @@ struct Engine<'a, P, const N: usize> {
     speed: SVector<f64, N>,
     stop: Option<StopReason>,
     steps_until_watch: u32,
-    /// Set where a field has no value beyond the surface: how near to it fields are asked (see [`Sided`]).
+    /// Set where a field has no value beyond the surface: how near to it fields are asked (see
+    /// [`Sided`]).
     depth: Option<f64>,
     /// f+ and f-, with the ends of their domains.
     fields: [(Arc<Tape>, Option<Ends>); 2],
@@ -537,7 +574,14 @@ struct Engine<'a, P, const N: usize> {
 
 impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
     fn summary(self, mode: Option<Mode>, stop: StopReason) -> FilippovSummary<N> {
-        FilippovSummary { t: self.t, x: self.x, mode, stop, events: self.events, statistics: self.statistics }
+        FilippovSummary {
+            t: self.t,
+            x: self.x,
+            mode,
+            stop,
+            events: self.events,
+            statistics: self.statistics,
+        }
     }
 
     fn event(&mut self, kind: EventKind, from: Option<Mode>, to: Option<Mode>) {
@@ -565,7 +609,11 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         }
     }
 
-    fn undecided(&self, what: &'static str, continuations: impl IntoIterator<Item = String>) -> FilippovError {
+    fn undecided(
+        &self,
+        what: &'static str,
+        continuations: impl IntoIterator<Item = String>,
+    ) -> FilippovError {
         let (t, state) = (self.t, Failure::state(&self.x));
         let continuations = continuations.into_iter().collect();
         let choice = Choice { what, continuations, remedy: CHOOSE };
@@ -580,10 +628,12 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         Sided { system: self.system, depth: self.depth }
     }
 
-    /// A field has no finite value at or beyond the surface: from here on each is asked on its own side only. Whether that is new.
+    /// A field has no finite value at or beyond the surface: from here on each is asked on its own
+    /// side only. Whether that is new.
     fn stay_inside(&mut self) -> bool {
         let new = self.depth.is_none();
-        // Resolved by the state's digits, or where the surface goes through zero so small that no tolerance sees it.
+        // Resolved by the state's digits, or where the surface goes through zero so small that no
+        // tolerance sees it.
         let least = (4.0 * f64::EPSILON * self.x.amax()).max(LIMITS.depth);
         self.depth = Some(least * gradient(self.system, &self.x).norm());
         new
@@ -600,11 +650,14 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         let system = self.sided();
         let (plus, minus) = (system.plus(x), system.minus(x));
         let (p, q) = lie_derivatives::<Sided<'_, P>, Dual<f64, N>, N>(&system, &variables(x));
-        let along = |d: &Dual<f64, N>, f: &SVector<f64, N>| (0..N).map(|i| d.partials[i] * f[i]).sum::<f64>();
+        let along = |d: &Dual<f64, N>, f: &SVector<f64, N>| {
+            (0..N).map(|i| d.partials[i] * f[i]).sum::<f64>()
+        };
         let slope = gradient(self.system, x);
         // Rounding of the sum that is the Lie derivative, and of the state that it is taken at.
         let zero = |d: &Dual<f64, N>, f: &SVector<f64, N>| {
-            let terms = (0..N).flat_map(|i| [(slope[i] * f[i]).abs(), d.partials[i].abs() * self.size[i]]);
+            let terms =
+                (0..N).flat_map(|i| [(slope[i] * f[i]).abs(), d.partials[i].abs() * self.size[i]]);
             // A derivative that does not exist says nothing.
             LIMITS.lie * terms.filter(|term| term.is_finite()).sum::<f64>()
         };
@@ -633,7 +686,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         if t1 > self.t {
             let step = Step { t0: self.t, t1, x0: self.x, x1, interpolant };
             self.size = self.size.zip_map(&x1, |s, x| s.max(x.abs()));
-            self.speed = self.speed.zip_map(&((x1 - self.x) / (t1 - self.t)), |s, v| s.max(v.abs()));
+            self.speed =
+                self.speed.zip_map(&((x1 - self.x) / (t1 - self.t)), |s, v| s.max(v.abs()));
             if self.observer.step(mode, &step) == Flow::Stop {
                 self.stop.get_or_insert(StopReason::Observer);
             }
@@ -675,8 +729,13 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         Ok(state)
     }
 
-    /// The present state, where the first Lie derivatives decide nothing: two folds in one place, or a rest.
-    fn degenerate(&mut self, from: Option<Mode>, what: &'static str) -> Result<State<N>, FilippovError> {
+    /// The present state, where the first Lie derivatives decide nothing: two folds in one place,
+    /// or a rest.
+    fn degenerate(
+        &mut self,
+        from: Option<Mode>,
+        what: &'static str,
+    ) -> Result<State<N>, FilippovError> {
         let l = self.lie_on_surface();
         match self.fused_here(&l) {
             Some(folds) => Ok(self.meet(folds, from)),
@@ -685,7 +744,11 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
     }
 
     /// A rest, if zero lies between the fields here, or an error that says `what` else.
-    fn rest_or(&mut self, from: Option<Mode>, what: &'static str) -> Result<State<N>, FilippovError> {
+    fn rest_or(
+        &mut self,
+        from: Option<Mode>,
+        what: &'static str,
+    ) -> Result<State<N>, FilippovError> {
         let below = self.speed * LIMITS.rest;
         if !self.rests_at(&self.x, &below) {
             return Err(self.non_transversal(what));
@@ -702,8 +765,9 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         Ok(State::Rest)
     }
 
-    /// Whether a convex combination of the two fields at `x` is zero, each component up to `below`: then Filippov's set of velocities holds
-    /// zero, and the motion may stay (Filippov 1988, sec. 19).
+    /// Whether a convex combination of the two fields at `x` is zero, each component up to `below`:
+    /// then Filippov's set of velocities holds zero, and the motion may stay (Filippov 1988, sec.
+    /// 19).
     fn rests_at(&self, x: &SVector<f64, N>, below: &SVector<f64, N>) -> bool {
         let (system, sided) = (self.system, self.sided());
         // Their values there, or beside it on their own sides where they have none there.
@@ -724,7 +788,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         (0..N).all(|i| mean[i].abs() <= below[i].max(rounding(i)))
     }
 
-    /// Crossings accumulate at `point`, `left` after the present moment: what follows, if the motion stays there.
+    /// Crossings accumulate at `point`, `left` after the present moment: what follows, if the
+    /// motion stays there.
     fn accumulate(
         &mut self,
         side: Side,
@@ -733,8 +798,10 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         duration: f64,
     ) -> Result<State<N>, FilippovError> {
         let (crossings, point) = (self.accumulation.in_a_row, project(self.system, &point));
-        // As far as the fields change over what is left of the accumulation, they are not known at its end.
-        let change = |f: &dyn Fn(&SVector<f64, N>) -> SVector<f64, N>| (f(&self.x) - f(&point)).abs();
+        // As far as the fields change over what is left of the accumulation, they are not known at
+        // its end.
+        let change =
+            |f: &dyn Fn(&SVector<f64, N>) -> SVector<f64, N>| (f(&self.x) - f(&point)).abs();
         let (plus, minus) = (change(&|x| self.system.plus(x)), change(&|x| self.system.minus(x)));
         let below = plus.zip_map(&minus, |a, b| 10.0 * a.max(b));
         if !self.rests_at(&point, &below) {
@@ -770,7 +837,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             return None;
         }
         let local = SlidingAtTwoFold::near(self.system, &self.x)?;
-        ((local.point - self.x).norm() <= LIMITS.same_point * local.radius.min(self.size.norm())).then_some(local)
+        ((local.point - self.x).norm() <= LIMITS.same_point * local.radius.min(self.size.norm()))
+            .then_some(local)
     }
 
     /// The state is in the repelling region: ask the rule.
@@ -803,7 +871,11 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             Side::Plus => (l.p, l.zero_p, l.pp),
             Side::Minus => (-l.q, l.zero_q, -l.mm),
         };
-        let start = if first.abs() > zero { FlightStart::Transversal(first) } else { FlightStart::Tangent(second) };
+        let start = if first.abs() > zero {
+            FlightStart::Transversal(first)
+        } else {
+            FlightStart::Tangent(second)
+        };
         State::Free { side, start }
     }
 
@@ -816,7 +888,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         &self.fields[usize::from(side == Side::Minus)]
     }
 
-    /// Why the motion does not go on from the present state on the surface, as far as a field shows it: its domain ends, or it grows without bound.
+    /// Why the motion does not go on from the present state on the surface, as far as a field shows
+    /// it: its domain ends, or it grows without bound.
     fn cause_on_surface(&self) -> Option<Failure> {
         let sided = self.sided();
         let (field, rate) = desingularised(&sided, &self.x);
@@ -829,15 +902,22 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                 Failure::Undefined { t, what, .. } => {
                     Some(Failure::Undefined { t, state: Failure::state(&self.x), what })
                 }
-                Failure::Unbounded { t, .. } => Some(Failure::Unbounded { t, state: Failure::state(&self.x) }),
+                Failure::Unbounded { t, .. } => {
+                    Some(Failure::Unbounded { t, state: Failure::state(&self.x) })
+                }
                 _ => None,
             }
         };
         SIDES.into_iter().find_map(cause)
     }
 
-    /// Where the domain of a field on one of `sides` ends in a step, of which `state` is the part that it depends on.
-    fn domain_end(&self, sides: &[Side], state: &dyn Fn(f64) -> SVector<f64, N>) -> Option<(f64, String)> {
+    /// Where the domain of a field on one of `sides` ends in a step, of which `state` is the part
+    /// that it depends on.
+    fn domain_end(
+        &self,
+        sides: &[Side],
+        state: &dyn Fn(f64) -> SVector<f64, N>,
+    ) -> Option<(f64, String)> {
         let sided = self.sided();
         let ends = sides.iter().filter_map(|side| {
             let path = |theta: f64| Failure::state(&sided.inside(&state(theta), *side));
@@ -852,7 +932,9 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         let mut flow = FreeFlow { system: Sided { system, depth: self.depth }, side };
         let mut method = Automatic::<N>::new(self.accumulation.tolerance(self.settings.tolerance));
         let (t_start, mut start) = (self.t, start);
-        if let Err(failure) = method.restart(&flow, self.t, self.x, self.t_end, self.settings.max_step) {
+        if let Err(failure) =
+            method.restart(&flow, self.t, self.x, self.t_end, self.settings.max_step)
+        {
             return if self.stay_inside() {
                 Ok(State::Free { side, start })
             } else {
@@ -862,10 +944,14 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         let landed = loop {
             let step = match method.step(&flow) {
                 Ok(step) => step,
-                // Trial points beyond the surface, where the motion does not go, may be where the field has no value.
-                Err(Failure::NotFinite { .. } | Failure::StepUnderflow { .. }) if self.stay_inside() => {
+                // Trial points beyond the surface, where the motion does not go, may be where the
+                // field has no value.
+                Err(Failure::NotFinite { .. } | Failure::StepUnderflow { .. })
+                    if self.stay_inside() =>
+                {
                     flow.system.depth = self.depth;
-                    let restarted = method.restart(&flow, self.t, self.x, self.t_end, self.settings.max_step);
+                    let restarted =
+                        method.restart(&flow, self.t, self.x, self.t_end, self.settings.max_step);
                     restarted.map_err(|failure| self.diagnosed(failure, side))?;
                     continue;
                 }
@@ -897,7 +983,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                 Some(zero) => {
                     let mut theta = zero.theta();
                     if matches!(zero, Zero::Touch(_)) {
-                        // A touch is known only to the root of the rounding; the tangency itself is a simple zero.
+                        // A touch is known only to the root of the rounding; the tangency itself is
+                        // a simple zero.
                         for _ in 0..LIMITS.touch_steps {
                             let l = self.lie(&step.at(theta));
                             let (rate, second) = match side {
@@ -905,7 +992,9 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                                 Side::Minus => (l.q, l.mm),
                             };
                             let moved = theta - rate / (second * length);
-                            if !((moved - theta).abs() < LIMITS.touch_range && (0.0..=1.0).contains(&moved)) {
+                            if !((moved - theta).abs() < LIMITS.touch_range
+                                && (0.0..=1.0).contains(&moved))
+                            {
                                 break;
                             }
                             theta = moved;
@@ -917,10 +1006,20 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                     let travel = (step.x1 - step.x0).norm() + place.norm();
                     let moved = (x1 - place).norm();
                     if moved.is_nan() || moved > LIMITS.jump * travel {
-                        self.take(side.into(), t1, place, &Truncated { inner: step.interpolant, end: theta });
+                        self.take(
+                            side.into(),
+                            t1,
+                            place,
+                            &Truncated { inner: step.interpolant, end: theta },
+                        );
                         return Err(FilippovError::Jump { t: t1, state: Failure::state(&place) });
                     }
-                    self.take(side.into(), t1, x1, &Truncated { inner: step.interpolant, end: theta });
+                    self.take(
+                        side.into(),
+                        t1,
+                        x1,
+                        &Truncated { inner: step.interpolant, end: theta },
+                    );
                     break Some(zero);
                 }
             }
@@ -955,17 +1054,23 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         if let Some(folds) = self.fused_here(&l) {
             return Ok(self.meet(folds, from));
         }
-        // Growth of |h| on this side along its own field, and on the other side along the other field.
+        // Growth of |h| on this side along its own field, and on the other side along the other
+        // field.
         let (own, own_zero, own_second, across, across_zero, across_second) = match side {
             Side::Plus => (l.p, l.zero_p, l.pp, -l.q, l.zero_q, -l.mm),
             Side::Minus => (-l.q, l.zero_q, -l.mm, l.p, l.zero_p, l.pp),
         };
         if own >= -own_zero || (touch && own_second > 0.0) {
             if own_second.is_nan() || own_second <= 0.0 {
-                return self.degenerate(from, "a tangency from an invisible or degenerate side (a cusp)");
+                return self
+                    .degenerate(from, "a tangency from an invisible or degenerate side (a cusp)");
             }
             self.event(EventKind::Grazing { side }, from, from);
-            let start = if own > own_zero { FlightStart::Transversal(own) } else { FlightStart::Tangent(own_second) };
+            let start = if own > own_zero {
+                FlightStart::Transversal(own)
+            } else {
+                FlightStart::Tangent(own_second)
+            };
             return Ok(State::Free { side, start });
         }
         let other = side.other();
@@ -974,7 +1079,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         } else if across < -across_zero {
             None
         } else if across_second == 0.0 || across_second.is_nan() {
-            return self.degenerate(from, "landing on a fold with zero second Lie derivative (a cusp)");
+            return self
+                .degenerate(from, "landing on a fold with zero second Lie derivative (a cusp)");
         } else {
             (across_second > 0.0).then_some(FlightStart::Tangent(across_second))
         };
@@ -997,13 +1103,17 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         let sided = Sided { system, depth: self.depth };
         let flow = SlidingFlow { system: Sided { ..sided }, direction: sliding.direction() };
         let mut method = Automatic::<M>::new(self.settings.tolerance);
-        let lift = |x: &SVector<f64, N>| SVector::<f64, M>::from_fn(|i, _| if i < N { x[i] } else { 0.0 });
-        // The clock of the flow starts at zero with each restart, so that short times keep their digits.
+        let lift =
+            |x: &SVector<f64, N>| SVector::<f64, M>::from_fn(|i, _| if i < N { x[i] } else { 0.0 });
+        // The clock of the flow starts at zero with each restart, so that short times keep their
+        // digits.
         let mut t_base = self.t;
         let mut fresh = true;
         let mut idle = 0;
         let mut ahead = TwoFoldAhead::new();
-        if let Err(failure) = method.restart(&flow, 0.0, lift(&self.x), f64::INFINITY, f64::INFINITY) {
+        if let Err(failure) =
+            method.restart(&flow, 0.0, lift(&self.x), f64::INFINITY, f64::INFINITY)
+        {
             return if self.stay_inside() {
                 Ok(State::Sliding(sliding))
             } else {
@@ -1014,7 +1124,9 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             let before = method.statistics().clone();
             let step = match method.step(&flow) {
                 Ok(step) => step,
-                Err(Failure::NotFinite { .. } | Failure::StepUnderflow { .. }) if self.stay_inside() => {
+                Err(Failure::NotFinite { .. } | Failure::StepUnderflow { .. })
+                    if self.stay_inside() =>
+                {
                     self.count(&before);
                     return Ok(State::Sliding(sliding));
                 }
@@ -1023,13 +1135,18 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             let end = self.sliding_end(&step, &sliding, t_base, fresh);
             fresh = false;
             let until = end.map_or(f64::INFINITY, |(theta, _)| theta);
-            if let Some((theta, what)) = self.domain_end(&SIDES, &|theta| without_clock(&step.at(theta)))
+            if let Some((theta, what)) =
+                self.domain_end(&SIDES, &|theta| without_clock(&step.at(theta)))
                 && theta < until
             {
                 let z = step.at(theta);
                 let (t, x) = ((t_base + z[N]).min(self.t_end), project(system, &without_clock(&z)));
-                let interpolant =
-                    InPhysicalTime { system, inner: step.interpolant, end: theta, clock: (step.x0[N], z[N]) };
+                let interpolant = InPhysicalTime {
+                    system,
+                    inner: step.interpolant,
+                    end: theta,
+                    clock: (step.x0[N], z[N]),
+                };
                 self.take(mode, t, x, &interpolant);
                 return Err(Failure::Undefined { t, state: Failure::state(&x), what }.into());
             }
@@ -1067,14 +1184,16 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                 let Tolerance { rtol, atol } = self.settings.tolerance;
                 let blur = LIMITS.blur * (atol + rtol * self.x.amax());
                 if distance <= (self.settings.leg * fold.radius).max(blur)
-                    && let Some((leg, error)) = fold.time_to_arrive(system, &self.x, sliding.repelling)
+                    && let Some((leg, error)) =
+                        fold.time_to_arrive(system, &self.x, sliding.repelling)
                 {
                     break self.arrive(fold.point, leg, error, mode);
                 }
             }
             // The size of h where the state is off by so much.
             let Tolerance { atol, .. } = self.settings.tolerance;
-            let allowed = self.size.map(|size| (LIMITS.drift * size).max(LIMITS.drift_in_tolerances * atol));
+            let allowed =
+                self.size.map(|size| (LIMITS.drift * size).max(LIMITS.drift_in_tolerances * atol));
             if drift > gradient(system, &off).abs().dot(&allowed) {
                 t_base = self.t;
                 method.restart(&flow, 0.0, lift(&self.x), f64::INFINITY, f64::INFINITY)?;
@@ -1084,7 +1203,9 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         let from = Some(mode);
         match next {
             None => match ahead.local {
-                Some(fold) if self.t < self.t_end && self.stop.is_none() => Ok(State::TwoFold(Box::new(fold))),
+                Some(fold) if self.t < self.t_end && self.stop.is_none() => {
+                    Ok(State::TwoFold(Box::new(fold)))
+                }
                 Some(fold) if self.x == fold.point => Ok(State::TwoFold(Box::new(fold))),
                 _ => Ok(State::Sliding(sliding)),
             },
@@ -1097,7 +1218,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         }
     }
 
-    /// The first end of sliding within a step of the sliding flow, and the fraction of the step at which it comes.
+    /// The first end of sliding within a step of the sliding flow, and the fraction of the step at
+    /// which it comes.
     fn sliding_end<const M: usize>(
         &self,
         step: &Step<'_, M>,
@@ -1135,7 +1257,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                 let (p, q) = lie_derivatives(&sided, &SVector::<Enclosed, N>::from_fn(|j, _| z[j]));
                 if i == 0 { p.scale(-direction) } else { q.scale(direction) }
             };
-            // A set of states about the surface reaches to where such a field has no value: nothing encloses it.
+            // A set of states about the surface reaches to where such a field has no value: nothing
+            // encloses it.
             let zero = match self.depth {
                 Some(_) => first_zero(margin, start),
                 None => first_zero_along(step, &margin, &enclosed, start),
@@ -1172,7 +1295,13 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
     }
 
     /// The last leg into a two-fold. `None`, as the loop's result, says that no other end was met.
-    fn arrive(&mut self, point: SVector<f64, N>, leg: f64, error: f64, mode: Mode) -> Option<SlidingEnd> {
+    fn arrive(
+        &mut self,
+        point: SVector<f64, N>,
+        leg: f64,
+        error: f64,
+        mode: Mode,
+    ) -> Option<SlidingEnd> {
         let straight = Straight { system: self.system, from: self.x, to: point };
         let t1 = self.t + leg;
         if t1 > self.t_end {
@@ -1196,7 +1325,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             return self.degenerate(from, DEGENERATE_END);
         }
         if sliding.repelling {
-            // The edge of the repelling region is an invisible fold: only the other side is left to go to.
+            // The edge of the repelling region is an invisible fold: only the other side is left to
+            // go to.
             let to = side.other();
             let (time, arc, rule) = (sliding.time, sliding.arc, self.chooser.rule);
             let first = match to {
@@ -1204,7 +1334,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                 Side::Minus => -l.q,
             };
             if first <= 0.0 {
-                return Err(self.non_transversal("repelling sliding ends where both Lie derivatives vanish"));
+                return Err(self
+                    .non_transversal("repelling sliding ends where both Lie derivatives vanish"));
             }
             self.event(EventKind::ExitAtBoundary { to, time, arc, rule }, from, Some(to.into()));
             return Ok(State::Free { side: to, start: FlightStart::Transversal(first) });
@@ -1214,7 +1345,9 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             Side::Minus => -l.mm,
         };
         if second <= 0.0 {
-            return Err(self.non_transversal("sliding ends at a fold that is not visible (a cusp or a two-fold)"));
+            return Err(self.non_transversal(
+                "sliding ends at a fold that is not visible (a cusp or a two-fold)",
+            ));
         }
         self.event(EventKind::LeftByTangency { to: side }, from, Some(side.into()));
         Ok(State::Free { side, start: FlightStart::Tangent(second) })
@@ -1231,7 +1364,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         let Some(velocity) = folds.velocity else { return Some(folds) };
         // At a kink the motion before and the motion behind are not those of one fold.
         let moved = velocity * self.departure(l, &folds);
-        let [before, behind] = [self.x - moved, self.x + moved].map(|x| FusedFolds::at(&system, &x));
+        let [before, behind] =
+            [self.x - moved, self.x + moved].map(|x| FusedFolds::at(&system, &x));
         let smooth = (before?.rate - behind?.rate).abs() <= LIMITS.kink * folds.rate.abs();
         smooth.then_some(folds)
     }
@@ -1270,12 +1404,17 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             (Some(_), []) if !repelling => None,
             (None, [only]) => return leave(self, *only, EventKind::LeftByTangency { to: *only }),
             _ if self.chooser.rule == ExitRule::Undecided => {
-                let slides = folds.velocity.map(|_| if repelling { REPELLING } else { "attracting sliding" });
-                let ways = slides.map(str::to_owned).into_iter().chain(flights.into_iter().map(flight));
+                let slides = folds
+                    .velocity
+                    .map(|_| if repelling { REPELLING } else { "attracting sliding" });
+                let ways =
+                    slides.map(str::to_owned).into_iter().chain(flights.into_iter().map(flight));
                 let what = if [Side::Plus, Side::Minus].iter().all(visible) {
-                    "the folds of both fields, both visible, lie in one place (fused folds, a two-fold with two visible sides), and the motion is there"
+                    "the folds of both fields, both visible, lie in one place (fused folds, a \
+                        two-fold with two visible sides), and the motion is there"
                 } else {
-                    "the folds of both fields lie in one place (fused folds), and the motion is there"
+                    "the folds of both fields lie in one place (fused folds), and the motion is \
+                        there"
                 };
                 return Err(self.undecided(what, ways));
             }
@@ -1288,15 +1427,24 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             && visible(&side)
             && (at_once || folds.velocity.is_none())
         {
-            return leave(self, side, EventKind::Exit { to: side, time: 0.0, arc: 0.0, rule: self.chooser.rule });
+            return leave(
+                self,
+                side,
+                EventKind::Exit { to: side, time: 0.0, arc: 0.0, rule: self.chooser.rule },
+            );
         }
         let Some(velocity) = folds.velocity else {
             return Err(self.no_exit(
-                "both folds lie in one place, no sliding leaves it, and the fold of the side asked for is invisible; ask --exit for the other side",
+                "both folds lie in one place, no sliding leaves it, and the fold of the side asked \
+                    for is invisible; ask --exit for the other side",
             ));
         };
         let mode = if repelling { Mode::SlidingRepelling } else { Mode::SlidingAttracting };
-        self.event(if repelling { EventKind::EnteredRepelling } else { EventKind::StartedOnSurface }, None, Some(mode));
+        self.event(
+            if repelling { EventKind::EnteredRepelling } else { EventKind::StartedOnSurface },
+            None,
+            Some(mode),
+        );
         let l = self.lie(&self.x);
         let t1 = (self.t + self.departure(&l, folds)).min(self.t_end);
         let (time, from) = (t1 - self.t, self.x);
@@ -1321,7 +1469,10 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             Side::Minus => -mm,
         };
         if self.chooser.rule == ExitRule::Undecided {
-            let sides = [Side::Plus, Side::Minus].into_iter().filter(|side| growth(*side) > 0.0).map(flight);
+            let sides = [Side::Plus, Side::Minus]
+                .into_iter()
+                .filter(|side| growth(*side) > 0.0)
+                .map(flight);
             let slides = match (&local.through, &local.back) {
                 (Some(_), _) => Some(REPELLING.to_owned()),
                 (None, Some(_)) => Some("attracting sliding".to_owned()),
@@ -1339,12 +1490,17 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         let curve = local.through.as_ref().or(local.back.as_ref());
         let tangent = growth(side) > 0.0;
         if tangent && (plan.at_once || curve.is_none()) {
-            self.event(EventKind::Exit { to: side, time: 0.0, arc: 0.0, rule }, None, Some(side.into()));
+            self.event(
+                EventKind::Exit { to: side, time: 0.0, arc: 0.0, rule },
+                None,
+                Some(side.into()),
+            );
             return Ok(State::Free { side, start: FlightStart::Tangent(growth(side)) });
         }
         let Some(curve) = curve else {
             return Err(self.no_exit(
-                "no sliding motion leaves this two-fold and the fold of the side asked for is invisible; ask for the other side",
+                "no sliding motion leaves this two-fold and the fold of the side asked for is \
+                    invisible; ask for the other side",
             ));
         };
         let Some(limit) = local.departure_limit(self.system, curve) else {
@@ -1352,7 +1508,11 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         };
         let repelling = curve.rate < 0.0;
         let mode = if repelling { Mode::SlidingRepelling } else { Mode::SlidingAttracting };
-        self.event(if repelling { EventKind::EnteredRepelling } else { EventKind::StartedOnSurface }, None, Some(mode));
+        self.event(
+            if repelling { EventKind::EnteredRepelling } else { EventKind::StartedOnSurface },
+            None,
+            Some(mode),
+        );
         let sign = curve.rate.signum();
         let longest = curve.time(sign * limit);
         let shortest = curve.time(sign * self.settings.departure * limit.min(local.radius));
@@ -1370,7 +1530,11 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         if plan.arc.is_finite() {
             let excess = |t: f64| arc_until(t) - plan.arc;
             let last = excess(longest);
-            planned = if last < 0.0 { f64::INFINITY } else { brent(excess, 0.0, longest, -plan.arc.max(1e-300), last) };
+            planned = if last < 0.0 {
+                f64::INFINITY
+            } else {
+                brent(excess, 0.0, longest, -plan.arc.max(1e-300), last)
+            };
         }
         let planned = match (repelling, planned > 0.0) {
             (false, _) => f64::INFINITY,
@@ -1383,7 +1547,12 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             let end = (self.t_end - self.t) / duration;
             let x1 = project(self.system, &whole.at(end));
             self.take(mode, self.t_end, x1, &Truncated { inner: &whole, end });
-            return Ok(State::Sliding(Sliding { repelling, plan: repelling.then_some(plan), time: 0.0, arc: 0.0 }));
+            return Ok(State::Sliding(Sliding {
+                repelling,
+                plan: repelling.then_some(plan),
+                time: 0.0,
+                arc: 0.0,
+            }));
         }
         let x1 = project(self.system, &whole.at(1.0));
         self.take(mode, self.t + duration, x1, &whole);

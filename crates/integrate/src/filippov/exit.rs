@@ -60,13 +60,16 @@ impl SlidingLaw {
 
 /// How an orbit leaves repelling sliding.
 ///
-/// In the repelling region sliding may end at any moment, to either side: Filippov's equation has all these solutions
-/// (Filippov 1988, sec. 10), and a passage through a two-fold puts every orbit there. The rule says which one is
-/// followed. Nothing is chosen silently: without a rule a run ends where one is needed, and each departure is an event that names the rule with the
-/// time and the side it gave. Out of a two-fold the orbit slides along the analytic invariant curve, the smooth
-/// continuation of the way in (see [`two_fold`](super::two_fold)); every point of the repelling region lies on some other
-/// sliding orbit out of the same two-fold, which [`history`](super::history) finds. Whatever the rule says, an orbit that comes to the edge of the repelling region (an
-/// invisible fold) leaves there, to the one side on which the field points away.
+/// In the repelling region sliding may end at any moment, to either side: Filippov's equation has
+/// all these solutions (Filippov 1988, sec. 10), and a passage through a two-fold puts every orbit
+/// there. The rule says which one is followed. Nothing is chosen silently: without a rule a run
+/// ends where one is needed, and each departure is an event that names the rule with the time and
+/// the side it gave. Out of a two-fold the orbit slides along the analytic invariant curve, the
+/// smooth continuation of the way in (see [`two_fold`](super::two_fold)); every point of the
+/// repelling region lies on some other sliding orbit out of the same two-fold, which
+/// [`history`](super::history) finds. Whatever the rule says, an orbit that comes to the edge of
+/// the repelling region (an invisible fold) leaves there, to the one side on which the field points
+/// away.
 ///
 /// ```
 /// use twofold_integrate::filippov::{ExitRule, Side};
@@ -76,17 +79,18 @@ impl SlidingLaw {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum ExitRule {
-    /// At once. From a point of the repelling region: without sliding. At a two-fold where the fold of that side is visible:
-    /// along the tangent orbit. Where it is invisible no orbit of that side starts at the two-fold itself; the orbit
-    /// then leaves sliding at [`FilippovOptions::departure`](super::FilippovOptions::departure) of the two-fold's radius, the
-    /// shortest sliding that is resolved.
+    /// At once. From a point of the repelling region: without sliding. At a two-fold where the fold
+    /// of that side is visible: along the tangent orbit. Where it is invisible no orbit of that
+    /// side starts at the two-fold itself; the orbit then leaves sliding at
+    /// [`FilippovOptions::departure`](super::FilippovOptions::departure) of the two-fold's radius,
+    /// the shortest sliding that is resolved.
     AtOnce {
         /// The side to leave to.
         side: Side,
     },
-    /// After a given time of repelling sliding; 0 is [`ExitRule::AtOnce`] without the tangent orbit. At a two-fold, times below
-    /// a millionth of the shortest departure are raised to that: nearer to it the two sides cannot be told apart.
-    /// The event records the time that was used.
+    /// After a given time of repelling sliding; 0 is [`ExitRule::AtOnce`] without the tangent
+    /// orbit. At a two-fold, times below a millionth of the shortest departure are raised to that:
+    /// nearer to it the two sides cannot be told apart. The event records the time that was used.
     AfterTime {
         /// The time.
         time: f64,
@@ -100,8 +104,8 @@ pub enum ExitRule {
         /// The side to leave to.
         side: Side,
     },
-    /// After a random time to a random side, both drawn from the generator `num::random` (ChaCha8) at the moment when
-    /// repelling sliding starts: first the time, then the side.
+    /// After a random time to a random side, both drawn from the generator `num::random` (ChaCha8)
+    /// at the moment when repelling sliding starts: first the time, then the side.
     Random {
         /// Law of the time.
         law: SlidingLaw,
@@ -115,7 +119,8 @@ pub enum ExitRule {
     /// No rule: a run goes on as long as none is needed, and ends with
     /// [`FilippovError::Undecided`](super::FilippovError::Undecided) where one is.
     Undecided,
-    /// No choice: a run stops at the first set-valued point. [`funnel`](super::funnel) then follows the whole family.
+    /// No choice: a run stops at the first set-valued point. [`funnel`](super::funnel) then follows
+    /// the whole family.
     All,
 }
 
@@ -127,11 +132,19 @@ impl std::fmt::Display for ExitRule {
             ExitRule::AtOnce { side } => write!(f, "at-once:{}", word(side)),
             ExitRule::AfterTime { time, side } => write!(f, "after-time:{time:?}:{}", word(side)),
             ExitRule::AfterArc { arc, side } => write!(f, "after-arc:{arc:?}:{}", word(side)),
-            ExitRule::Random { law: SlidingLaw::Exponential { mean }, plus_probability, .. } => {
-                write!(f, "random:exponential:{mean:?}, to h > 0 with probability {plus_probability:?}")
+            ExitRule::Random {
+                law: SlidingLaw::Exponential { mean }, plus_probability, ..
+            } => {
+                write!(
+                    f,
+                    "random:exponential:{mean:?}, to h > 0 with probability {plus_probability:?}"
+                )
             }
             ExitRule::Random { law: SlidingLaw::Uniform { longest }, plus_probability, .. } => {
-                write!(f, "random:uniform:{longest:?}, to h > 0 with probability {plus_probability:?}")
+                write!(
+                    f,
+                    "random:uniform:{longest:?}, to h > 0 with probability {plus_probability:?}"
+                )
             }
             ExitRule::Undecided => write!(f, "undecided"),
             ExitRule::All => write!(f, "all"),
@@ -166,7 +179,8 @@ impl ExitRule {
                     Ok(())
                 } else {
                     Err(format!(
-                        "the exit rule's probability of the plus side must lie between 0 and 1, not {plus_probability}"
+                        "the exit rule's probability of the plus side must lie between 0 and 1, \
+                            not {plus_probability}"
                     ))
                 }
             }
@@ -203,13 +217,20 @@ impl Chooser {
     pub fn plan(&mut self) -> Option<ExitPlan> {
         let never = f64::INFINITY;
         match self.rule {
-            ExitRule::AtOnce { side } => Some(ExitPlan { side, time: 0.0, arc: never, at_once: true }),
-            ExitRule::AfterTime { time, side } => Some(ExitPlan { side, time, arc: never, at_once: false }),
-            ExitRule::AfterArc { arc, side } => Some(ExitPlan { side, time: never, arc, at_once: false }),
+            ExitRule::AtOnce { side } => {
+                Some(ExitPlan { side, time: 0.0, arc: never, at_once: true })
+            }
+            ExitRule::AfterTime { time, side } => {
+                Some(ExitPlan { side, time, arc: never, at_once: false })
+            }
+            ExitRule::AfterArc { arc, side } => {
+                Some(ExitPlan { side, time: never, arc, at_once: false })
+            }
             ExitRule::Random { law, plus_probability, .. } => {
                 let stream = self.stream.as_mut()?;
                 let time = law.time(stream.uniform());
-                let side = if stream.uniform() < plus_probability { Side::Plus } else { Side::Minus };
+                let side =
+                    if stream.uniform() < plus_probability { Side::Plus } else { Side::Minus };
                 Some(ExitPlan { side, time, arc: never, at_once: false })
             }
             ExitRule::Undecided | ExitRule::All => None,
@@ -228,9 +249,13 @@ mod tests {
         let (mut uniform, mut exponential) = (0.0, 0.0);
         for _ in 0..n {
             uniform += SlidingLaw::Uniform { longest: 3.0 }.time(stream.uniform()) / f64::from(n);
-            exponential += SlidingLaw::Exponential { mean: 0.7 }.time(stream.uniform()) / f64::from(n);
+            exponential +=
+                SlidingLaw::Exponential { mean: 0.7 }.time(stream.uniform()) / f64::from(n);
         }
         // Five standard errors: 3/sqrt(12 n) and 0.7/sqrt(n).
-        assert!((uniform - 1.5).abs() < 0.031 && (exponential - 0.7).abs() < 0.025, "{uniform} {exponential}");
+        assert!(
+            (uniform - 1.5).abs() < 0.031 && (exponential - 0.7).abs() < 0.025,
+            "{uniform} {exponential}"
+        );
     }
 }

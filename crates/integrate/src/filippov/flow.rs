@@ -9,8 +9,9 @@ use twofold_num::Elementary;
 use twofold_system::filippov::{gradient, lie_derivatives};
 use twofold_system::{PiecewiseSmooth, VectorField};
 
-/// A system whose fields may be defined on their own sides only. With a `depth`, a field is asked no nearer to the surface than |h| = `depth` on
-/// its own side: beyond, it is continued by its values there, along grad h. Motion on the field's own side does not depend on that.
+/// A system whose fields may be defined on their own sides only. With a `depth`, a field is asked
+/// no nearer to the surface than |h| = `depth` on its own side: beyond, it is continued by its
+/// values there, along grad h. Motion on the field's own side does not depend on that.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sided<'a, P> {
     pub system: &'a P,
@@ -18,13 +19,18 @@ pub(super) struct Sided<'a, P> {
 }
 
 impl<P> Sided<'_, P> {
-    pub fn inside<S: Elementary, const N: usize>(&self, x: &SVector<S, N>, side: Side) -> SVector<S, N>
+    pub fn inside<S: Elementary, const N: usize>(
+        &self,
+        x: &SVector<S, N>,
+        side: Side,
+    ) -> SVector<S, N>
     where
         P: PiecewiseSmooth<N>,
     {
         let Some(depth) = self.depth else { return *x };
         let mut y = *x;
-        // Newton's method, with steps a little too long: from outside of a convex side it would stay outside.
+        // Newton's method, with steps a little too long: from outside of a convex side it would
+        // stay outside.
         for _ in 0..4 {
             let height = self.system.switching(&y).scale(side.sign()) - S::from_f64(depth);
             let short = (height - height.abs()).scale(0.5 * (1.0 + 1.0 / 1024.0) * side.sign());
@@ -68,7 +74,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> VectorField<N> for FreeFlow<'_, P> {
 
 /// The desingularised sliding field F = L-h f+ - L+h f-: the sliding field multiplied by L-h - L+h.
 ///
-/// It is smooth everywhere, vanishes at a two-fold, and leaves h unchanged exactly: L_F h = L-h L+h - L+h L-h = 0.
+/// It is smooth everywhere, vanishes at a two-fold, and leaves h unchanged exactly: L_F h = L-h L+h
+/// - L+h L-h = 0.
 pub(super) fn desingularised<P: PiecewiseSmooth<N>, S: Elementary, const N: usize>(
     system: &P,
     x: &SVector<S, N>,
@@ -78,15 +85,17 @@ pub(super) fn desingularised<P: PiecewiseSmooth<N>, S: Elementary, const N: usiz
     (SVector::from_fn(|i, _| q * plus[i] - p * minus[i]), q - p)
 }
 
-/// The desingularised sliding flow with physical time as an extra state: (x, t)' = +-(F(x), L-h - L+h). `M` is `N + 1`. The
-/// sign is + in the attracting region and - in the repelling one, so that time always runs forward.
+/// The desingularised sliding flow with physical time as an extra state: (x, t)' = +-(F(x), L-h -
+/// L+h). `M` is `N + 1`. The sign is + in the attracting region and - in the repelling one, so that
+/// time always runs forward.
 #[derive(Clone, Copy, Debug)]
 pub struct SlidingFlow<'a, P, const N: usize> {
     pub(super) system: Sided<'a, P>,
     pub(super) direction: f64,
 }
 
-/// Implemented for each dimension, because `N + 1` cannot yet be written in stable Rust's const generics.
+/// Implemented for each dimension, because `N + 1` cannot yet be written in stable Rust's const
+/// generics.
 macro_rules! sliding_in_dimension {
     ($n:literal, $m:literal) => {
         impl<P: PiecewiseSmooth<$n>> VectorField<$m> for SlidingFlow<'_, P, $n> {
@@ -109,8 +118,12 @@ sliding_in_dimension!(6, 7);
 sliding_in_dimension!(7, 8);
 sliding_in_dimension!(8, 9);
 
-/// The point of h = 0 that Newton's method along grad h finds from `x`. For h linear in one coordinate it is exact.
-pub(super) fn project<P: PiecewiseSmooth<N>, const N: usize>(system: &P, x: &SVector<f64, N>) -> SVector<f64, N> {
+/// The point of h = 0 that Newton's method along grad h finds from `x`. For h linear in one
+/// coordinate it is exact.
+pub(super) fn project<P: PiecewiseSmooth<N>, const N: usize>(
+    system: &P,
+    x: &SVector<f64, N>,
+) -> SVector<f64, N> {
     let mut y = *x;
     let mut h = system.switching(&y);
     for _ in 0..8 {
@@ -155,7 +168,8 @@ impl<const N: usize> Interpolant<N> for Truncated<'_, N> {
     }
 }
 
-/// A step of the sliding flow seen in physical time: finds the rescaled time for a physical one, and projects.
+/// A step of the sliding flow seen in physical time: finds the rescaled time for a physical one,
+/// and projects.
 pub(super) struct InPhysicalTime<'a, P, const N: usize, const M: usize> {
     pub system: &'a P,
     pub inner: &'a dyn Interpolant<M>,
@@ -164,7 +178,9 @@ pub(super) struct InPhysicalTime<'a, P, const N: usize, const M: usize> {
     pub clock: (f64, f64),
 }
 
-impl<P: PiecewiseSmooth<N>, const N: usize, const M: usize> Interpolant<N> for InPhysicalTime<'_, P, N, M> {
+impl<P: PiecewiseSmooth<N>, const N: usize, const M: usize> Interpolant<N>
+    for InPhysicalTime<'_, P, N, M>
+{
     fn at(&self, theta: f64) -> SVector<f64, N> {
         let (from, to) = self.clock;
         let wanted = from + theta * (to - from);
@@ -181,7 +197,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize, const M: usize> Interpolant<N> for I
         project(self.system, &SVector::from_fn(|i, _| state[i]))
     }
     fn degree(&self) -> usize {
-        // Not a polynomial in time; a step of the method is smooth enough for twice the degree to resolve it.
+        // Not a polynomial in time; a step of the method is smooth enough for twice the degree to
+        // resolve it.
         2 * self.inner.degree()
     }
 }

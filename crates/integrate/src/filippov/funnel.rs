@@ -7,22 +7,26 @@ use super::engine::{Departure, Origin};
 use super::exit::Chooser;
 use super::two_fold::SlidingAtTwoFold;
 use super::{
-    ExitRule, FilippovError, FilippovOptions, FilippovSummary, Side, SlidingFlow, Trajectory, engine, flow::project,
+    ExitRule, FilippovError, FilippovOptions, FilippovSummary, Side, SlidingFlow, Trajectory,
+    engine, flow::project,
 };
 use crate::{Statistics, StopReason};
 use twofold_num::elementary::pow;
 use twofold_system::filippov::{Region, region};
 use twofold_system::{PiecewiseSmooth, Reversed, VectorField};
 
-/// Which members of the funnel to compute: exit times between the shortest and the longest, both sides of each.
+/// Which members of the funnel to compute: exit times between the shortest and the longest, both
+/// sides of each.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FunnelGrid {
     /// The shortest time of repelling sliding.
     pub shortest: f64,
-    /// The longest time of repelling sliding. Members whose repelling region ends earlier leave there.
+    /// The longest time of repelling sliding. Members whose repelling region ends earlier leave
+    /// there.
     pub longest: f64,
-    /// Number of times, at least 1; spaced geometrically, because the funnel is self-similar at a two-fold.
+    /// Number of times, at least 1; spaced geometrically, because the funnel is self-similar at a
+    /// two-fold.
     pub times: usize,
     /// Follow each member at most so long after the set-valued point.
     pub horizon: f64,
@@ -65,7 +69,8 @@ pub struct Funnel<const N: usize> {
 /// The most points that all members of a funnel have together: 0.6 GB.
 const MOST_POINTS: usize = 20_000_000;
 
-/// Follows the orbit of `x0` to the first point where its future is a set, then that set: [`ExitRule::All`].
+/// Follows the orbit of `x0` to the first point where its future is a set, then that set:
+/// [`ExitRule::All`].
 ///
 /// ```
 /// use nalgebra::vector;
@@ -88,7 +93,8 @@ const MOST_POINTS: usize = 20_000_000;
 /// ```
 ///
 /// # Errors
-/// [`FilippovError::NoSuchExit`] if no set-valued point is reached by `t_end`; those of [`run`](super::run).
+/// [`FilippovError::NoSuchExit`] if no set-valued point is reached by `t_end`; those of
+/// [`run`](super::run).
 pub fn funnel<P, const N: usize, const M: usize>(
     system: &P,
     x0: SVector<f64, N>,
@@ -101,7 +107,8 @@ where
     for<'a> SlidingFlow<'a, P, N>: VectorField<M>,
 {
     let mut approach = Trajectory::new(grid.per_step);
-    let there = super::run(system, x0, t_end, settings, ExitRule::All, &mut approach)?.within_budget()?;
+    let there =
+        super::run(system, x0, t_end, settings, ExitRule::All, &mut approach)?.within_budget()?;
     if there.stop != StopReason::SetValued {
         return Err(FilippovError::NoSuchExit {
             t: there.t,
@@ -122,15 +129,18 @@ where
     Ok(family)
 }
 
-/// The past of a point of the repelling region, in forward time: the sliding orbit that leads from where repelling sliding
-/// began (a two-fold, if it runs back into one) to `x`, with time 0 at its beginning.
+/// The past of a point of the repelling region, in forward time: the sliding orbit that leads from
+/// where repelling sliding began (a two-fold, if it runs back into one) to `x`, with time 0 at its
+/// beginning.
 ///
-/// At a two-fold whose sliding flow is a node every point of the repelling region has such a past: the full set of futures
-/// of the two-fold has, besides exit time and side, the sliding orbit as a third index. [`funnel`] follows the analytic
-/// one; the others are reached by running on from any `x`.
+/// At a two-fold whose sliding flow is a node every point of the repelling region has such a past:
+/// the full set of futures of the two-fold has, besides exit time and side, the sliding orbit as a
+/// third index. [`funnel`] follows the analytic one; the others are reached by running on from any
+/// `x`.
 ///
 /// # Errors
-/// [`FilippovError::NoSuchExit`] if `x` is not in the repelling region, or its past does not end by `longest`.
+/// [`FilippovError::NoSuchExit`] if `x` is not in the repelling region, or its past does not end by
+/// `longest`.
 pub fn history<P, const N: usize, const M: usize>(
     system: &P,
     x: SVector<f64, N>,
@@ -142,28 +152,38 @@ where
     P: PiecewiseSmooth<N> + Clone,
     for<'a> SlidingFlow<'a, Reversed<P>, N>: VectorField<M>,
 {
-    let refuse = |why| FilippovError::NoSuchExit { t: 0.0, state: x.iter().copied().collect(), why };
+    let refuse =
+        |why| FilippovError::NoSuchExit { t: 0.0, state: x.iter().copied().collect(), why };
     let on_surface = project(system, &x);
     if region(system, &on_surface) != Region::Repelling {
         return Err(refuse("it has a sliding past only in the repelling region"));
     }
-    // Reversed, repelling sliding attracts and its past is a future. It stops at its first event after the start.
+    // Reversed, repelling sliding attracts and its past is a future. It stops at its first event
+    // after the start.
     let mut back = Trajectory::new(per_step).until_events(2);
-    let end = super::run(&Reversed(system.clone()), on_surface, longest, settings, ExitRule::All, &mut back)?
-        .within_budget()?;
+    let end = super::run(
+        &Reversed(system.clone()),
+        on_surface,
+        longest,
+        settings,
+        ExitRule::All,
+        &mut back,
+    )?
+    .within_budget()?;
     if end.stop == StopReason::EndTime {
         return Err(refuse("its past is longer than the given time"));
     }
     Ok(back.turned(end.t))
 }
 
-/// A trajectory from `a` to `b` through a two-fold: the future of `a` up to the singularity, then a past of `b` from there on. That
-/// two such points are joined by a trajectory in finite time is what Jeffrey (2013, sec. 3) calls
-/// non-deterministic chaos. Events are those of the first part; the second part's pieces tell its modes.
+/// A trajectory from `a` to `b` through a two-fold: the future of `a` up to the singularity, then a
+/// past of `b` from there on. That two such points are joined by a trajectory in finite time is
+/// what Jeffrey (2013, sec. 3) calls non-deterministic chaos. Events are those of the first part;
+/// the second part's pieces tell its modes.
 ///
 /// # Errors
-/// [`FilippovError::NoSuchExit`] if the future of `a` or the past of `b` comes to no two-fold within `longest`, or to different
-/// ones.
+/// [`FilippovError::NoSuchExit`] if the future of `a` or the past of `b` comes to no two-fold
+/// within `longest`, or to different ones.
 pub fn connect<P, const N: usize, const M: usize>(
     system: &P,
     a: SVector<f64, N>,
@@ -178,17 +198,28 @@ where
     for<'a> SlidingFlow<'a, Reversed<P>, N>: VectorField<M>,
 {
     let mut path = Trajectory::new(per_step);
-    let there = super::run(system, a, longest, settings, ExitRule::All, &mut path)?.within_budget()?;
+    let there =
+        super::run(system, a, longest, settings, ExitRule::All, &mut path)?.within_budget()?;
     let mut past = Trajectory::new(per_step);
     let back =
-        super::run(&Reversed(system.clone()), b, longest, settings, ExitRule::All, &mut past)?.within_budget()?;
-    let refuse =
-        |x: &SVector<f64, N>, why| FilippovError::NoSuchExit { t: there.t, state: x.iter().copied().collect(), why };
+        super::run(&Reversed(system.clone()), b, longest, settings, ExitRule::All, &mut past)?
+            .within_budget()?;
+    let refuse = |x: &SVector<f64, N>, why| FilippovError::NoSuchExit {
+        t: there.t,
+        state: x.iter().copied().collect(),
+        why,
+    };
     if there.stop != StopReason::SetValued || there.mode.is_some() {
-        return Err(refuse(&there.x, "the future of the first point comes to no two-fold in the given time"));
+        return Err(refuse(
+            &there.x,
+            "the future of the first point comes to no two-fold in the given time",
+        ));
     }
     if back.stop != StopReason::SetValued || back.mode.is_some() {
-        return Err(refuse(&back.x, "the past of the second point comes from no two-fold in the given time"));
+        return Err(refuse(
+            &back.x,
+            "the past of the second point comes from no two-fold in the given time",
+        ));
     }
     if (there.x - back.x).amax() > 1e-9 * (1.0 + there.x.amax()) {
         return Err(refuse(&back.x, "the past of the second point comes from another two-fold"));
@@ -234,11 +265,22 @@ impl<const N: usize> Funnel<N> {
                 let mut chooser = Chooser::new(ExitRule::AfterTime { time: exit_time, side });
                 let origin = Origin { t: self.t, x: self.point, departure: departure.clone() };
                 let until = self.t + grid.horizon;
-                let summary = engine::run_from(system, origin, until, settings, &mut chooser, &mut trajectory, &())?
-                    .within_budget()?;
+                let summary = engine::run_from(
+                    system,
+                    origin,
+                    until,
+                    settings,
+                    &mut chooser,
+                    &mut trajectory,
+                    &(),
+                )?
+                .within_budget()?;
                 points += trajectory.points().count();
                 if points > MOST_POINTS {
-                    return Err(FilippovError::TooManyPoints { limit: MOST_POINTS, members: members.len() });
+                    return Err(FilippovError::TooManyPoints {
+                        limit: MOST_POINTS,
+                        members: members.len(),
+                    });
                 }
                 members.push(FunnelMember { exit_time, side, trajectory, summary });
             }

@@ -5,13 +5,15 @@
 //!
 //! - a field that points into its own quadrant leaves there;
 //! - sliding on one surface leaves where it moves away from the other;
-//! - the motion stays on the intersection where zero lies inside the convex hull of the pairs of Lie derivatives. Its velocity is a mixture
-//!   of the fields that is tangent to both surfaces. Four fields leave one such mixture undetermined; the velocity is unique where
-//!   all of them give the same, as with switches that add;
-//! - fields that turn around the intersection come to it or leave it in a spiral; a return map, linear to leading order, says which.
+//! - the motion stays on the intersection where zero lies inside the convex hull of the pairs of
+//!   Lie derivatives. Its velocity is a mixture of the fields that is tangent to both surfaces.
+//!   Four fields leave one such mixture undetermined; the velocity is unique where all of them give
+//!   the same, as with switches that add;
+//! - fields that turn around the intersection come to it or leave it in a spiral; a return map,
+//!   linear to leading order, says which.
 //!
-//! A derivative that vanishes is replaced by its own derivative along the motion. The motion is decided where exactly one of these is
-//! possible; nothing is chosen anywhere else.
+//! A derivative that vanishes is replaced by its own derivative along the motion. The motion is
+//! decided where exactly one of these is possible; nothing is chosen anywhere else.
 
 use nalgebra::SVector;
 
@@ -26,10 +28,12 @@ use twofold_system::{PiecewiseSmooth, VectorField, variables};
 const ROUNDING: f64 = 1e-13;
 /// Relative difference of velocities below which they are the same.
 const SAME_VELOCITY: f64 = 1e-11;
-/// A turn that changes the distance by less than this share neither contracts nor expands to leading order.
+/// A turn that changes the distance by less than this share neither contracts nor expands to
+/// leading order.
 const NEUTRAL: f64 = 1e-9;
 
-/// The sign of a function number `surface` in the field number `mode`: bit i of the number is set where function i is negative.
+/// The sign of a function number `surface` in the field number `mode`: bit i of the number is set
+/// where function i is negative.
 pub(super) fn side(mode: usize, surface: usize) -> Side {
     if mode >> surface & 1 == 0 { Side::Plus } else { Side::Minus }
 }
@@ -50,7 +54,10 @@ fn dot<S: Elementary, const N: usize>(a: &SVector<S, N>, b: &SVector<S, N>) -> S
 type Fields<S, const N: usize> = ([SVector<S, N>; 4], [[S; 2]; 4]);
 
 /// The four fields at `x` and the rates of both functions along each.
-fn fields<P: PiecewiseSmooth<N>, S: Elementary, const N: usize>(faces: &Faces<P>, x: &SVector<S, N>) -> Fields<S, N> {
+fn fields<P: PiecewiseSmooth<N>, S: Elementary, const N: usize>(
+    faces: &Faces<P>,
+    x: &SVector<S, N>,
+) -> Fields<S, N> {
     let slopes: [SVector<S, N>; 2] = std::array::from_fn(|i| gradient(&faces[i][0], x));
     let fields: [SVector<S, N>; 4] = std::array::from_fn(|m| field(faces, m, x));
     let rates = std::array::from_fn(|m| std::array::from_fn(|i| dot(&slopes[i], &fields[m])));
@@ -84,25 +91,48 @@ impl<const N: usize> std::fmt::Display for Continuation<N> {
         let name = |surface: usize| if surface == 0 { "h" } else { "the second h" };
         match self {
             Continuation::Flight(m) => {
-                write!(f, "flight with the field of h {} 0, the second h {} 0", sign(side(*m, 0)), sign(side(*m, 1)))
+                write!(
+                    f,
+                    "flight with the field of h {} 0, the second h {} 0",
+                    sign(side(*m, 0)),
+                    sign(side(*m, 1))
+                )
             }
             Continuation::Sliding { surface, beyond, repelling } => {
                 let kind = if *repelling { "repelling" } else { "attracting" };
-                write!(f, "{kind} sliding on {} = 0 to where {} {} 0", name(*surface), name(1 - surface), sign(*beyond))
+                write!(
+                    f,
+                    "{kind} sliding on {} = 0 to where {} {} 0",
+                    name(*surface),
+                    name(1 - surface),
+                    sign(*beyond)
+                )
             }
             Continuation::Stay(_) => write!(f, "motion along the intersection"),
             Continuation::Several(_) => {
-                write!(f, "motion along the intersection, where mixtures of the four fields have different velocities")
+                write!(
+                    f,
+                    "motion along the intersection, where mixtures of the four fields have \
+                        different velocities"
+                )
             }
             Continuation::Spiral(ratio) if *ratio > 1.0 + NEUTRAL => {
-                write!(f, "a spiral away from the intersection, {ratio:.4} times as far with each turn")
+                write!(
+                    f,
+                    "a spiral away from the intersection, {ratio:.4} times as far with each turn"
+                )
             }
             Continuation::Spiral(_) => {
-                write!(f, "turns around the intersection that to leading order neither contract nor expand")
+                write!(
+                    f,
+                    "turns around the intersection that to leading order neither contract nor \
+                        expand"
+                )
             }
             Continuation::Unclear(m) => write!(
                 f,
-                "flight with the field of h {} 0, the second h {} 0, or sliding along its edge: a Lie derivative and the one after it vanish",
+                "flight with the field of h {} 0, the second h {} 0, or sliding along its edge: a \
+                    Lie derivative and the one after it vanish",
                 sign(side(*m, 0)),
                 sign(side(*m, 1))
             ),
@@ -114,13 +144,18 @@ impl<const N: usize> std::fmt::Display for Continuation<N> {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Mixture<const N: usize> {
     modes: [usize; 3],
-    /// Set where all pairs of rates lie on a line: two fields suffice, and this direction measures their rates.
+    /// Set where all pairs of rates lie on a line: two fields suffice, and this direction measures
+    /// their rates.
     line: Option<[f64; 2]>,
     pub velocity: SVector<f64, N>,
 }
 
 impl<const N: usize> Mixture<N> {
-    fn velocity<P: PiecewiseSmooth<N>, S: Elementary>(&self, faces: &Faces<P>, x: &SVector<S, N>) -> SVector<S, N> {
+    fn velocity<P: PiecewiseSmooth<N>, S: Elementary>(
+        &self,
+        faces: &Faces<P>,
+        x: &SVector<S, N>,
+    ) -> SVector<S, N> {
         let (fields, rates) = fields(faces, x);
         let [a, b, c] = self.modes;
         if let Some(line) = self.line {
@@ -128,10 +163,12 @@ impl<const N: usize> Mixture<N> {
             let weight = rate(b) / (rate(b) - rate(a));
             return SVector::from_fn(|i, _| fields[b][i] + (fields[a][i] - fields[b][i]) * weight);
         }
-        let weights = [cross(&rates[b], &rates[c]), cross(&rates[c], &rates[a]), cross(&rates[a], &rates[b])];
+        let weights =
+            [cross(&rates[b], &rates[c]), cross(&rates[c], &rates[a]), cross(&rates[a], &rates[b])];
         let sum = weights[0] + weights[1] + weights[2];
         SVector::from_fn(|i, _| {
-            (fields[a][i] * weights[0] + fields[b][i] * weights[1] + fields[c][i] * weights[2]) / sum
+            (fields[a][i] * weights[0] + fields[b][i] * weights[1] + fields[c][i] * weights[2])
+                / sum
         })
     }
 }
@@ -167,7 +204,10 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Interpolant<N> for OnIntersection<'_
 }
 
 /// The shortest u with grad h_i . u = `right`[i]; `None` if the surfaces touch instead of crossing.
-fn shortest<const N: usize>(slopes: &[SVector<f64, N>; 2], right: [f64; 2]) -> Option<SVector<f64, N>> {
+fn shortest<const N: usize>(
+    slopes: &[SVector<f64, N>; 2],
+    right: [f64; 2],
+) -> Option<SVector<f64, N>> {
     let lengths = slopes.map(|s| s.norm());
     let [a, b] = [slopes[0] / lengths[0], slopes[1] / lengths[1]];
     let [r, s] = [right[0] / lengths[0], right[1] / lengths[1]];
@@ -202,8 +242,12 @@ pub(super) fn project<P: PiecewiseSmooth<N>, const N: usize>(
     (last <= 64.0 * f64::EPSILON * y.amax()).then_some(y)
 }
 
-/// How far from the intersection a state may be and count as on it, by coordinates: what the tolerances resolve.
-pub(super) fn resolution<const N: usize>(settings: &FilippovOptions, x: &SVector<f64, N>) -> SVector<f64, N> {
+/// How far from the intersection a state may be and count as on it, by coordinates: what the
+/// tolerances resolve.
+pub(super) fn resolution<const N: usize>(
+    settings: &FilippovOptions,
+    x: &SVector<f64, N>,
+) -> SVector<f64, N> {
     x.map(|v| 10.0 * (settings.tolerance.atol + settings.tolerance.rtol * v.abs()))
 }
 
@@ -261,7 +305,8 @@ impl<const N: usize> Corner<N> {
         [other, other | 1 << i]
     }
 
-    /// Sliding on surface `i` that leaves to the side `beyond` of the other, if there is any; whether it repels.
+    /// Sliding on surface `i` that leaves to the side `beyond` of the other, if there is any;
+    /// whether it repels.
     fn sliding(&self, i: usize, beyond: Side) -> Option<Result<bool, usize>> {
         let [a, b] = Self::pair(i, beyond);
         let outward = self.outward(i, beyond)?;
@@ -298,14 +343,19 @@ impl<const N: usize> Corner<N> {
     }
 
     /// Motion along the intersection.
-    fn stay<P: PiecewiseSmooth<N>>(&self, faces: &Faces<P>, x: &SVector<f64, N>) -> Option<Continuation<N>> {
+    fn stay<P: PiecewiseSmooth<N>>(
+        &self,
+        faces: &Faces<P>,
+        x: &SVector<f64, N>,
+    ) -> Option<Continuation<N>> {
         let w = self.pairs();
         let size = w.iter().flatten().fold(0.0_f64, |m, v| m.max(v.abs()));
         let speed = self.fields.iter().fold(0.0_f64, |m, f| m.max(f.norm()));
         if size == 0.0 {
             return None;
         }
-        let flat = (0..4).all(|a| (0..a).all(|b| cross(&w[a], &w[b]).abs() <= ROUNDING * size * size));
+        let flat =
+            (0..4).all(|a| (0..a).all(|b| cross(&w[a], &w[b]).abs() <= ROUNDING * size * size));
         if flat {
             let longest = (0..4).max_by(|&a, &b| length(&w[a]).total_cmp(&length(&w[b])))?;
             let line = w[longest].map(|v| v / length(&w[longest]));
@@ -323,7 +373,8 @@ impl<const N: usize> Corner<N> {
                 return None;
             }
             let line = [line[0] / self.slopes[0].norm(), line[1] / self.slopes[1].norm()];
-            let mut mixture = Mixture { modes: [low, high, high], line: Some(line), velocity: SVector::zeros() };
+            let mut mixture =
+                Mixture { modes: [low, high, high], line: Some(line), velocity: SVector::zeros() };
             mixture.velocity = mixture.velocity(faces, x);
             let v = mixture.velocity;
             let same = |a: usize, b: usize| {
@@ -332,19 +383,27 @@ impl<const N: usize> Corner<N> {
             };
             let unique = (0..4).all(|a| (0..a).all(|b| same(a, b)));
             let mixture = Box::new(mixture);
-            return Some(if unique { Continuation::Stay(mixture) } else { Continuation::Several(mixture) });
+            return Some(if unique {
+                Continuation::Stay(mixture)
+            } else {
+                Continuation::Several(mixture)
+            });
         }
         let triples = [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]];
-        let weights = |[a, b, c]: [usize; 3]| [cross(&w[b], &w[c]), cross(&w[c], &w[a]), cross(&w[a], &w[b])];
+        let weights =
+            |[a, b, c]: [usize; 3]| [cross(&w[b], &w[c]), cross(&w[c], &w[a]), cross(&w[a], &w[b])];
         let determinant = |t: [usize; 3]| weights(t).iter().sum::<f64>();
-        let best = triples.into_iter().max_by(|a, b| determinant(*a).abs().total_cmp(&determinant(*b).abs()))?;
+        let best = triples
+            .into_iter()
+            .max_by(|a, b| determinant(*a).abs().total_cmp(&determinant(*b).abs()))?;
         if determinant(best).abs() <= ROUNDING * size * size {
             return None;
         }
         let mut mixture = Mixture { modes: best, line: None, velocity: SVector::zeros() };
         mixture.velocity = mixture.velocity(faces, x);
         let v = mixture.velocity;
-        // Zero is inside the hull if every line through it and one of the pairs has others on both sides.
+        // Zero is inside the hull if every line through it and one of the pairs has others on both
+        // sides.
         let side_of = |a: usize, b: usize| {
             let c = self.rates[a][0] * self.rates[b][1] - self.rates[a][1] * self.rates[b][0];
             let (slope, slope_zero) = Self::along(&c, &v);
@@ -360,14 +419,16 @@ impl<const N: usize> Corner<N> {
         }
         let unique = triples.into_iter().all(|t| {
             let k = weights(t);
-            let apart = self.fields[t[0]] * k[0] + self.fields[t[1]] * k[1] + self.fields[t[2]] * k[2];
+            let apart =
+                self.fields[t[0]] * k[0] + self.fields[t[1]] * k[1] + self.fields[t[2]] * k[2];
             (apart - v * determinant(t)).norm() <= SAME_VELOCITY * size * size * speed
         });
         let mixture = Box::new(mixture);
         Some(if unique { Continuation::Stay(mixture) } else { Continuation::Several(mixture) })
     }
 
-    /// The factor by which the distance grows with one turn around the intersection, if the fields turn around it.
+    /// The factor by which the distance grows with one turn around the intersection, if the fields
+    /// turn around it.
     fn turn(&self) -> Option<f64> {
         let w = self.pairs();
         for order in [[0, 1, 3, 2], [0, 2, 3, 1]] {
@@ -381,7 +442,8 @@ impl<const N: usize> Corner<N> {
                 return ratio;
             }
         }
-        // One function is the rate of the other, as position and speed: its own rate vanishes on the intersection.
+        // One function is the rate of the other, as position and speed: its own rate vanishes on
+        // the intersection.
         (0..2).find_map(|k| {
             let j = 1 - k;
             if !(0..4).all(|m| w[m][k] == 0.0 && w[m][j] != 0.0) {
@@ -390,9 +452,11 @@ impl<const N: usize> Corner<N> {
             let u = self.outward(k, Side::Plus)?;
             let gains: [f64; 4] = std::array::from_fn(|m| Self::along(&self.rates[m][k], &u).0);
             let up = gains[0].signum();
-            let turns = (0..4).all(|m| gains[m] * up > 0.0 && w[m][j] * up * side(m, k).sign() < 0.0);
+            let turns =
+                (0..4).all(|m| gains[m] * up > 0.0 && w[m][j] * up * side(m, k).sign() < 0.0);
             turns.then(|| {
-                let mode = |s: f64, r: f64| (usize::from(s < 0.0) << k) | (usize::from(r < 0.0) << j);
+                let mode =
+                    |s: f64, r: f64| (usize::from(s < 0.0) << k) | (usize::from(r < 0.0) << j);
                 let half = |s: f64| {
                     let (out, back) = (mode(s, up * s), mode(s, -up * s));
                     (gains[out] / w[out][j]) * (w[back][j] / gains[back])
@@ -415,7 +479,8 @@ pub(super) fn continuations<P: PiecewiseSmooth<N>, const N: usize>(
     let corner = Corner::at(faces, x);
     let mut found = Vec::new();
     for m in 0..4 {
-        let growth: [f64; 2] = std::array::from_fn(|i| corner.sign(m, i, &corner.fields[m]) * side(m, i).sign());
+        let growth: [f64; 2] =
+            std::array::from_fn(|i| corner.sign(m, i, &corner.fields[m]) * side(m, i).sign());
         if growth == [1.0; 2] {
             found.push(Continuation::Flight(m));
         } else if growth.iter().all(|g| *g >= 0.0) {
@@ -425,7 +490,9 @@ pub(super) fn continuations<P: PiecewiseSmooth<N>, const N: usize>(
     for surface in 0..2 {
         for beyond in [Side::Plus, Side::Minus] {
             match corner.sliding(surface, beyond) {
-                Some(Ok(repelling)) => found.push(Continuation::Sliding { surface, beyond, repelling }),
+                Some(Ok(repelling)) => {
+                    found.push(Continuation::Sliding { surface, beyond, repelling })
+                }
                 Some(Err(mode)) => found.push(Continuation::Unclear(mode)),
                 None => {}
             }
@@ -441,19 +508,28 @@ pub(super) fn continuations<P: PiecewiseSmooth<N>, const N: usize>(
 }
 
 /// Whether the fields turn around the intersection at `x`.
-pub(super) fn turns<P: PiecewiseSmooth<N>, const N: usize>(faces: &Faces<P>, x: &SVector<f64, N>) -> bool {
+pub(super) fn turns<P: PiecewiseSmooth<N>, const N: usize>(
+    faces: &Faces<P>,
+    x: &SVector<f64, N>,
+) -> bool {
     Corner::at(faces, x).turn().is_some()
 }
 
-/// The functions whose signs decide what follows on the intersection: rates, and the orientation of each two pairs of rates. Each in units of
-/// its largest terms.
-pub(super) fn deciding<P: PiecewiseSmooth<N>, const N: usize>(faces: &Faces<P>, x: &SVector<f64, N>) -> [f64; 14] {
+/// The functions whose signs decide what follows on the intersection: rates, and the orientation of
+/// each two pairs of rates. Each in units of its largest terms.
+pub(super) fn deciding<P: PiecewiseSmooth<N>, const N: usize>(
+    faces: &Faces<P>,
+    x: &SVector<f64, N>,
+) -> [f64; 14] {
     let (fields, rates) = fields(faces, x);
     let speed = fields.iter().fold(f64::MIN_POSITIVE, |m, f| m.max(f.norm()));
     let slopes: [f64; 2] = std::array::from_fn(|i| gradient(&faces[i][0], x).norm());
-    let w: [[f64; 2]; 4] = std::array::from_fn(|m| std::array::from_fn(|i| rates[m][i] / (slopes[i] * speed)));
+    let w: [[f64; 2]; 4] =
+        std::array::from_fn(|m| std::array::from_fn(|i| rates[m][i] / (slopes[i] * speed)));
     let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
-    std::array::from_fn(|k| if k < 8 { w[k / 2][k % 2] } else { cross(&w[pairs[k - 8].0], &w[pairs[k - 8].1]) })
+    std::array::from_fn(|k| {
+        if k < 8 { w[k / 2][k % 2] } else { cross(&w[pairs[k - 8].0], &w[pairs[k - 8].1]) }
+    })
 }
 
 /// Values of [`deciding`] below this are rounding.

@@ -2,8 +2,8 @@
 //!
 //! # The mathematics
 //!
-//! Of x' = f+ where h > 0 and x' = f- where h < 0, write p = L+h and q = L-h for the Lie derivatives. On h = 0 (Filippov
-//! 1988, ch. 2):
+//! Of x' = f+ where h > 0 and x' = f- where h < 0, write p = L+h and q = L-h for the Lie
+//! derivatives. On h = 0 (Filippov 1988, ch. 2):
 //!
 //! | p | q | motion |
 //! |---|---|---|
@@ -15,35 +15,40 @@
 //! | | = 0 | fold of f-: visible if L-²h < 0, invisible if L-²h > 0 |
 //! | = 0 | = 0 | two-fold |
 //!
-//! A run is a sequence of pieces, each in one [`Mode`], and of [`ModeEvent`]s between them (Piiroinen & Kuznetsov 2008;
-//! Dieci & Lopez 2009, 2012). After every landing on the surface the mode that follows is decided from the signs of p and q
-//! at the landing point, never by stepping on and looking; so a motion that should slide slides from its first
-//! landing on, and chattering cannot occur.
+//! A run is a sequence of pieces, each in one [`Mode`], and of [`ModeEvent`]s between them
+//! (Piiroinen & Kuznetsov 2008; Dieci & Lopez 2009, 2012). After every landing on the surface the
+//! mode that follows is decided from the signs of p and q at the landing point, never by stepping
+//! on and looking; so a motion that should slide slides from its first landing on, and chattering
+//! cannot occur.
 //!
-//! **Free flight** ends at the first zero of h on the step's dense output; [`roots::first_zero`](super::roots::first_zero)
-//! says precisely when it is certain that none was missed (h linear or quadratic in the state: always, up to rounding). A
-//! flight that begins on the surface has a zero of h at its start; it is divided out, so that an early return is seen
-//! and the start is not taken for one.
+//! **Free flight** ends at the first zero of h on the step's dense output;
+//! [`roots::first_zero`](super::roots::first_zero) says precisely when it is certain that none was
+//! missed (h linear or quadratic in the state: always, up to rounding). A flight that begins on the
+//! surface has a zero of h at its start; it is divided out, so that an early return is seen and the
+//! start is not taken for one.
 //!
-//! **Sliding** is integrated with the desingularised field F = q f+ - p f- and physical time as an extra state, t' = q - p
-//! ([`SlidingFlow`]). F leaves h unchanged identically and is smooth even at a two-fold. Every recorded point, also between
-//! the ends of a step, is projected onto h = 0 along grad h. Attracting sliding ends where p or q comes to zero: there it
-//! leaves tangentially along the visible fold's own orbit. Repelling sliding ends by an [`ExitRule`], or at the latest
+//! **Sliding** is integrated with the desingularised field F = q f+ - p f- and physical time as an
+//! extra state, t' = q - p ([`SlidingFlow`]). F leaves h unchanged identically and is smooth even
+//! at a two-fold. Every recorded point, also between the ends of a step, is projected onto h = 0
+//! along grad h. Attracting sliding ends where p or q comes to zero: there it leaves tangentially
+//! along the visible fold's own orbit. Repelling sliding ends by an [`ExitRule`], or at the latest
 //! where p or q comes to zero: that is an invisible fold, and the orbit leaves to the other side.
 //!
-//! **At a two-fold** F = 0. [`two_fold`] has the local analysis. If sliding runs into it, the last leg is a closed form with a
-//! stated error ([`EventKind::TwoFoldReached`]). There the future is a set, and the exit rule selects from it:
-//! where the sliding flow continues into the repelling region (an invisible two-fold with vw > 1, v < 0; a
-//! visible one where the line of entry leads on) the orbit follows the analytic continuation of the invariant curve for as
-//! long as the rule says; [`ExitRule::AtOnce`] to a visible side takes that side's tangent orbit. Where the rule asks for a
-//! future that does not exist the run ends with [`FilippovError::NoSuchExit`].
+//! **At a two-fold** F = 0. [`two_fold`] has the local analysis. If sliding runs into it, the last
+//! leg is a closed form with a stated error ([`EventKind::TwoFoldReached`]). There the future is a
+//! set, and the exit rule selects from it: where the sliding flow continues into the repelling
+//! region (an invisible two-fold with vw > 1, v < 0; a visible one where the line of entry leads
+//! on) the orbit follows the analytic continuation of the invariant curve for as long as the rule
+//! says; [`ExitRule::AtOnce`] to a visible side takes that side's tangent orbit. Where the rule
+//! asks for a future that does not exist the run ends with [`FilippovError::NoSuchExit`].
 //!
-//! **Two switching surfaces** are followed one at a time ([`run_two_surfaces`]); where they meet, the motion is followed if the four fields
-//! decide it, and refused if not.
+//! **Two switching surfaces** are followed one at a time ([`run_two_surfaces`]); where they meet,
+//! the motion is followed if the four fields decide it, and refused if not.
 //!
-//! **Non-transversal cases.** A fold whose second Lie derivative vanishes too (a cusp), and contact with a two-fold that is
-//! not reached along a sliding direction, end with [`FilippovError::NonTransversal`]; crossings that accumulate (invisible
-//! two-folds have such orbits) end with [`FilippovError::Zeno`], which names the moment of accumulation.
+//! **Non-transversal cases.** A fold whose second Lie derivative vanishes too (a cusp), and contact
+//! with a two-fold that is not reached along a sliding direction, end with
+//! [`FilippovError::NonTransversal`]; crossings that accumulate (invisible two-folds have such
+//! orbits) end with [`FilippovError::Zeno`], which names the moment of accumulation.
 
 mod automatic;
 mod engine;
@@ -126,9 +131,11 @@ pub enum EventKind {
     StartedOnSurface,
     /// The run started in the repelling region, or a graze led there: the future is a set.
     EnteredRepelling,
-    /// Crossings accumulated (Zeno) at a point where the motion stays: zero lies between the two fields there.
+    /// Crossings accumulated (Zeno) at a point where the motion stays: zero lies between the two
+    /// fields there.
     Accumulation {
-        /// How long before it the last crossing was that was computed; from there on the durations are a geometric series.
+        /// How long before it the last crossing was that was computed; from there on the durations
+        /// are a geometric series.
         leg: f64,
     },
     /// Came to a two-fold.
@@ -149,7 +156,8 @@ pub enum EventKind {
         /// The rule.
         rule: ExitRule,
     },
-    /// Left repelling sliding because the repelling region ended (an invisible fold), before the rule's moment.
+    /// Left repelling sliding because the repelling region ended (an invisible fold), before the
+    /// rule's moment.
     ExitAtBoundary {
         /// The side it left to: the only one possible.
         to: Side,
@@ -173,13 +181,15 @@ pub struct ModeEvent<const N: usize> {
     pub kind: EventKind,
     /// The mode before; `None` at the start of a run.
     pub from: Option<Mode>,
-    /// The mode after; `None` at the two-fold itself and where a run stops because the future is a set.
+    /// The mode after; `None` at the two-fold itself and where a run stops because the future is a
+    /// set.
     pub to: Option<Mode>,
 }
 
 /// Receives a Filippov run as it happens.
 pub trait FilippovObserver<const N: usize> {
-    /// A step, all of it in one mode. Steps follow each other without gaps; a step that an event cut short ends there.
+    /// A step, all of it in one mode. Steps follow each other without gaps; a step that an event
+    /// cut short ends there.
     fn step(&mut self, mode: Mode, step: &Step<'_, N>) -> Flow;
     /// A change of mode.
     fn event(&mut self, _event: &ModeEvent<N>) -> Flow {
@@ -187,7 +197,8 @@ pub trait FilippovObserver<const N: usize> {
     }
 }
 
-/// Hands every step, whatever its mode, to an ordinary observer: a path or a section of a Filippov orbit.
+/// Hands every step, whatever its mode, to an ordinary observer: a path or a section of a Filippov
+/// orbit.
 #[derive(Debug)]
 pub struct AllModes<'a, O>(pub &'a mut O);
 
@@ -201,14 +212,17 @@ impl<const N: usize, O: Observer<N>> FilippovObserver<N> for AllModes<'_, O> {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FilippovOptions {
-    /// Tolerances in every mode: of the Dormand-Prince method, and of Radau IIA where a piece is stiff.
+    /// Tolerances in every mode: of the Dormand-Prince method, and of Radau IIA where a piece is
+    /// stiff.
     pub tolerance: Tolerance,
-    /// The longest step in free flight. Sliding steps are measured in rescaled time and have no cap.
+    /// The longest step in free flight. Sliding steps are measured in rescaled time and have no
+    /// cap.
     pub max_step: f64,
-    /// Distance from a two-fold, as a fraction of its radius, at which the closed-form last leg begins; never less than 300 times
-    /// what the tolerances resolve.
+    /// Distance from a two-fold, as a fraction of its radius, at which the closed-form last leg
+    /// begins; never less than 300 times what the tolerances resolve.
     pub leg: f64,
-    /// Distance of the shortest departure from a two-fold, as a fraction of its radius (see [`ExitRule::AtOnce`]).
+    /// Distance of the shortest departure from a two-fold, as a fraction of its radius (see
+    /// [`ExitRule::AtOnce`]).
     pub departure: f64,
     /// Largest number of events.
     pub max_events: u64,
@@ -254,10 +268,12 @@ impl<const N: usize> FilippovSummary<N> {
     /// [`Failure::TooManySteps`] if the budget of steps ended the run.
     pub fn within_budget(self) -> Result<Self, FilippovError> {
         match self.stop {
-            StopReason::StepBudget => {
-                Err(Failure::TooManySteps { t: self.t, limit: self.statistics.steps, state: Failure::state(&self.x) }
-                    .into())
+            StopReason::StepBudget => Err(Failure::TooManySteps {
+                t: self.t,
+                limit: self.statistics.steps,
+                state: Failure::state(&self.x),
             }
+            .into()),
             _ => Ok(self),
         }
     }
@@ -274,7 +290,9 @@ pub enum FilippovError {
     Invalid(String),
     /// Crossings accumulate.
     #[error(
-        "crossings accumulate (Zeno): {crossings} in a row, each sooner than the one before, the last flight took {last:e}; they come together near t = {accumulates}, state {state:?}. Start elsewhere, or end the run before that time"
+        "crossings accumulate (Zeno): {crossings} in a row, each sooner than the one before, the \
+            last flight took {last:e}; they come together near t = {accumulates}, state {state:?}. \
+            Start elsewhere, or end the run before that time"
     )]
     Zeno {
         /// Time reached.
@@ -290,7 +308,8 @@ pub enum FilippovError {
     },
     /// A contact with the surface that first and second Lie derivatives do not decide.
     #[error(
-        "non-transversal contact with the switching surface at t = {t}, state {state:?}: {what}. Perturb the start or the parameters"
+        "non-transversal contact with the switching surface at t = {t}, state {state:?}: {what}. \
+            Perturb the start or the parameters"
     )]
     NonTransversal {
         /// Time reached.
@@ -312,7 +331,10 @@ pub enum FilippovError {
     },
     /// The switching function is not continuous along the motion.
     #[error(
-        "the switching function h jumps at t = {t}, state {state:?}: it changes sign there without coming to 0, or faster than numbers resolve. Give the place of the jump as a second switching surface ([second] in the system's file), or smooth the switches (--switch smoothed)"
+        "the switching function h jumps at t = {t}, state {state:?}: it changes sign there without \
+            coming to 0, or faster than numbers resolve. Give the place of the jump as a second \
+            switching surface ([second] in the system's file), or smooth the switches (--switch \
+            smoothed)"
     )]
     Jump {
         /// Time reached.
@@ -332,7 +354,8 @@ pub enum FilippovError {
     },
     /// The recorded futures are more than fits in memory.
     #[error(
-        "more than {limit} points were recorded in the first {members} futures of the funnel: follow fewer of them, or each for a shorter time"
+        "more than {limit} points were recorded in the first {members} futures of the funnel: \
+            follow fewer of them, or each for a shorter time"
     )]
     TooManyPoints {
         /// The limit.
@@ -342,7 +365,8 @@ pub enum FilippovError {
     },
     /// The budget of events is used up.
     #[error(
-        "{limit} events were not enough: stopped at t = {t}, state {state:?}; end the run earlier (--t-end); where switches follow each other so closely, smooth them (--switch smoothed)"
+        "{limit} events were not enough: stopped at t = {t}, state {state:?}; end the run earlier \
+            (--t-end); where switches follow each other so closely, smooth them (--switch smoothed)"
     )]
     TooManyEvents {
         /// Time reached.
@@ -370,10 +394,14 @@ pub struct Choice {
 }
 
 /// What helps where an exit rule can choose.
-const CHOOSE: &str = "Nothing is chosen silently: say which is followed by --exit, such as at-once:plus, after-time:0.3:minus, after-arc:0.2:plus, random:exponential:0.5, or all; or end the run before (--t-end)";
+const CHOOSE: &str = "Nothing is chosen silently: say which is followed by --exit, such as \
+    at-once:plus, after-time:0.3:minus, after-arc:0.2:plus, random:exponential:0.5, or all; or end \
+    the run before (--t-end)";
 
 /// What helps where no rule can choose.
-const WITHOUT_CHOICE: &str = "Nothing is chosen here: end the run before that time (--t-end), start elsewhere (--start), change a parameter (--set), or smooth the switches (--switch smoothed)";
+const WITHOUT_CHOICE: &str = "Nothing is chosen here: end the run before that time (--t-end), \
+    start elsewhere (--start), change a parameter (--set), or smooth the switches (--switch \
+    smoothed)";
 
 #[cfg(test)]
 mod tests;

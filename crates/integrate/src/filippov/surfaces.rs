@@ -1,12 +1,14 @@
 //! Filippov motion with two switching surfaces.
 //!
-//! Near a point of one surface that is off the other, a system with two is a system with one: the other's sign does not change there. So a run
-//! is a sequence of runs of the one-surface engine, each with the sign of the other surface fixed (a *face* of the system), and ends its turn
-//! where the other surface is reached, which becomes the one that is followed. Crossing, sliding, folds, two-folds and the exit
-//! rule are those of [`engine`](super::engine) on each surface.
+//! Near a point of one surface that is off the other, a system with two is a system with one: the
+//! other's sign does not change there. So a run is a sequence of runs of the one-surface engine,
+//! each with the sign of the other surface fixed (a *face* of the system), and ends its turn where
+//! the other surface is reached, which becomes the one that is followed. Crossing, sliding, folds,
+//! two-folds and the exit rule are those of [`engine`](super::engine) on each surface.
 //!
-//! Where both surfaces meet, [`intersection`](super::intersection) lists what may follow. If that is one motion it is followed, also along the
-//! intersection itself; else the run ends with [`FilippovError::Undecided`].
+//! Where both surfaces meet, [`intersection`](super::intersection) lists what may follow. If that
+//! is one motion it is followed, also along the intersection itself; else the run ends with
+//! [`FilippovError::Undecided`].
 
 use nalgebra::SVector;
 
@@ -14,12 +16,13 @@ use super::engine::{Departure, FlightStart, Origin, near_surface, run_from, up_t
 use super::exit::Chooser;
 use super::flow::{SlidingFlow, Truncated, project};
 use super::intersection::{
-    AlongIntersection, Continuation, Mixture, OnIntersection, UNDECIDING, continuations, deciding, resolution, side,
-    turns,
+    AlongIntersection, Continuation, Mixture, OnIntersection, UNDECIDING, continuations, deciding,
+    resolution, side, turns,
 };
 use super::{Choice, WITHOUT_CHOICE, intersection};
 use super::{
-    EventKind, ExitRule, FilippovError, FilippovObserver, FilippovOptions, FilippovSummary, Mode, ModeEvent, Side,
+    EventKind, ExitRule, FilippovError, FilippovObserver, FilippovOptions, FilippovSummary, Mode,
+    ModeEvent, Side,
 };
 use crate::dopri5::Dopri5;
 use crate::driver::Monitor;
@@ -29,23 +32,31 @@ use twofold_num::{Arithmetic, Dual};
 use twofold_system::filippov::{gradient, sliding_field};
 use twofold_system::{PiecewiseSmooth, VectorField, variables};
 
-/// The faces of a system with two surfaces: `faces[i][0]` switches at surface i where the other function is positive, `faces[i][1]` where it is
-/// negative.
+/// The faces of a system with two surfaces: `faces[i][0]` switches at surface i where the other
+/// function is positive, `faces[i][1]` where it is negative.
 pub type Faces<P> = [[P; 2]; 2];
 
 /// Distance from a surface, relative to the state's size, below which tables call a state on the
 /// surface.
 pub const INTERSECTION: f64 = 1e-9;
 
-/// Share of [`resolution`] within which a spiral has come to the intersection: nearer, a turn takes no time that matters.
+/// Share of [`resolution`] within which a spiral has come to the intersection: nearer, a turn takes
+/// no time that matters.
 const END_OF_SPIRAL: f64 = 1e-4;
-/// Share of [`resolution`] within which sliding that reaches the other surface is at the intersection.
+/// Share of [`resolution`] within which sliding that reaches the other surface is at the
+/// intersection.
 const SLID: f64 = 100.0;
 
 /// What the next part of a run is.
 enum Part<const N: usize> {
     /// A run of the one-surface engine on surface `active`, on the side `beyond` of the other.
-    Face { active: usize, beyond: Side, departure: Departure<N>, left: Option<FlightStart>, first: First },
+    Face {
+        active: usize,
+        beyond: Side,
+        departure: Departure<N>,
+        left: Option<FlightStart>,
+        first: First,
+    },
     /// Motion along the intersection.
     Intersection(Box<Mixture<N>>),
 }
@@ -61,8 +72,9 @@ enum First {
     Called(EventKind, Mode),
 }
 
-/// Runs the Filippov motion of a system with two switching surfaces from (0, x0) to `t_end`. `M` is `N + 1` and is inferred. The modes that the
-/// observer is told are those of the surface that was met last (at the start: the first one, unless the run starts on the second).
+/// Runs the Filippov motion of a system with two switching surfaces from (0, x0) to `t_end`. `M` is
+/// `N + 1` and is inferred. The modes that the observer is told are those of the surface that was
+/// met last (at the start: the first one, unless the run starts on the second).
 ///
 /// ```
 /// use nalgebra::vector;
@@ -80,8 +92,8 @@ enum First {
 /// ```
 ///
 /// # Errors
-/// [`FilippovError::Undecided`] where both surfaces meet and several motions are possible; else see [`FilippovError`]. Each names the time and
-/// the state.
+/// [`FilippovError::Undecided`] where both surfaces meet and several motions are possible; else see
+/// [`FilippovError`]. Each names the time and the state.
 pub fn run_two_surfaces<P, const N: usize, const M: usize>(
     faces: &Faces<P>,
     x0: SVector<f64, N>,
@@ -126,12 +138,20 @@ where
         None => {
             let active = usize::from(near[1]);
             let beyond = run.side_of(1 - active);
-            Part::Face { active, beyond, departure: Departure::Anywhere, left: None, first: First::AsIs }
+            Part::Face {
+                active,
+                beyond,
+                departure: Departure::Anywhere,
+                left: None,
+                first: First::AsIs,
+            }
         }
     };
     loop {
         let (active, beyond, departure, left, first) = match part {
-            Part::Face { active, beyond, departure, left, first } => (active, beyond, departure, left, first),
+            Part::Face { active, beyond, departure, left, first } => {
+                (active, beyond, departure, left, first)
+            }
             Part::Intersection(mixture) => match run.along(*mixture)? {
                 Ok(next) => {
                     part = next;
@@ -164,7 +184,11 @@ where
         run.events += summary.events;
         run.statistics += &summary.statistics;
         let Some(Hit { t: when, x: place, mode, from, wanted }) = hit else {
-            return Ok(FilippovSummary { events: run.events, statistics: run.statistics, ..summary });
+            return Ok(FilippovSummary {
+                events: run.events,
+                statistics: run.statistics,
+                ..summary
+            });
         };
         (run.t, run.x) = (when, place);
         if !wanted {
@@ -184,7 +208,10 @@ where
             });
         }
         if from_corner && when <= t {
-            return Err(run.undecided(&[], "the motion does not get away from where both switching surfaces meet"));
+            return Err(run.undecided(
+                &[],
+                "the motion does not get away from where both switching surfaces meet",
+            ));
         }
         // Who slides is on both surfaces; a flight that only comes near one may pass by.
         let mut corner = run.corner(&place, if mode.slides() { SLID } else { 1.0 });
@@ -236,14 +263,22 @@ struct SurfacesRun<'a, P, const N: usize> {
 
 impl<P: PiecewiseSmooth<N>, const N: usize> SurfacesRun<'_, P, N> {
     fn summary(self, mode: Option<Mode>, stop: StopReason) -> FilippovSummary<N> {
-        FilippovSummary { t: self.t, x: self.x, mode, stop, events: self.events, statistics: self.statistics }
+        FilippovSummary {
+            t: self.t,
+            x: self.x,
+            mode,
+            stop,
+            events: self.events,
+            statistics: self.statistics,
+        }
     }
 
     fn side_of(&self, surface: usize) -> Side {
         if self.faces[surface][0].switching(&self.x) < 0.0 { Side::Minus } else { Side::Plus }
     }
 
-    /// Whether `x` and `y` differ by no more than this share of [`resolution`], each coordinate in its own units.
+    /// Whether `x` and `y` differ by no more than this share of [`resolution`], each coordinate in
+    /// its own units.
     fn within(&self, share: f64, x: &SVector<f64, N>, y: &SVector<f64, N>) -> bool {
         let reach = resolution(self.settings, x);
         (0..N).all(|i| (y[i] - x[i]).abs() <= share * reach[i])
@@ -282,11 +317,14 @@ impl<P: PiecewiseSmooth<N>, const N: usize> SurfacesRun<'_, P, N> {
             [only @ (Continuation::Flight(_) | Continuation::Sliding { repelling: false, .. })] => {
                 Ok(self.leave(only, arrival, false))
             }
-            [] => {
-                Err(self
-                    .undecided(&[], "both switching surfaces meet, and their Lie derivatives do not say what follows"))
-            }
-            _ => Err(self.undecided(&found, "both switching surfaces meet, and the motion there is not unique")),
+            [] => Err(self.undecided(
+                &[],
+                "both switching surfaces meet, and their Lie derivatives do not say what follows",
+            )),
+            _ => Err(self.undecided(
+                &found,
+                "both switching surfaces meet, and the motion there is not unique",
+            )),
         }
     }
 
@@ -294,7 +332,9 @@ impl<P: PiecewiseSmooth<N>, const N: usize> SurfacesRun<'_, P, N> {
     fn leave(&self, next: &Continuation<N>, arrival: Option<Arrival>, stayed: bool) -> Part<N> {
         let (active, beyond, mode) = match *next {
             Continuation::Flight(m) => (0, side(m, 1), side(m, 0).into()),
-            Continuation::Sliding { surface, beyond, .. } => (surface, beyond, Mode::SlidingAttracting),
+            Continuation::Sliding { surface, beyond, .. } => {
+                (surface, beyond, Mode::SlidingAttracting)
+            }
             _ => unreachable!("the others do not leave"),
         };
         let face = &self.faces[active][usize::from(beyond == Side::Minus)];
@@ -314,7 +354,9 @@ impl<P: PiecewiseSmooth<N>, const N: usize> SurfacesRun<'_, P, N> {
             FlightStart::Tangent(beyond.sign() * along)
         };
         let first = match arrival {
-            None if stayed => First::Called(EventKind::LeftByTangency { to: beyond }, Mode::SlidingAttracting),
+            None if stayed => {
+                First::Called(EventKind::LeftByTangency { to: beyond }, Mode::SlidingAttracting)
+            }
             None => First::AsIs,
             Some(Arrival { mode: before, from, .. }) if mode.slides() && !before.slides() => {
                 First::Called(EventKind::Landing { from }, before)
@@ -334,7 +376,10 @@ impl<P: PiecewiseSmooth<N>, const N: usize> SurfacesRun<'_, P, N> {
     }
 
     /// Motion along the intersection until something else follows, or the reason to stop.
-    fn along(&mut self, mut mixture: Mixture<N>) -> Result<Result<Part<N>, StopReason>, FilippovError> {
+    fn along(
+        &mut self,
+        mut mixture: Mixture<N>,
+    ) -> Result<Result<Part<N>, StopReason>, FilippovError> {
         let faces = self.faces;
         let mode = Mode::SlidingAttracting;
         'stretch: loop {
@@ -346,7 +391,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> SurfacesRun<'_, P, N> {
                 let step = method.step(&flow)?;
                 let (t0, signs) = (step.t0, deciding(faces, &self.x));
                 let mut end: Option<f64> = None;
-                for (k, sign) in signs.into_iter().enumerate().filter(|(_, v)| v.abs() > UNDECIDING) {
+                for (k, sign) in signs.into_iter().enumerate().filter(|(_, v)| v.abs() > UNDECIDING)
+                {
                     let margin = |theta: f64| sign.signum() * deciding(faces, &step.at(theta))[k];
                     if let Some(zero) = first_zero(margin, Start::Away) {
                         end = Some(end.unwrap_or(1.0).min(zero.theta()));
@@ -355,14 +401,16 @@ impl<P: PiecewiseSmooth<N>, const N: usize> SurfacesRun<'_, P, N> {
                 let theta = end.unwrap_or(1.0);
                 let place = step.at(theta);
                 let Some(x1) = intersection::project(faces, &place) else {
-                    return Err(
-                        self.undecided(&[], "the motion along the intersection of the switching surfaces loses it")
-                    );
+                    return Err(self.undecided(
+                        &[],
+                        "the motion along the intersection of the switching surfaces loses it",
+                    ));
                 };
                 let t1 = up_to(self.t_end, if theta == 1.0 { step.t1 } else { step.time(theta) });
                 let interpolant = OnIntersection { faces, inner: step.interpolant, end: theta };
                 let seen = Step { t0, t1, x0: self.x, x1, interpolant: &interpolant };
-                let flow_on = if t1 > t0 { self.observer.step(mode, &seen) } else { Flow::Continue };
+                let flow_on =
+                    if t1 > t0 { self.observer.step(mode, &seen) } else { Flow::Continue };
                 (self.t, self.x) = (t1, x1);
                 let work = method.statistics();
                 self.statistics.steps += work.steps - before.steps;
@@ -388,11 +436,15 @@ impl<P: PiecewiseSmooth<N>, const N: usize> SurfacesRun<'_, P, N> {
                             continue 'stretch;
                         }
                     }
-                    [only @ (Continuation::Flight(_) | Continuation::Sliding { repelling: false, .. })] => {
+                    [
+                        only @ (Continuation::Flight(_)
+                        | Continuation::Sliding { repelling: false, .. }),
+                    ] => {
                         return Ok(Ok(self.leave(only, None, true)));
                     }
                     _ => {
-                        let what = "the motion along the intersection of the switching surfaces comes to where it is not unique";
+                        let what = "the motion along the intersection of the switching surfaces \
+                            comes to where it is not unique";
                         return Err(self.undecided(&found, what));
                     }
                 }
@@ -420,7 +472,8 @@ struct Guard<'a, P, const N: usize> {
     /// The sign of its function.
     sign: f64,
     first: First,
-    /// Set until the first step of a run that begins at the intersection: how it leaves the other surface.
+    /// Set until the first step of a run that begins at the intersection: how it leaves the other
+    /// surface.
     left: Option<FlightStart>,
     hit: Option<Hit<N>>,
     t_end: f64,
@@ -433,7 +486,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> FilippovObserver<N> for Guard<'_, P,
         }
         let height = |theta: f64| self.sign * self.guarded.switching(&step.at(theta));
         let enclosed = |x: &SVector<Enclosed, N>| self.guarded.switching(x).scale(self.sign);
-        let first = |start| first_zero_along(step, &height, &enclosed, start).map(|zero| zero.theta());
+        let first =
+            |start| first_zero_along(step, &height, &enclosed, start).map(|zero| zero.theta());
         let zero = match self.left.take() {
             Some(start) => first(start.over(step.length())),
             // Rounding may have carried the step before over the surface.
@@ -442,7 +496,12 @@ impl<P: PiecewiseSmooth<N>, const N: usize> FilippovObserver<N> for Guard<'_, P,
         };
         let Some(end) = zero else { return self.observer.step(mode, step) };
         let (t, x) = (up_to(self.t_end, step.time(end)), project(self.guarded, &step.at(end)));
-        let cut = Step { t1: t, x1: x, interpolant: &Truncated { inner: step.interpolant, end }, ..*step };
+        let cut = Step {
+            t1: t,
+            x1: x,
+            interpolant: &Truncated { inner: step.interpolant, end },
+            ..*step
+        };
         let wanted = t <= step.t0 || self.observer.step(mode, &cut) == Flow::Continue;
         let from = if self.sign > 0.0 { Side::Plus } else { Side::Minus };
         self.hit = Some(Hit { t, x, mode, from, wanted });
@@ -450,7 +509,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> FilippovObserver<N> for Guard<'_, P,
     }
 
     fn event(&mut self, event: &ModeEvent<N>) -> Flow {
-        // What the engine says after the step in which the other surface was reached did not happen.
+        // What the engine says after the step in which the other surface was reached did not
+        // happen.
         if self.hit.is_some() {
             return Flow::Stop;
         }
@@ -462,8 +522,12 @@ impl<P: PiecewiseSmooth<N>, const N: usize> FilippovObserver<N> for Guard<'_, P,
             First::Arrived(from) => from,
         };
         let kind = match (event.kind, event.to) {
-            (EventKind::StartedOnSurface, Some(mode)) if mode.slides() => EventKind::Landing { from },
-            (EventKind::StartedOnSurface, Some(mode)) if mode == from.into() => EventKind::Grazing { side: from },
+            (EventKind::StartedOnSurface, Some(mode)) if mode.slides() => {
+                EventKind::Landing { from }
+            }
+            (EventKind::StartedOnSurface, Some(mode)) if mode == from.into() => {
+                EventKind::Grazing { side: from }
+            }
             (EventKind::StartedOnSurface, Some(_)) => EventKind::Crossing { to: from.other() },
             (kind, _) => kind,
         };
@@ -491,7 +555,8 @@ mod tests {
             [0, 1].map(|surface| [false, true].map(|below| Self { fields, surface, below }))
         }
         fn field(&self, positive: bool) -> [f64; 2] {
-            let (x, y) = if self.surface == 0 { (positive, !self.below) } else { (!self.below, positive) };
+            let (x, y) =
+                if self.surface == 0 { (positive, !self.below) } else { (!self.below, positive) };
             self.fields[usize::from(!x) + 2 * usize::from(!y)]
         }
     }
@@ -516,7 +581,15 @@ mod tests {
         let mut seen = Trajectory::new(1);
         let rule = ExitRule::AtOnce { side: Side::Plus };
         let faces = Quadrants::faces(fields);
-        let end = run_two_surfaces(&faces, x0.into(), t_end, &FilippovOptions::default(), rule, &mut seen, &());
+        let end = run_two_surfaces(
+            &faces,
+            x0.into(),
+            t_end,
+            &FilippovOptions::default(),
+            rule,
+            &mut seen,
+            &(),
+        );
         (end, seen)
     }
 
@@ -547,38 +620,54 @@ mod tests {
         let (end, seen) = run(DOWN, [1.0, 3.0], 10.0);
         let Err(FilippovError::Undecided { t, state, .. }) = end else { panic!("{end:?}") };
         assert!((t - 3.0).abs() < 1e-11 && state.iter().all(|v| v.abs() < 1e-11), "{t} {state:?}");
-        assert!(
-            seen.events.iter().any(|e| e.kind == EventKind::Landing { from: Side::Plus } && (e.t - 1.0).abs() < 1e-11)
-        );
+        assert!(seen.events.iter().any(
+            |e| e.kind == EventKind::Landing { from: Side::Plus } && (e.t - 1.0).abs() < 1e-11
+        ));
         // The same without ever coming there.
         let (end, _) = run(DOWN, [1.0, 3.0], 2.5);
         let end = end.unwrap();
-        assert!((end.x - vector![0.0, 0.5]).amax() < 1e-11 && end.mode == Some(Mode::SlidingAttracting));
-        // Crossing y = 0 first, then landing on x = 0 below it, where the two fields are opposite: there it rests.
+        assert!(
+            (end.x - vector![0.0, 0.5]).amax() < 1e-11 && end.mode == Some(Mode::SlidingAttracting)
+        );
+        // Crossing y = 0 first, then landing on x = 0 below it, where the two fields are opposite:
+        // there it rests.
         let (end, seen) = run(DOWN, [3.0, 1.0], 10.0);
         assert!((end.unwrap().x - vector![0.0, -2.0]).amax() < 1e-10);
         let kinds: Vec<_> = seen.events.iter().map(|e| e.kind).collect();
-        assert_eq!(kinds, [EventKind::Crossing { to: Side::Minus }, EventKind::Landing { from: Side::Plus }]);
+        assert_eq!(
+            kinds,
+            [EventKind::Crossing { to: Side::Minus }, EventKind::Landing { from: Side::Plus }]
+        );
     }
 
     #[test]
     fn sliding_across_the_other_surface_goes_on_where_that_is_decided() {
-        // x' = -sign(x) and y' from -1 (y > 0) to -2 (y < 0): all four fields cross y = 0 downwards.
-        let (end, seen) = run([[-1.0, -1.0], [1.0, -1.0], [-1.0, -2.0], [1.0, -2.0]], [1.0, 3.0], 10.0);
+        // x' = -sign(x) and y' from -1 (y > 0) to -2 (y < 0): all four fields cross y = 0
+        // downwards.
+        let (end, seen) =
+            run([[-1.0, -1.0], [1.0, -1.0], [-1.0, -2.0], [1.0, -2.0]], [1.0, 3.0], 10.0);
         assert!((end.unwrap().x - vector![0.0, -14.0]).amax() < 1e-10);
         let events: Vec<_> = seen.events.iter().map(|e| (e.kind, e.to)).collect();
         let sliding = Some(Mode::SlidingAttracting);
         let crossed = EventKind::Crossing { to: Side::Minus };
-        assert_eq!(events, [(EventKind::Landing { from: Side::Plus }, sliding), (crossed, sliding)]);
+        assert_eq!(
+            events,
+            [(EventKind::Landing { from: Side::Plus }, sliding), (crossed, sliding)]
+        );
         assert!((seen.events[1].t - 3.0).abs() < 1e-11);
         // Below, x = 0 is crossed and not slid on: it leaves there, to x > 0.
-        let (end, seen) = run([[-1.0, -1.0], [1.0, -1.0], [0.5, -2.0], [1.0, -2.0]], [1.0, 3.0], 4.0);
+        let (end, seen) =
+            run([[-1.0, -1.0], [1.0, -1.0], [0.5, -2.0], [1.0, -2.0]], [1.0, 3.0], 4.0);
         assert!((end.unwrap().x - vector![0.5, -2.0]).amax() < 1e-10);
         assert_eq!(seen.events[1].to, Some(Mode::Plus));
         // Below, x = 0 repels: a set of futures.
-        let (end, _) = run([[-1.0, -1.0], [1.0, -1.0], [1.0, -2.0], [-1.0, -2.0]], [1.0, 3.0], 10.0);
+        let (end, _) =
+            run([[-1.0, -1.0], [1.0, -1.0], [1.0, -2.0], [-1.0, -2.0]], [1.0, 3.0], 10.0);
         let Err(FilippovError::Undecided { choice, .. }) = end else { panic!("{end:?}") };
-        assert!(choice.continuations.iter().any(|way| way.contains("repelling sliding on h = 0")), "{choice:?}");
+        assert!(
+            choice.continuations.iter().any(|way| way.contains("repelling sliding on h = 0")),
+            "{choice:?}"
+        );
     }
 
     #[test]
@@ -593,7 +682,8 @@ mod tests {
         let Err(FilippovError::Undecided { t, choice, .. }) = end else { panic!("{end:?}") };
         assert!(t == 0.0 && choice.continuations.len() > 1, "{choice:?}");
         // Each side halves the distance: 1 + 1/2 + 1/4 + ... = 2 to the middle.
-        let (end, seen) = run([[-2.0, 1.0], [-1.0, -2.0], [1.0, 2.0], [2.0, -1.0]], [1.0, 0.0], 100.0);
+        let (end, seen) =
+            run([[-2.0, 1.0], [-1.0, -2.0], [1.0, 2.0], [2.0, -1.0]], [1.0, 0.0], 100.0);
         let end = end.unwrap();
         assert!(end.x.amax() < 1e-11 && end.mode == Some(Mode::SlidingAttracting), "{}", end.x);
         let last = seen.events.last().unwrap();

@@ -1,5 +1,5 @@
-//! What holds for any piecewise-smooth system: two sides that mirror each other, the local analysis against differences of the field itself, and a
-//! two-fold that is not at the origin.
+//! What holds for any piecewise-smooth system: two sides that mirror each other, the local analysis
+//! against differences of the field itself, and a two-fold that is not at the origin.
 
 use nalgebra::{SVector, vector};
 use std::ops::ControlFlow;
@@ -59,7 +59,9 @@ fn story(
         .map(|e| (e.t, e.state, format!("{} {:?} {:?}", kind(e.kind), mode(e.from), mode(e.to))))
         .collect();
     match end {
-        Ok(end) => all.push((end.t, end.x, format!("{:?} {:?} {}", end.stop, mode(end.mode), end.events))),
+        Ok(end) => {
+            all.push((end.t, end.x, format!("{:?} {:?} {}", end.stop, mode(end.mode), end.events)))
+        }
         Err(error) => {
             let word = format!("{error:?}").split([' ', '(']).next().unwrap_or_default().to_owned();
             all.push((0.0, SVector::zeros(), word));
@@ -109,14 +111,25 @@ fn the_two_sides_mirror_each_other() {
                 for side in [Side::Plus, Side::Minus] {
                     for at_once in [false, true] {
                         let rule = |side| {
-                            if at_once { ExitRule::AtOnce { side } } else { ExitRule::AfterTime { time: 0.3, side } }
+                            if at_once {
+                                ExitRule::AtOnce { side }
+                            } else {
+                                ExitRule::AfterTime { time: 0.3, side }
+                            }
                         };
                         let mut seen = [Trajectory::new(1), Trajectory::new(1)];
                         let [straight, turned] = &mut seen;
                         let x0 = SVector::from(start);
                         let ends = [
                             run(&system, x0, 3.0, &settings, rule(side), straight),
-                            run(&Mirrored(system.clone()), x0, 3.0, &settings, rule(side.other()), turned),
+                            run(
+                                &Mirrored(system.clone()),
+                                x0,
+                                3.0,
+                                &settings,
+                                rule(side.other()),
+                                turned,
+                            ),
                         ];
                         let [a, b] = ends;
                         let [straight, turned] = seen;
@@ -133,7 +146,16 @@ fn the_two_sides_mirror_each_other() {
             }
         }
     }
-    for kind in ["crossing", "landing", "grazing", "tangency", "exit", "boundary", "two-fold", "StartedOnSurface"] {
+    for kind in [
+        "crossing",
+        "landing",
+        "grazing",
+        "tangency",
+        "exit",
+        "boundary",
+        "two-fold",
+        "StartedOnSurface",
+    ] {
         assert!(kinds.contains(kind), "no {kind} among {kinds:?}");
     }
 }
@@ -143,7 +165,8 @@ fn the_two_sides_mirror_each_other() {
 struct Curved {
     centre: [f64; 3],
     bend: f64,
-    /// Of each field: the first component's slopes and squares, the other components' values and slopes.
+    /// Of each field: the first component's slopes and squares, the other components' values and
+    /// slopes.
     fields: [[f64; 8]; 2],
 }
 
@@ -191,7 +214,10 @@ fn the_local_analysis_is_that_of_the_field_itself() {
     for _ in 0..60 {
         let s = Curved::by_chance(&mut stream);
         let centre = SVector::from(s.centre);
-        let Some(local) = SlidingAtTwoFold::near(&s, &(centre + vector![0.01, -0.02, 0.015])) else { continue };
+        let Some(local) = SlidingAtTwoFold::near(&s, &(centre + vector![0.01, -0.02, 0.015]))
+        else {
+            continue;
+        };
         assert!((local.point - centre).amax() < 1e-12, "{s:?}: {:?}", local.point);
         let field = |x: &SVector<f64, 3>| desingularised(&s, x).0;
         // L+h and L-h near the centre, and their slopes along both fields there.
@@ -199,8 +225,11 @@ fn the_local_analysis_is_that_of_the_field_itself() {
             let f = s.fields[i];
             [f[0] + s.bend * f[5], f[1] + s.bend * f[4]]
         });
-        let along = |slope: [f64; 2], field: usize| slope[0] * s.fields[field][4] + slope[1] * s.fields[field][5];
-        let [pp, pm, mp, mm] = [along(slopes[0], 0), along(slopes[0], 1), along(slopes[1], 0), along(slopes[1], 1)];
+        let along = |slope: [f64; 2], field: usize| {
+            slope[0] * s.fields[field][4] + slope[1] * s.fields[field][5]
+        };
+        let [pp, pm, mp, mm] =
+            [along(slopes[0], 0), along(slopes[0], 1), along(slopes[1], 0), along(slopes[1], 1)];
         for (found, want) in local.second.iter().zip([pp, pm, mp, mm]) {
             near(*found, want, 1e-11, "second Lie derivative");
         }
@@ -219,19 +248,31 @@ fn the_local_analysis_is_that_of_the_field_itself() {
             near(d.vector[0], 0.0, 1e-12, "tangent to the surface");
             assert!(d.lie[0] < 0.0 || (d.lie[0] == 0.0 && d.lie[1] >= 0.0), "{d:?}");
             for (lie, slope) in d.lie.iter().zip(slopes) {
-                near(*lie, slope[0] * d.vector[1] + slope[1] * d.vector[2], 1e-9, "Lie derivative along it");
+                near(
+                    *lie,
+                    slope[0] * d.vector[1] + slope[1] * d.vector[2],
+                    1e-9,
+                    "Lie derivative along it",
+                );
             }
             let e = 1e-5;
-            let slope = (field(&(centre + d.vector * e)) - field(&(centre - d.vector * e))) / (2.0 * e);
-            assert!((slope - d.vector * d.rate).amax() < 1e-8 * (1.0 + d.rate.abs()), "{slope} {d:?}");
+            let slope =
+                (field(&(centre + d.vector * e)) - field(&(centre - d.vector * e))) / (2.0 * e);
+            assert!(
+                (slope - d.vector * d.rate).amax() < 1e-8 * (1.0 + d.rate.abs()),
+                "{slope} {d:?}"
+            );
             assert_eq!(d.slides(), d.lie[0] < 0.0 && d.lie[1] > 0.0);
         }
-        let [a, b] = local.coordinates(&s, &(centre + (weak.vector * 3.0 - strong.vector * 2.0) * 1e-6)).unwrap();
+        let [a, b] = local
+            .coordinates(&s, &(centre + (weak.vector * 3.0 - strong.vector * 2.0) * 1e-6))
+            .unwrap();
         if (weak.rate - strong.rate).abs() > 0.1 {
             near(a * 1e6, 3.0, 1e-3, "along the weak direction");
             near(b * 1e6, -2.0, 1e-3, "along the strong direction");
         }
-        let of_sign = |sign: f64| [weak, strong].iter().position(|d| d.slides() && d.rate * sign > 0.0);
+        let of_sign =
+            |sign: f64| [weak, strong].iter().position(|d| d.slides() && d.rate * sign > 0.0);
         assert_eq!(local.through.as_ref().map(|c| c.index), of_sign(-1.0));
         assert_eq!(local.back.as_ref().map(|c| c.index), of_sign(1.0));
         let curves = [&local.through, &local.back].map(|c| c.as_ref());
@@ -248,7 +289,10 @@ fn the_local_analysis_is_that_of_the_field_itself() {
                 let (sigma, e) = (part * curve.radius, 1e-4 * curve.radius);
                 let slope = (curve.at(sigma + e) - curve.at(sigma - e)) / (2.0 * e);
                 let (f, clock) = desingularised(&s, &curve.at(sigma));
-                assert!((f - slope * (sigma * curve.rate)).amax() < 1e-5 * f.amax(), "{part}: {f} {slope}");
+                assert!(
+                    (f - slope * (sigma * curve.rate)).amax() < 1e-5 * f.amax(),
+                    "{part}: {f} {slope}"
+                );
                 let speed = (curve.time(sigma + e) - curve.time(sigma - e)) / (2.0 * e);
                 near(speed, clock / (curve.rate * sigma), 1e-5, "time along the curve");
                 near(s.switching(&curve.at(sigma)), 0.0, 1e-9, "on the surface");
@@ -267,7 +311,8 @@ fn the_local_analysis_is_that_of_the_field_itself() {
                     "no farther than the limit"
                 );
             }
-            // As a step its ends are those of its times, whichever side of the two-fold they are on.
+            // As a step its ends are those of its times, whichever side of the two-fold they are
+            // on.
             let [from, to] = [curve.time(-0.5 * curve.radius), curve.time(0.25 * curve.radius)];
             let step = AlongCurve { curve, from, to, limit: curve.radius };
             for (theta, part) in [(0.0, -0.5), (-from / (to - from), 0.0), (1.0, 0.25)] {
@@ -276,7 +321,8 @@ fn the_local_analysis_is_that_of_the_field_itself() {
             // Where the curve may be used it is in the sliding regions.
             let limit = local.departure_limit(&s, curve).unwrap();
             assert!(limit <= curve.radius);
-            // Arrival along it takes the series' time; an orbit beside it, the linear flow's besides, if that contracts.
+            // Arrival along it takes the series' time; an orbit beside it, the linear flow's
+            // besides, if that contracts.
             let (on, across) = (1e-5, 3e-9);
             let repelling = curve.rate > 0.0;
             let (time, error) = local.time_to_arrive(&s, &curve.at(on), repelling).unwrap();
@@ -287,9 +333,15 @@ fn the_local_analysis_is_that_of_the_field_itself() {
             if other.rate * curve.rate > 0.0 {
                 let (later, _) = local.time_to_arrive(&s, &beside, repelling).unwrap();
                 let linear = across * (other.lie[1] - other.lie[0]) / -other.rate;
-                assert!((later - time - linear).abs() < 0.02 * linear.abs() + 1e-12, "{later} {time} {linear}");
+                assert!(
+                    (later - time - linear).abs() < 0.02 * linear.abs() + 1e-12,
+                    "{later} {time} {linear}"
+                );
             } else {
-                assert!(local.time_to_arrive(&s, &beside, repelling).is_some(), "almost on the curve");
+                assert!(
+                    local.time_to_arrive(&s, &beside, repelling).is_some(),
+                    "almost on the curve"
+                );
                 let far = curve.at(on) + other.vector * (0.1 * on);
                 assert_eq!(local.time_to_arrive(&s, &far, repelling), None);
             }
@@ -298,7 +350,8 @@ fn the_local_analysis_is_that_of_the_field_itself() {
     assert!(sliding > 10 && spirals > 3 && backwards > 2, "{sliding} {spirals} {backwards}");
 }
 
-/// Its invariant curve is the line y = z in the surface, along which F = -y (0, 1, 1); L+h = -y (1 + 2 y) is zero there at the two-fold and, after it, at y = -1/2.
+/// Its invariant curve is the line y = z in the surface, along which F = -y (0, 1, 1); L+h = -y (1
+/// + 2 y) is zero there at the two-fold and, after it, at y = -1/2.
 #[derive(Clone)]
 struct Straight;
 
@@ -307,7 +360,8 @@ impl PiecewiseSmooth<3> for Straight {
         x[0]
     }
     fn plus<S: Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
-        // f+ = -(1, 1) - (1 + 2 y) f-, so that q f+ - p f- = -y (1, 1) on the line, where p = -y (1 + 2 y) and q = y.
+        // f+ = -(1, 1) - (1 + 2 y) f-, so that q f+ - p f- = -y (1, 1) on the line, where p = -y (1
+        // + 2 y) and q = y.
         let rest = S::one() + x[1].scale(2.0);
         let along = S::from_f64(-1.0);
         vector![-(x[1] * rest), along - rest.scale(0.5), along - rest.scale(-0.25)]
@@ -327,7 +381,8 @@ fn a_curve_is_used_only_where_it_slides() {
     assert!(limit < zero && limit > 0.4 * zero, "{limit}");
 }
 
-/// A two-fold with rates -0.3, along the sliding direction, and -0.6: from order 2 on the curve has no series.
+/// A two-fold with rates -0.3, along the sliding direction, and -0.6: from order 2 on the curve has
+/// no series.
 #[test]
 fn a_resonance_ends_the_series() {
     let square = [0.0, 0.0, 0.1, 0.0];
@@ -345,7 +400,8 @@ fn a_resonance_ends_the_series() {
     near(strong.rate, -0.6, 1e-14, "strong");
     let curve = local.through.unwrap();
     assert_eq!(curve.index, 0);
-    // The invariance equation is kept to 1e-12 as far as the square of the distance allows, and no term of a small divisor spoils that.
+    // The invariance equation is kept to 1e-12 as far as the square of the distance allows, and no
+    // term of a small divisor spoils that.
     assert!(curve.radius > 1e-9 && curve.radius < 1e-4, "{}", curve.radius);
 }
 
@@ -385,12 +441,21 @@ fn futures_and_pasts_meet_at_a_two_fold_anywhere() {
     let path = connect(&system, place(0.3, 0.8), place(-0.4, -0.5), 100.0, &settings, 2).unwrap();
     let points: Vec<_> = path.points().collect();
     let (first, last) = (points[0], points[points.len() - 1]);
-    assert!((first.1 - place(0.3, 0.8)).amax() < 1e-12 && (last.1 - place(-0.4, -0.5)).amax() < 1e-9);
+    assert!(
+        (first.1 - place(0.3, 0.8)).amax() < 1e-12 && (last.1 - place(-0.4, -0.5)).amax() < 1e-9
+    );
     near(last.0 - first.0, time(0.3, 0.8) + time(0.4, 0.5), 1e-9, "there and on");
     assert!(points.windows(2).all(|p| p[1].0 >= p[0].0 - 1e-12), "time runs forward");
     let past = history(&system, place(-0.4, -0.5), 100.0, &settings, 2).unwrap();
     near(past.points().last().unwrap().0, time(0.4, 0.5), 1e-9, "its past");
-    let grid = FunnelGrid { shortest: 0.1, longest: 0.4, times: 3, horizon: 2.0, until_two_fold: true, per_step: 1 };
+    let grid = FunnelGrid {
+        shortest: 0.1,
+        longest: 0.4,
+        times: 3,
+        horizon: 2.0,
+        until_two_fold: true,
+        per_step: 1,
+    };
     let family = funnel(&system, place(0.3, 0.8), 100.0, &settings, &grid).unwrap();
     assert!(family.at_two_fold && (family.point - place(0.0, 0.0)).amax() < 1e-12);
     let times: Vec<_> = family.members.iter().map(|m| m.exit_time).collect();
@@ -398,26 +463,39 @@ fn futures_and_pasts_meet_at_a_two_fold_anywhere() {
         near(*found, want, 1e-12, "equal ratios");
     }
     for member in &family.members {
-        let exit = member.trajectory.events.iter().find(|e| matches!(e.kind, EventKind::Exit { .. })).unwrap();
+        let exit = member
+            .trajectory
+            .events
+            .iter()
+            .find(|e| matches!(e.kind, EventKind::Exit { .. }))
+            .unwrap();
         near(exit.t - family.t, member.exit_time, 1e-12, "exit");
         assert_eq!(exit.to, Some(member.side.into()));
     }
-    let only = family.members_on(&system, &settings, &FunnelGrid { times: 1, ..grid }, Some(Side::Plus)).unwrap();
+    let only = family
+        .members_on(&system, &settings, &FunnelGrid { times: 1, ..grid }, Some(Side::Plus))
+        .unwrap();
     assert!(only.len() == 1 && only[0].exit_time == 0.4 && only[0].side == Side::Plus);
 }
 
 #[test]
 fn a_start_on_a_visible_fold_flies_off_along_it() {
-    // f+ = (y, 1, 0) and f- = (-z, 0, 1): from a fold of one side, where the other points to the same side.
+    // f+ = (y, 1, 0) and f- = (-z, 0, 1): from a fold of one side, where the other points to the
+    // same side.
     let system = fold(-1.0, -1.0, 0.0, 0.0);
-    for (start, side, end) in
-        [([0.0, 0.0, -0.5], Side::Plus, [0.5, 1.0, -0.5]), ([0.0, -0.5, 0.0], Side::Minus, [-0.5, -0.5, 1.0])]
-    {
+    for (start, side, end) in [
+        ([0.0, 0.0, -0.5], Side::Plus, [0.5, 1.0, -0.5]),
+        ([0.0, -0.5, 0.0], Side::Minus, [-0.5, -0.5, 1.0]),
+    ] {
         let mut seen = Trajectory::new(1);
         let rule = ExitRule::AtOnce { side: Side::Plus };
-        let summary = run(&system, start.into(), 1.0, &FilippovOptions::default(), rule, &mut seen).unwrap();
+        let summary =
+            run(&system, start.into(), 1.0, &FilippovOptions::default(), rule, &mut seen).unwrap();
         assert_eq!(seen.events.len(), 1, "{:?}", seen.events);
-        assert_eq!((seen.events[0].kind, seen.events[0].to), (EventKind::StartedOnSurface, Some(side.into())));
+        assert_eq!(
+            (seen.events[0].kind, seen.events[0].to),
+            (EventKind::StartedOnSurface, Some(side.into()))
+        );
         assert!((summary.x - SVector::from(end)).amax() < 1e-11, "{}", summary.x);
     }
 }
@@ -433,13 +511,19 @@ fn a_budget_is_an_error_where_it_is_asked_to_be() {
         statistics: Statistics { steps: 7, ..Statistics::default() },
     };
     let failure = Failure::TooManySteps { t: 1.5, limit: 7, state: vec![1.0, 2.0] };
-    assert_eq!(summary(StopReason::StepBudget).within_budget(), Err(FilippovError::Stepping(failure)));
-    for stop in [StopReason::EndTime, StopReason::Observer, StopReason::Cancelled, StopReason::SetValued] {
+    assert_eq!(
+        summary(StopReason::StepBudget).within_budget(),
+        Err(FilippovError::Stepping(failure))
+    );
+    for stop in
+        [StopReason::EndTime, StopReason::Observer, StopReason::Cancelled, StopReason::SetValued]
+    {
         assert_eq!(summary(stop).within_budget(), Ok(summary(stop)));
     }
 }
 
-/// A monitor is asked at every event and now and then between steps; when it refuses, the run ends there.
+/// A monitor is asked at every event and now and then between steps; when it refuses, the run ends
+/// there.
 #[test]
 fn a_watch_ends_a_run() {
     struct Until(f64);
@@ -453,7 +537,16 @@ fn a_watch_ends_a_run() {
     let rule = ExitRule::AtOnce { side: Side::Plus };
     let ends = |until: f64| {
         let mut seen = Trajectory::new(1);
-        let end = run_watched(&system, vector![0.0, 0.3, 0.8], 3.0, &settings, rule, &mut seen, &Until(until)).unwrap();
+        let end = run_watched(
+            &system,
+            vector![0.0, 0.3, 0.8],
+            3.0,
+            &settings,
+            rule,
+            &mut seen,
+            &Until(until),
+        )
+        .unwrap();
         (end.stop, end.t, seen.events)
     };
     let (stop, t, events) = ends(f64::INFINITY);
@@ -469,7 +562,8 @@ fn a_watch_ends_a_run() {
 
 #[test]
 fn exit_rules_have_numbers_that_make_sense_and_words() {
-    let random = |law, plus_probability| ExitRule::Random { law, plus_probability, seed: 1, stream: 2 };
+    let random =
+        |law, plus_probability| ExitRule::Random { law, plus_probability, seed: 1, stream: 2 };
     let uniform = |longest| SlidingLaw::Uniform { longest };
     let exponential = |mean| SlidingLaw::Exponential { mean };
     let side = Side::Minus;
@@ -497,5 +591,8 @@ fn exit_rules_have_numbers_that_make_sense_and_words() {
         assert!(said.contains(what), "{bad}: {said}");
     }
     assert_eq!(ExitRule::AtOnce { side }.to_string(), "at-once:minus");
-    assert_eq!(ExitRule::AfterTime { time: 0.3, side: Side::Plus }.to_string(), "after-time:0.3:plus");
+    assert_eq!(
+        ExitRule::AfterTime { time: 0.3, side: Side::Plus }.to_string(),
+        "after-time:0.3:plus"
+    );
 }

@@ -10,7 +10,8 @@ use crate::step::{Flow, Step};
 pub struct Piece<const N: usize> {
     /// The mode.
     pub mode: Mode,
-    /// Times and states, from the event that began the piece to the event that ended it, both included.
+    /// Times and states, from the event that began the piece to the event that ended it, both
+    /// included.
     pub points: Vec<(f64, SVector<f64, N>)>,
 }
 
@@ -52,8 +53,9 @@ impl<const N: usize> Trajectory<N> {
         self
     }
 
-    /// The trajectory of the reversed system ([`Reversed`](twofold_system::Reversed)) as one of the original: order turned round,
-    /// time t becomes `origin` - t, attracting and repelling change places. Events are dropped: an end is not a beginning.
+    /// The trajectory of the reversed system ([`Reversed`](twofold_system::Reversed)) as one of the
+    /// original: order turned round, time t becomes `origin` - t, attracting and repelling change
+    /// places. Events are dropped: an end is not a beginning.
     pub fn turned(mut self, origin: f64) -> Self {
         self.events.clear();
         self.pieces.reverse();

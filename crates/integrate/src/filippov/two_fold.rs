@@ -1,22 +1,27 @@
-//! The sliding flow at a two-fold: linearisation, the invariant curve through it, and the time of passage.
+//! The sliding flow at a two-fold: linearisation, the invariant curve through it, and the time of
+//! passage.
 //!
-//! In the coordinates p = L+h, q = L-h the desingularised flow x' = F(x) is, to first order at the two-fold,
+//! In the coordinates p = L+h, q = L-h the desingularised flow x' = F(x) is, to first order at the
+//! two-fold,
 //!
 //! ```text
 //! p' = -(L-L+h) p + (L+²h) q,      q' = -(L-²h) p + (L+L-h) q,      dt/ds = q - p,
 //! ```
 //!
-//! with the second Lie derivatives taken at the two-fold. For the normal form (4), p = -y and q = z, the eigenvalues mu
-//! solve mu² - (v + w) mu + vw - 1 = 0. An orbit that runs into the point along an eigenvector with mu < 0 never arrives in s,
-//! but needs only the finite time int (q - p) ds; for the linear flow this is -(-1, 1) A^-1 (p, q).
+//! with the second Lie derivatives taken at the two-fold. For the normal form (4), p = -y and q =
+//! z, the eigenvalues mu solve mu² - (v + w) mu + vw - 1 = 0. An orbit that runs into the point
+//! along an eigenvector with mu < 0 never arrives in s, but needs only the finite time int (q - p)
+//! ds; for the linear flow this is -(-1, 1) A^-1 (p, q).
 //!
-//! Along one eigenvector there is an analytic invariant curve W(sigma) with F(W) = mu sigma W' (the parameterisation
-//! method of Cabre, Fontich & de la Llave 2005), and physical time along it is the series t(sigma) = sum g_k
-//! sigma^k/(k mu), where sum g_k sigma^k is q - p on W. sigma > 0 lies in the attracting region and sigma < 0 in the
-//! repelling one, so t(sigma) runs from negative to positive through the singularity: the curve is the analytic
-//! continuation of sliding through it. All other sliding orbits of a node touch this curve at the two-fold to an order
-//! mu_strong/mu_weak (7.8 for v = -1.2, w = -1.4): each one of them is another future in the repelling region, all of them
-//! indistinguishable from W near the point. [`funnel`](super::funnel) and the exit rules follow W.
+//! Along one eigenvector there is an analytic invariant curve W(sigma) with F(W) = mu sigma W' (the
+//! parameterisation method of Cabre, Fontich & de la Llave 2005), and physical time along it is the
+//! series t(sigma) = sum g_k sigma^k/(k mu), where sum g_k sigma^k is q - p on W. sigma > 0 lies in
+//! the attracting region and sigma < 0 in the repelling one, so t(sigma) runs from negative to
+//! positive through the singularity: the curve is the analytic continuation of sliding through it.
+//! All other sliding orbits of a node touch this curve at the two-fold to an order
+//! mu_strong/mu_weak (7.8 for v = -1.2, w = -1.4): each one of them is another future in the
+//! repelling region, all of them indistinguishable from W near the point. [`funnel`](super::funnel)
+//! and the exit rules follow W.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -38,7 +43,8 @@ const TERMS: usize = 24;
 pub struct Eigendirection<const N: usize> {
     /// The eigenvalue mu, in rescaled time.
     pub rate: f64,
-    /// (L+h, L-h) along the direction; points into the attracting region (L+h < 0 < L-h) where that is possible.
+    /// (L+h, L-h) along the direction; points into the attracting region (L+h < 0 < L-h) where that
+    /// is possible.
     pub lie: [f64; 2],
     /// The unit vector in state space, tangent to the surface.
     pub vector: SVector<f64, N>,
@@ -71,12 +77,15 @@ pub struct SlidingAtTwoFold<const N: usize> {
     pub second: [f64; 4],
     /// The eigendirections, weak one (smaller |mu|) first; `None` if the eigenvalues are complex.
     pub directions: Option<[Eigendirection<N>; 2]>,
-    /// The invariant curve along a sliding eigendirection with mu < 0 (the weak one if there are two): motion along it goes
-    /// from the attracting region through the two-fold into the repelling one.
+    /// The invariant curve along a sliding eigendirection with mu < 0 (the weak one if there are
+    /// two): motion along it goes from the attracting region through the two-fold into the
+    /// repelling one.
     pub through: Option<InvariantCurve<N>>,
-    /// The same with mu > 0: motion along it goes from the repelling region into the attracting one.
+    /// The same with mu > 0: motion along it goes from the repelling region into the attracting
+    /// one.
     pub back: Option<InvariantCurve<N>>,
-    /// The distance over which the local description holds: the curve's radius but at most 1; 1e-3 without a curve.
+    /// The distance over which the local description holds: the curve's radius but at most 1; 1e-3
+    /// without a curve.
     pub radius: f64,
 }
 
@@ -104,7 +113,8 @@ impl<const N: usize> InvariantCurve<N> {
         self.time.iter().rev().fold(0.0, |sum, c| sum * sigma + c)
     }
 
-    /// sigma at time `t` after the two-fold, |sigma| within `limit`; the end of that range if `t` is beyond it.
+    /// sigma at time `t` after the two-fold, |sigma| within `limit`; the end of that range if `t`
+    /// is beyond it.
     pub fn sigma(&self, t: f64, limit: f64) -> f64 {
         if t == 0.0 {
             return 0.0;
@@ -133,7 +143,8 @@ impl<const N: usize> Interpolant<N> for AlongCurve<'_, N> {
 }
 
 impl<const N: usize> SlidingAtTwoFold<N> {
-    /// The sliding flow at the two-fold near `guess`; `None` if there is none that Newton's method finds from there.
+    /// The sliding flow at the two-fold near `guess`; `None` if there is none that Newton's method
+    /// finds from there.
     pub fn near<P: PiecewiseSmooth<N>>(system: &P, guess: &SVector<f64, N>) -> Option<Self> {
         two_fold(system, guess).ok().and_then(|fold| Self::at(system, fold.point))
     }
@@ -142,7 +153,8 @@ impl<const N: usize> SlidingAtTwoFold<N> {
     pub fn at<P: PiecewiseSmooth<N>>(system: &P, point: SVector<f64, N>) -> Option<Self> {
         let rows = fold_conditions(system, &point);
         let (plus, minus) = (system.plus(&point), system.minus(&point));
-        let along = |i: usize, f: &SVector<f64, N>| (0..N).map(|j| rows[i].partials[j] * f[j]).sum::<f64>();
+        let along =
+            |i: usize, f: &SVector<f64, N>| (0..N).map(|j| rows[i].partials[j] * f[j]).sum::<f64>();
         let second = [along(1, &plus), along(1, &minus), along(2, &plus), along(2, &minus)];
         let [pp, pm, mp, mm] = second;
         let a = [[-pm, pp], [-mm, mp]];
@@ -162,7 +174,11 @@ impl<const N: usize> SlidingAtTwoFold<N> {
                 }
                 let vector = shortest(&rows, [0.0, lie[0], lie[1]])?;
                 let norm = vector.norm();
-                Some(Eigendirection { rate, lie: [lie[0] / norm, lie[1] / norm], vector: vector / norm })
+                Some(Eigendirection {
+                    rate,
+                    lie: [lie[0] / norm, lie[1] / norm],
+                    vector: vector / norm,
+                })
             };
             directions = Some([direction(weak)?, direction(strong)?]);
         }
@@ -172,13 +188,18 @@ impl<const N: usize> SlidingAtTwoFold<N> {
             Some(invariant_curve(system, &point, &d[index], d[1 - index].rate, index))
         };
         let (through, back) = (curve(-1.0), curve(1.0));
-        let radius = [&through, &back].into_iter().flatten().map(|c| c.radius).fold(f64::INFINITY, f64::min);
+        let radius =
+            [&through, &back].into_iter().flatten().map(|c| c.radius).fold(f64::INFINITY, f64::min);
         let radius = if radius.is_finite() { radius.min(1.0) } else { 1e-3 };
         Some(Self { point, second, directions, through, back, radius })
     }
 
     /// The coefficients of `x` - two-fold along the two eigendirections, to first order.
-    pub fn coordinates<P: PiecewiseSmooth<N>>(&self, system: &P, x: &SVector<f64, N>) -> Option<[f64; 2]> {
+    pub fn coordinates<P: PiecewiseSmooth<N>>(
+        &self,
+        system: &P,
+        x: &SVector<f64, N>,
+    ) -> Option<[f64; 2]> {
         let d = self.directions.as_ref()?;
         let (p, q) = lie_derivatives(system, x);
         let [[a, c], [b, e]] = [d[0].lie, d[1].lie];
@@ -186,9 +207,10 @@ impl<const N: usize> SlidingAtTwoFold<N> {
         Some([(p * e - b * q) / det, (a * q - p * c) / det])
     }
 
-    /// Time of sliding from `x` to the two-fold, and an estimate of its error; `None` if sliding from `x`, in the attracting
-    /// region or (`repelling`) in the repelling one, does not run into it. The leg is the invariant curve's series plus the linear flow across it: its error is of second order in
-    /// the distance, estimated as time times distance over radius.
+    /// Time of sliding from `x` to the two-fold, and an estimate of its error; `None` if sliding
+    /// from `x`, in the attracting region or (`repelling`) in the repelling one, does not run into
+    /// it. The leg is the invariant curve's series plus the linear flow across it: its error is of
+    /// second order in the distance, estimated as time times distance over radius.
     pub fn time_to_arrive<P: PiecewiseSmooth<N>>(
         &self,
         system: &P,
@@ -204,14 +226,19 @@ impl<const N: usize> SlidingAtTwoFold<N> {
         if !contracts && across.abs() > 1e-3 * on.abs() {
             return None;
         }
-        let direct = if contracts { across * (other.lie[1] - other.lie[0]) / -other.rate } else { 0.0 };
+        let direct =
+            if contracts { across * (other.lie[1] - other.lie[0]) / -other.rate } else { 0.0 };
         let time = -curve.time(on) + direct;
         let distance = (x - self.point).norm();
         Some((time, time.abs() * distance / self.radius))
     }
 
     /// How far from the two-fold along the curve, forward in time, the series may be used: |sigma|.
-    pub(super) fn departure_limit<P: PiecewiseSmooth<N>>(&self, system: &P, curve: &InvariantCurve<N>) -> Option<f64> {
+    pub(super) fn departure_limit<P: PiecewiseSmooth<N>>(
+        &self,
+        system: &P,
+        curve: &InvariantCurve<N>,
+    ) -> Option<f64> {
         let mut limit = curve.radius;
         for _ in 0..60 {
             let inside = (1..=16).all(|k| {
@@ -228,7 +255,8 @@ impl<const N: usize> SlidingAtTwoFold<N> {
     }
 }
 
-/// Two folds in one place: both Lie derivatives vanish on the same part of the surface, not only at a point. Always so with two states.
+/// Two folds in one place: both Lie derivatives vanish on the same part of the surface, not only at
+/// a point. Always so with two states.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct FusedFolds<const N: usize> {
     /// L+²h and L-²h.
@@ -240,10 +268,12 @@ pub(super) struct FusedFolds<const N: usize> {
 }
 
 impl<const N: usize> FusedFolds<N> {
-    /// The folds at `x`, where both Lie derivatives vanish; `None` if they vanish apart from each other elsewhere.
+    /// The folds at `x`, where both Lie derivatives vanish; `None` if they vanish apart from each
+    /// other elsewhere.
     pub fn at<P: PiecewiseSmooth<N>>(system: &P, x: &SVector<f64, N>) -> Option<Self> {
         let rows = fold_conditions(system, x);
-        let [normal, of_plus, of_minus] = [0, 1, 2].map(|i| SVector::<f64, N>::from(rows[i].partials));
+        let [normal, of_plus, of_minus] =
+            [0, 1, 2].map(|i| SVector::<f64, N>::from(rows[i].partials));
         let along = |g: SVector<f64, N>| g - normal * (g.dot(&normal) / normal.norm_squared());
         let (a, b) = (along(of_plus), along(of_minus));
         let (aa, ab, bb) = (a.norm_squared(), a.dot(&b), b.norm_squared());
@@ -268,7 +298,8 @@ impl<const N: usize> FusedFolds<N> {
     }
 }
 
-/// The series of the invariant curve along `direction`, order by order: (DF - k mu) W_k = -[F(W_0 + ... + W_(k-1))]_k.
+/// The series of the invariant curve along `direction`, order by order: (DF - k mu) W_k = -[F(W_0 +
+/// ... + W_(k-1))]_k.
 fn invariant_curve<P: PiecewiseSmooth<N>, const N: usize>(
     system: &P,
     point: &SVector<f64, N>,
@@ -300,12 +331,14 @@ fn invariant_curve<P: PiecewiseSmooth<N>, const N: usize>(
             }
         }
     }
-    let coefficients: Vec<_> = (0..terms).map(|k| SVector::<f64, N>::from_fn(|i, _| w[i].c[k])).collect();
+    let coefficients: Vec<_> =
+        (0..terms).map(|k| SVector::<f64, N>::from_fn(|i, _| w[i].c[k])).collect();
     let (_, rate) = desingularised(system, &w);
     let time = (0..terms).map(|k| if k == 0 { 0.0 } else { rate.c[k] / (k as f64 * mu) }).collect();
     let mut curve = InvariantCurve { rate: mu, index, radius: 0.0, coefficients, time };
 
-    // The first guess at the radius comes from the last terms; the invariance equation itself then decides.
+    // The first guess at the radius comes from the last terms; the invariance equation itself then
+    // decides.
     let mut radius = 1e3_f64;
     for k in terms.saturating_sub(4).max(2)..terms {
         let c = curve.coefficients[k].amax();
@@ -313,15 +346,20 @@ fn invariant_curve<P: PiecewiseSmooth<N>, const N: usize>(
             radius = radius.min(pow(1e-12 / c, 1.0 / (k - 1) as f64));
         }
     }
-    let slope =
-        |s: f64| (1..terms).rev().fold(SVector::<f64, N>::zeros(), |sum, k| sum * s + curve.coefficients[k] * k as f64);
+    let slope = |s: f64| {
+        (1..terms)
+            .rev()
+            .fold(SVector::<f64, N>::zeros(), |sum, k| sum * s + curve.coefficients[k] * k as f64)
+    };
     let holds = |s: f64| {
         let (f, _) = desingularised(system, &curve.at(s));
         let wanted = slope(s) * (mu * s);
         (f - wanted).amax() <= 1e-12 * wanted.amax().max(1e-3 * mu.abs())
     };
     // After a resonance only the tangent may be left, which holds to the square of the distance.
-    while radius > 1e-12 && !(holds(radius) && holds(-radius) && holds(0.5 * radius) && holds(-0.5 * radius)) {
+    while radius > 1e-12
+        && !(holds(radius) && holds(-radius) && holds(0.5 * radius) && holds(-0.5 * radius))
+    {
         radius *= 0.9;
     }
     curve.radius = radius;

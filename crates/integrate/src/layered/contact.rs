@@ -31,11 +31,12 @@ impl Contact {
         Self { count, to_bernstein }
     }
 
-    /// The first zero in (0, 1] of the polynomial with the coefficients `c`, positive at 0 (or zero there and then positive: then the next one),
-    /// to the last bits; none if it stays positive. Two zeros closer together than rounding can tell may be missed.
+    /// The first zero in (0, 1] of the polynomial with the coefficients `c`, positive at 0 (or zero
+    /// there and then positive: then the next one), to the last bits; none if it stays positive.
+    /// Two zeros closer together than rounding can tell may be missed.
     ///
-    /// Bernstein coefficients of one sign prove that there is none, one change of sign that there is exactly one (Lane & Riesenfeld 1981);
-    /// else the interval is halved, left half first.
+    /// Bernstein coefficients of one sign prove that there is none, one change of sign that there
+    /// is exactly one (Lane & Riesenfeld 1981); else the interval is halved, left half first.
     pub fn first(&self, c: &[f64]) -> Option<f64> {
         let rest = |from: usize| c[from..].iter().map(|c| c.abs()).sum::<f64>();
         let simple = c[0] == 0.0;
@@ -54,7 +55,14 @@ impl Contact {
         self.first_in(&reduced, bernstein, 0.0, 1.0, 0)
     }
 
-    fn first_in(&self, c: &[f64; MOST], bernstein: [f64; MOST], a: f64, b: f64, depth: usize) -> Option<f64> {
+    fn first_in(
+        &self,
+        c: &[f64; MOST],
+        bernstein: [f64; MOST],
+        a: f64,
+        b: f64,
+        depth: usize,
+    ) -> Option<f64> {
         let used = &bernstein[..self.count];
         let signs = used.iter().filter(|v| **v != 0.0).map(|v| *v > 0.0);
         let changes = signs.clone().zip(signs.skip(1)).filter(|(x, y)| x != y).count();
@@ -82,7 +90,8 @@ impl Contact {
             }
         }
         let middle = 0.5 * (a + b);
-        self.first_in(c, left, a, middle, depth + 1).or_else(|| self.first_in(c, right, middle, b, depth + 1))
+        self.first_in(c, left, a, middle, depth + 1)
+            .or_else(|| self.first_in(c, right, middle, b, depth + 1))
     }
 }
 
@@ -110,7 +119,9 @@ mod tests {
             let c = polynomial(scale, zeros);
             Contact::new(c.len()).first(&c)
         };
-        let near = |found: Option<f64>, want: f64| assert!((found.unwrap() - want).abs() < 1e-9, "{found:?} {want}");
+        let near = |found: Option<f64>, want: f64| {
+            assert!((found.unwrap() - want).abs() < 1e-9, "{found:?} {want}")
+        };
         near(first(-1.0, &[0.4]), 0.4);
         near(first(1.0, &[0.4, 0.3]), 0.3);
         near(first(-1.0, &[0.8, 0.401, 0.4]), 0.4);

@@ -1,4 +1,5 @@
-//! A layer that is crossed: the states as functions of its variable, by collocation in all its parts at once.
+//! A layer that is crossed: the states as functions of its variable, by collocation in all its
+//! parts at once.
 
 use nalgebra::SVector;
 use pulp::bytemuck::cast_slice;
@@ -37,7 +38,8 @@ pub(super) struct Layer<const N: usize> {
     known: Vec<Section>,
 }
 
-/// Neighbouring parts on the way of v from -edge to edge, where v is u or, downwards, -u: the same numbers both ways, since tanh is odd.
+/// Neighbouring parts on the way of v from -edge to edge, where v is u or, downwards, -u: the same
+/// numbers both ways, since tanh is odd.
 #[derive(Clone, Default)]
 pub(super) struct Section {
     /// Where it begins, where it ends.
@@ -57,7 +59,11 @@ impl Section {
         let count = (points.len() - 1).min(PARTS);
         let mut section = Self { from: points[0], to: points[count], count, ..Self::default() };
         for part in 0..PARTS {
-            let (from, to) = if part < count { (points[part], points[part + 1]) } else { (section.to, section.to) };
+            let (from, to) = if part < count {
+                (points[part], points[part + 1])
+            } else {
+                (section.to, section.to)
+            };
             section.starts[part] = from;
             section.halves[part] = 0.5 * (to - from);
             for (j, there) in stages(from, to).iter().enumerate() {
@@ -75,7 +81,8 @@ fn stages(from: f64, to: f64) -> Stages {
 }
 
 impl<const N: usize> Layer<N> {
-    /// The layer between -`edge` and `edge`, in parts on which tanh alone lets the collocation be as exact as is wanted.
+    /// The layer between -`edge` and `edge`, in parts on which tanh alone lets the collocation be
+    /// as exact as is wanted.
     pub fn new(gradient: SVector<f64, N>, constant: f64, edge: f64, atol: f64) -> Self {
         let gauss = Gauss::get();
         // A unit of u in units of the state.
@@ -94,12 +101,17 @@ impl<const N: usize> Layer<N> {
             half.push(to);
             from = to;
         }
-        let points: Vec<f64> = half[1..].iter().rev().map(|p| -p).chain(half.iter().copied()).collect();
-        let known = (0..points.len() - 1).step_by(PARTS).map(|first| Section::new(&points[first..])).collect();
+        let points: Vec<f64> =
+            half[1..].iter().rev().map(|p| -p).chain(half.iter().copied()).collect();
+        let known = (0..points.len() - 1)
+            .step_by(PARTS)
+            .map(|first| Section::new(&points[first..]))
+            .collect();
         Self { gradient, constant, points, known }
     }
 
-    /// The next parts of the way from `v`, each halved so many times, and made in `place` unless they are known.
+    /// The next parts of the way from `v`, each halved so many times, and made in `place` unless
+    /// they are known.
     pub fn section<'a>(&'a self, v: f64, halvings: u32, place: &'a mut Section) -> &'a Section {
         if halvings == 0
             && let Some(known) = self.known.iter().find(|known| known.from == v)
@@ -108,12 +120,20 @@ impl<const N: usize> Layer<N> {
         }
         let pieces = 1 << halvings;
         let mut points = vec![v];
-        for next in self.points.iter().copied().filter(|p| *p > v + LEAST).chain(self.points.last().copied()) {
+        for next in self
+            .points
+            .iter()
+            .copied()
+            .filter(|p| *p > v + LEAST)
+            .chain(self.points.last().copied())
+        {
             let last = points[points.len() - 1];
             if next <= last || points.len() > PARTS {
                 break;
             }
-            points.extend((1..pieces).map(|i| last + (next - last) * f64::from(i) / f64::from(pieces)));
+            points.extend(
+                (1..pieces).map(|i| last + (next - last) * f64::from(i) / f64::from(pieces)),
+            );
             points.push(next);
         }
         *place = Section::new(&points);
@@ -182,7 +202,8 @@ impl<const N: usize> Crossing<N> {
                 low = s;
             }
             let step = excess / (half * gauss::sum(&rate, s));
-            let next = if (low..=high).contains(&(s - step)) { s - step } else { 0.5 * (low + high) };
+            let next =
+                if (low..=high).contains(&(s - step)) { s - step } else { 0.5 * (low + high) };
             if (next - s).abs() <= 4.0 * f64::EPSILON {
                 s = next;
                 break;
@@ -229,7 +250,8 @@ impl<const N: usize> Interpolant<N> for Crossing<N> {
     }
 }
 
-/// A crossing to compute, all parts side by side in the machine's own instructions: each lane rounds by itself, so that they change no bit.
+/// A crossing to compute, all parts side by side in the machine's own instructions: each lane
+/// rounds by itself, so that they change no bit.
 pub(super) struct Collocation<'a, F, const N: usize> {
     pub field: &'a F,
     pub layer: &'a Layer<N>,
@@ -262,7 +284,8 @@ impl<F: VectorField<N>, const N: usize> Collocation<'_, F, N> {
 }
 
 impl Gauss {
-    /// The integral of component `i`'s slopes from each part's start to stage `j`, for parts that are as long as they are for [`Gauss`].
+    /// The integral of component `i`'s slopes from each part's start to stage `j`, for parts that
+    /// are as long as they are for [`Gauss`].
     #[allow(clippy::needless_range_loop)]
     #[inline(always)]
     fn along<S: Simd, const N: usize, const K: usize>(
@@ -272,7 +295,8 @@ impl Gauss {
         i: usize,
         j: usize,
     ) -> Registers<S, K> {
-        let mut sum = Registers::splat(set, self.integrals[0][j]) * Registers::new(set, slopes[0][i]);
+        let mut sum =
+            Registers::splat(set, self.integrals[0][j]) * Registers::new(set, slopes[0][i]);
         for m in 1..STAGES {
             sum += Registers::splat(set, self.integrals[m][j]) * Registers::new(set, slopes[m][i]);
         }
@@ -283,11 +307,13 @@ impl Gauss {
 impl<F: VectorField<N>, const N: usize, const K: usize> WithSimd for In<Collocation<'_, F, N>, K> {
     type Output = (bool, u64);
 
-    // Loops by number: iterators and closures may stay calls, compiled for the wrong instruction set.
+    // Loops by number: iterators and closures may stay calls, compiled for the wrong instruction
+    // set.
     #[allow(clippy::needless_range_loop)]
     #[inline(always)]
     fn with_simd<S: Simd>(self, set: S) -> Self::Output {
-        let Collocation { field, layer, section, direction, tolerance, x0, ends, crossing } = self.0;
+        let Collocation { field, layer, section, direction, tolerance, x0, ends, crossing } =
+            self.0;
         let gauss = Gauss::get();
         let number = |value: f64| Registers::<S, K>::splat(set, value);
         let lanes = |values: &Parts| Registers::<S, K>::load(set, values);
@@ -319,7 +345,8 @@ impl<F: VectorField<N>, const N: usize, const K: usize> WithSimd for In<Collocat
                     // As if the state did not change, and only tanh did.
                     for i in 0..N {
                         let (low, high) = (ends[0][i], ends[1][i]);
-                        f[i] = number(0.5 * (low + high)) + number(0.5 * (high - low)) * full(tanh[j]);
+                        f[i] =
+                            number(0.5 * (low + high)) + number(0.5 * (high - low)) * full(tanh[j]);
                     }
                 } else {
                     let mut x = SVector::<_, N>::from_element(Given::new(zero, full(tanh[j])));
@@ -370,7 +397,8 @@ impl<F: VectorField<N>, const N: usize, const K: usize> WithSimd for In<Collocat
                     // NaN must not be lost, as it is in a comparison.
                     no_number = far.at_most(number(f64::INFINITY), set).select(no_number, far);
                 }
-                (first[i], last[i], states[MIDDLE][i]) = (start.parts(), end.parts(), middle.parts());
+                (first[i], last[i], states[MIDDLE][i]) =
+                    (start.parts(), end.parts(), middle.parts());
             }
             let mut change = 0.0_f64;
             for far in bare(moved + no_number) {
@@ -380,7 +408,8 @@ impl<F: VectorField<N>, const N: usize, const K: usize> WithSimd for In<Collocat
             if sweep > 0 {
                 before = change;
             }
-            // What is left is about change * contraction / (1 - contraction); of the first iteration nothing is known.
+            // What is left is about change * contraction / (1 - contraction); of the first
+            // iteration nothing is known.
             if sweep > 0 && (contraction < 0.5 && change * contraction <= 0.02 || change <= 0.02) {
                 let mut error = 0.0_f64;
                 for i in 0..N {
@@ -393,7 +422,9 @@ impl<F: VectorField<N>, const N: usize, const K: usize> WithSimd for In<Collocat
                         let coefficient = coefficient.size();
                         rough = rough.less(coefficient, set).select(coefficient, rough);
                     }
-                    for slope in [rough, full(slopes[0][i]).size(), full(slopes[STAGES - 1][i]).size()] {
+                    for slope in
+                        [rough, full(slopes[0][i]).size(), full(slopes[STAGES - 1][i]).size()]
+                    {
                         size = size.less(slope, set).select(slope, size);
                     }
                     // At the end the method is of twice the order.
@@ -418,7 +449,8 @@ impl<F: VectorField<N>, const N: usize, const K: usize> WithSimd for In<Collocat
                 for part in 0..PARTS {
                     crossing.times[part + 1] = crossing.times[part] + durations[part];
                 }
-                (crossing.count, crossing.from, crossing.halves) = (section.count, section.starts, section.halves);
+                (crossing.count, crossing.from, crossing.halves) =
+                    (section.count, section.starts, section.halves);
                 crossing.duration = crossing.times[section.count];
                 return (error <= 1.0, evaluations);
             }

@@ -1,5 +1,5 @@
-//! Gauss collocation with eight stages: order 16 at the end of a step (Kuntzmann 1961; Butcher 1964; Hairer, Norsett & Wanner 1993,
-//! sec. II.7), and the polynomial of degree 8 in between.
+//! Gauss collocation with eight stages: order 16 at the end of a step (Kuntzmann 1961; Butcher
+//! 1964; Hairer, Norsett & Wanner 1993, sec. II.7), and the polynomial of degree 8 in between.
 
 use std::sync::OnceLock;
 
@@ -8,8 +8,9 @@ use twofold_num::elementary::cos;
 /// Stages.
 pub(super) const STAGES: usize = 8;
 
-/// How much smaller than its last Legendre coefficients the error of the integral is between the stages: the next coefficient, some six times smaller, times
-/// the integral of its polynomial, at most 1.5/(2 k + 1).
+/// How much smaller than its last Legendre coefficients the error of the integral is between the
+/// stages: the next coefficient, some six times smaller, times the integral of its polynomial, at
+/// most 1.5/(2 k + 1).
 pub(super) const BETWEEN: f64 = 0.25 / (2 * STAGES + 1) as f64;
 
 /// A number for each stage.
@@ -23,7 +24,8 @@ pub(super) struct Gauss {
     pub weights: Stages,
     /// `integrals[m][j]`: integral from -1 to node j of the Lagrange polynomial of node m.
     pub integrals: [Stages; STAGES],
-    /// `legendre[k][m]`: what a value at node m contributes to the Legendre coefficient k of the polynomial through the values.
+    /// `legendre[k][m]`: what a value at node m contributes to the Legendre coefficient k of the
+    /// polynomial through the values.
     pub legendre: [Stages; STAGES],
     /// Largest absolute value on [-1, 1] of a polynomial whose values at the nodes are at most 1.
     pub lebesgue: f64,
@@ -49,7 +51,8 @@ impl Gauss {
 
     fn made() -> Self {
         let n = STAGES as f64;
-        let slope = |x: f64, p: &[f64; STAGES + 1]| n * (x * p[STAGES] - p[STAGES - 1]) / (x * x - 1.0);
+        let slope =
+            |x: f64, p: &[f64; STAGES + 1]| n * (x * p[STAGES] - p[STAGES - 1]) / (x * x - 1.0);
         let nodes: Stages = std::array::from_fn(|j| {
             let mut x = -cos(std::f64::consts::PI * (j as f64 + 0.75) / (n + 0.5));
             for _ in 0..10 {
@@ -63,8 +66,9 @@ impl Gauss {
             2.0 / ((1.0 - x * x) * d * d)
         });
         // The Lagrange polynomial of node m is the sum over k of (k + 1/2) w_m P_k(x_m) P_k.
-        let coefficients: [Stages; STAGES] =
-            std::array::from_fn(|k| std::array::from_fn(|m| (k as f64 + 0.5) * weights[m] * legendre(nodes[m])[k]));
+        let coefficients: [Stages; STAGES] = std::array::from_fn(|k| {
+            std::array::from_fn(|m| (k as f64 + 0.5) * weights[m] * legendre(nodes[m])[k])
+        });
         let integrals = std::array::from_fn(|m| {
             nodes.map(|x| {
                 let basis = antiderivatives(x);
@@ -73,7 +77,13 @@ impl Gauss {
         });
         // The largest value is at the ends, where every P_k is 1 (or +-1).
         let at_end = |m: usize| (0..STAGES).map(|k| coefficients[k][m]).sum::<f64>().abs();
-        Self { nodes, weights, integrals, legendre: coefficients, lebesgue: (0..STAGES).map(at_end).sum() }
+        Self {
+            nodes,
+            weights,
+            integrals,
+            legendre: coefficients,
+            lebesgue: (0..STAGES).map(at_end).sum(),
+        }
     }
 
     /// The Legendre coefficients of the polynomial through the `values` at the nodes.
@@ -81,7 +91,8 @@ impl Gauss {
         self.legendre.map(|row| row.iter().zip(values).map(|(a, b)| a * b).sum())
     }
 
-    /// The last two Legendre coefficients, the larger one's size: how far the values are from a polynomial of smaller degree.
+    /// The last two Legendre coefficients, the larger one's size: how far the values are from a
+    /// polynomial of smaller degree.
     pub fn roughness(&self, values: &Stages) -> f64 {
         let [a, b] = [STAGES - 2, STAGES - 1]
             .map(|k| self.legendre[k].iter().zip(values).map(|(a, b)| a * b).sum::<f64>().abs());
@@ -92,7 +103,9 @@ impl Gauss {
 /// Integrals from -1 to x of Legendre's polynomials of degrees 0 to 7.
 pub(super) fn antiderivatives(x: f64) -> Stages {
     let p = legendre(x);
-    std::array::from_fn(|k| if k == 0 { x + 1.0 } else { (p[k + 1] - p[k - 1]) / (2 * k + 1) as f64 })
+    std::array::from_fn(
+        |k| if k == 0 { x + 1.0 } else { (p[k + 1] - p[k - 1]) / (2 * k + 1) as f64 },
+    )
 }
 
 /// The sum of Legendre's polynomials at x.
@@ -113,7 +126,9 @@ mod tests {
     fn integrates_polynomials_exactly() {
         let gauss = Gauss::get();
         // Degree 15 over the whole interval.
-        let whole = |f: fn(f64) -> f64| gauss.nodes.iter().zip(gauss.weights).map(|(x, w)| f(*x) * w).sum::<f64>();
+        let whole = |f: fn(f64) -> f64| {
+            gauss.nodes.iter().zip(gauss.weights).map(|(x, w)| f(*x) * w).sum::<f64>()
+        };
         assert!((whole(|x| x.powi(14)) - 2.0 / 15.0).abs() < 1e-15);
         assert!(whole(|x| x.powi(15)).abs() < 1e-15);
         // Degree 7 to every node: x^7 + x^2.

@@ -1,18 +1,24 @@
-//! A method for smoothed switches: outside the layer the equation is a polynomial, inside it the layer's own variable is the clock.
+//! A method for smoothed switches: outside the layer the equation is a polynomial, inside it the
+//! layer's own variable is the clock.
 //!
-//! A smoothed system x' = f(x, tanh u), u = h(x)/eps, is two equations in one. Where |u| exceeds an *edge*, tanh is +-1 to far below the
-//! tolerance, and if f is a polynomial in x there ([`Flow`]), its solutions have cheap Taylor series of any order: long steps,
-//! as in [`Taylor`](super::Taylor) (Jorba & Zou 2005), and where such a step meets the edge is a zero of a polynomial, found with certainty
-//! (`Contact`). Inside, an orbit that crosses the layer does so in a time of order eps, in which x hardly moves while tanh runs from one end to the
-//! other: as a function of u, dx/du = f/u' is smooth, small, and has tanh at places that are known beforehand. Eight-stage Gauss collocation in u
-//! (`Gauss`, order 16) on a few fixed parts of the layer, all parts side by side, solved by a few fixed-point iterations, does it: one step. (Taking a component of the state as
+//! A smoothed system x' = f(x, tanh u), u = h(x)/eps, is two equations in one. Where |u| exceeds an
+//! *edge*, tanh is +-1 to far below the tolerance, and if f is a polynomial in x there ([`Flow`]),
+//! its solutions have cheap Taylor series of any order: long steps, as in [`Taylor`](super::Taylor)
+//! (Jorba & Zou 2005), and where such a step meets the edge is a zero of a polynomial, found with
+//! certainty (`Contact`). Inside, an orbit that crosses the layer does so in a time of order eps,
+//! in which x hardly moves while tanh runs from one end to the other: as a function of u, dx/du =
+//! f/u' is smooth, small, and has tanh at places that are known beforehand. Eight-stage Gauss
+//! collocation in u (`Gauss`, order 16) on a few fixed parts of the layer, all parts side by side,
+//! solved by a few fixed-point iterations, does it: one step. (Taking a component of the state as
 //! clock to land on a surface: Henon 1982.)
 //!
-//! An orbit that does not cross - it slides along the layer, or touches it and turns back - is followed through it by
-//! [`Dopri5`] in time, with steps that move u by [`STRIDE`] at most, and with tanh u for a state beside the others (`Sliding`). Where u is not a sum of
-//! states every orbit is followed so through the layer, and by [`Dopri5`] alone.
+//! An orbit that does not cross - it slides along the layer, or touches it and turns back - is
+//! followed through it by [`Dopri5`] in time, with steps that move u by [`STRIDE`] at most, and
+//! with tanh u for a state beside the others (`Sliding`). Where u is not a sum of states every
+//! orbit is followed so through the layer, and by [`Dopri5`] alone.
 //!
-//! The edge lies where 1 - tanh u is a hundredth of the tolerance: what is dropped outside is never more than that part of the field.
+//! The edge lies where 1 - tanh u is a hundredth of the tolerance: what is dropped outside is never
+//! more than that part of the field.
 
 mod contact;
 mod crossing;
@@ -36,8 +42,8 @@ use twofold_system::VectorField;
 /// Largest change of u in one time step inside the layer.
 pub const STRIDE: f64 = 4.0;
 
-/// A step in time inside the layer ends there only when u is so far beyond the edge: else an orbit that follows the edge would change methods at
-/// every step.
+/// A step in time inside the layer ends there only when u is so far beyond the edge: else an orbit
+/// that follows the edge would change methods at every step.
 const BEYOND: f64 = 1.0;
 
 /// Jorba & Zou (2005), sec. 3: the step is shortened by exp(-0.7/(p - 1)) for safety.
@@ -129,7 +135,8 @@ struct Polynomial<const N: usize> {
 }
 
 impl<const N: usize> Polynomial<N> {
-    /// The coefficients of degree 0 to `degree` in the fraction of a step of length `h`, from those in time.
+    /// The coefficients of degree 0 to `degree` in the fraction of a step of length `h`, from those
+    /// in time.
     fn scale(&mut self, series: &Series, h: f64, degree: usize) {
         let mut power = 1.0;
         for k in 0..(degree + 1).min(MOST) {
@@ -146,7 +153,8 @@ impl<const N: usize> Interpolant<N> for Polynomial<N> {
     fn at(&self, theta: f64) -> SVector<f64, N> {
         SVector::from_fn(|i, _| self.coordinate(theta, i))
     }
-    // Four polynomials in theta^4 (Estrin 1960): a single one would wait for itself all the way. Beyond the last coefficient are zeros.
+    // Four polynomials in theta^4 (Estrin 1960): a single one would wait for itself all the way.
+    // Beyond the last coefficient are zeros.
     #[inline]
     fn coordinate(&self, theta: f64, i: usize) -> f64 {
         let theta2 = theta * theta;
@@ -162,7 +170,8 @@ impl<const N: usize> Interpolant<N> for Polynomial<N> {
     fn degree(&self) -> usize {
         self.count - 1
     }
-    /// The distance from the chord, term by term: theta - theta^2 is at most 1/4, theta - theta^k less than 1.
+    /// The distance from the chord, term by term: theta - theta^2 is at most 1/4, theta - theta^k
+    /// less than 1.
     fn reach(&self, coordinate: usize) -> f64 {
         let c = &self.coefficients[coordinate];
         0.25 * c[2].abs() + c[3..self.count].iter().map(|c| c.abs()).sum::<f64>()
@@ -190,8 +199,9 @@ impl<const N: usize> Layered<N> {
     /// A stepper with the given tolerances.
     pub fn new(tolerance: Tolerance) -> Self {
         let smallest = tolerance.rtol.min(tolerance.atol).clamp(f64::EPSILON / 16.0, 1e-2);
-        // A degree more costs about as much as the one before: only what is computed now is waited for. So the work per unit of time,
-        // p tolerance^(-1/p), is least near -ln(tolerance), and hardly less than there at the longer half of that.
+        // A degree more costs about as much as the one before: only what is computed now is waited
+        // for. So the work per unit of time, p tolerance^(-1/p), is least near -ln(tolerance), and
+        // hardly less than there at the longer half of that.
         let degree = ((-0.85 * ln(smallest)).ceil() as usize).clamp(8, Series::MOST);
         let zero = SVector::zeros();
         Self {
@@ -225,7 +235,10 @@ impl<const N: usize> Layered<N> {
         let layer = sides[0].linear_argument().and_then(|(gradient, constant)| {
             let gradient = SVector::<f64, N>::from_column_slice(gradient);
             // An argument that is one number everywhere has no layer to cross.
-            gradient.iter().any(|g| *g != 0.0).then(|| Layer::new(gradient, constant, self.edge, self.tolerance.atol))
+            gradient
+                .iter()
+                .any(|g| *g != 0.0)
+                .then(|| Layer::new(gradient, constant, self.edge, self.tolerance.atol))
         });
         self.equation = Some(Equation { tape, sides, layer });
         Ok(())
@@ -263,22 +276,29 @@ impl<const N: usize> Layered<N> {
             return Place::Outside { side: 1.0, leaving: false };
         }
         let u = self.layer_variable();
-        if u.abs() > self.edge { Place::Outside { side: u.signum(), leaving: false } } else { Place::Arrived { u } }
+        if u.abs() > self.edge {
+            Place::Outside { side: u.signum(), leaving: false }
+        } else {
+            Place::Arrived { u }
+        }
     }
 
     /// A step outside; none if there is no room for one, and then the orbit is somewhere else.
     fn outside(&mut self, side: f64, leaving: bool) -> Result<Option<Made>, Failure> {
         let Some(equation) = &self.equation else { return Ok(None) };
-        let (flow, series) = (&equation.sides[usize::from(side > 0.0)], &mut self.series[usize::from(side > 0.0)]);
+        let (flow, series) =
+            (&equation.sides[usize::from(side > 0.0)], &mut self.series[usize::from(side > 0.0)]);
         let (degree, width) = (self.degree, self.degree + 1);
         flow.expand(self.x.as_slice(), degree, series);
         self.statistics.evaluations += degree as u64;
-        // The step that the series allow: the terms of degree p - 1 and p stay below atol + rtol |x|.
+        // The step that the series allow: the terms of degree p - 1 and p stay below atol + rtol
+        // |x|.
         let mut log = f64::NEG_INFINITY;
         for k in [degree - 1, degree] {
             let mut size = 0.0_f64;
             for i in 0..N {
-                let q = series.component(i)[k].abs() / (self.tolerance.atol + self.tolerance.rtol * self.x[i].abs());
+                let q = series.component(i)[k].abs()
+                    / (self.tolerance.atol + self.tolerance.rtol * self.x[i].abs());
                 // NaN must not be lost, as it would be in f64::max.
                 size = if q > size || q.is_nan() { q } else { size };
             }
@@ -370,8 +390,10 @@ impl<const N: usize> Layered<N> {
         let mut reached = None;
         for halvings in 0..HALVINGS {
             let section = layer.section(v, halvings, &mut place);
-            let (tolerance, x0, ends, crossing) = (self.tolerance, self.x, &self.ends, &mut self.crossing);
-            let task = Collocation { field, layer, section, direction, tolerance, x0, ends, crossing };
+            let (tolerance, x0, ends, crossing) =
+                (self.tolerance, self.x, &self.ends, &mut self.crossing);
+            let task =
+                Collocation { field, layer, section, direction, tolerance, x0, ends, crossing };
             let (good, evaluations) = task.solve();
             self.statistics.evaluations += evaluations;
             if good {
@@ -458,7 +480,8 @@ impl<const N: usize> Stepper<N> for Layered<N> {
         if const { N > MOST_STATES } {
             return Err(Self::too_many_states());
         }
-        self.read(field.tape()).map_err(|why| Failure::NotApplicable { method: "layered", why: why.to_string() })?;
+        self.read(field.tape())
+            .map_err(|why| Failure::NotApplicable { method: "layered", why: why.to_string() })?;
         self.restart_again(field, t, x, t_end, max_step)
     }
 

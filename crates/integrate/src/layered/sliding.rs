@@ -6,8 +6,9 @@
 //! At each step's end w is set to tanh u (a projection on the invariant w - tanh u, Hairer, Lubich
 //! & Wanner 2006, sec. IV.4), so that errors of w do not accumulate.
 //!
-//! Along an orbit that is held in the layer u hardly moves in a step. Where it does, and near the edge, where 1 - w^2 grows like an exponential,
-//! w would need shorter steps than x: there each stage takes its own tanh.
+//! Along an orbit that is held in the layer u hardly moves in a step. Where it does, and near the
+//! edge, where 1 - w^2 grows like an exponential, w would need shorter steps than x: there each
+//! stage takes its own tanh.
 
 use nalgebra::SVector;
 
@@ -21,14 +22,16 @@ use twofold_num::Given;
 use twofold_num::elementary::{rough_exp2, rough_log2, tanh};
 use twofold_system::VectorField;
 
-/// How far u may seem to move in a step with w for a state. With 0.5 steps are a twentieth more, and the error is larger; with 0.1 nothing is gained.
+/// How far u may seem to move in a step with w for a state. With 0.5 steps are a twentieth more,
+/// and the error is larger; with 0.1 nothing is gained.
 const NEAR: f64 = 0.25;
 
 /// Up to which |w| such steps begin.
 const MIDDLE: f64 = 0.9;
 
-/// The part of the tolerance that a step may err by: with all of it the error at the end is now below, now a fifth above that of [`Dopri5`] alone; with this it is
-/// about half of that, for a tenth more steps.
+/// The part of the tolerance that a step may err by: with all of it the error at the end is now
+/// below, now a fifth above that of [`Dopri5`] alone; with this it is about half of that, for a
+/// tenth more steps.
 const SHARE: f64 = 0.5;
 
 /// What is known of an orbit inside a layer beside what [`Dopri5`] keeps.
@@ -43,7 +46,11 @@ pub(super) struct Sliding {
 
 impl Sliding {
     /// At the state of `inner`, which has just been restarted.
-    pub fn begin<F: VectorField<N>, const N: usize>(inner: &Dopri5<N>, field: &F, layer: &Layer<N>) -> Self {
+    pub fn begin<F: VectorField<N>, const N: usize>(
+        inner: &Dopri5<N>,
+        field: &F,
+        layer: &Layer<N>,
+    ) -> Self {
         let u = layer.gradient.dot(&inner.x) + layer.constant;
         Self { u, w: tanh(u), longest: longest(field, layer, &inner.x) }
     }
@@ -82,8 +89,14 @@ impl Sliding {
             let k7 = at(field, &x1, w);
             inner.statistics.evaluations += 6;
 
-            let e = k1 * (h * E1) + k3 * (h * E3) + k4 * (h * E4) + k5 * (h * E5) + k6 * (h * E6) + k7 * (h * E7);
-            let square = inner.mean_square(&e, |i| x0[i].abs().max(x1[i].abs())) * (1.0 / (SHARE * SHARE));
+            let e = k1 * (h * E1)
+                + k3 * (h * E3)
+                + k4 * (h * E4)
+                + k5 * (h * E5)
+                + k6 * (h * E6)
+                + k7 * (h * E7);
+            let square =
+                inner.mean_square(&e, |i| x0[i].abs().max(x1[i].abs())) * (1.0 / (SHARE * SHARE));
             if !square.is_finite() || !finite(&x1) || !finite(&k7) {
                 inner.statistics.rejected += 1;
                 inner.h = h * 0.1;
@@ -95,9 +108,10 @@ impl Sliding {
             }
             let log = rough_log2(square.max(control::LEAST_SQUARE));
             if square <= 1.0 {
-                let factor = (rough_exp2(0.5 * (control::ALPHA * log - control::BETA * inner.last_log))
-                    / control::SAFETY)
-                    .clamp(1.0 / control::GROW, 1.0 / control::SHRINK);
+                let factor =
+                    (rough_exp2(0.5 * (control::ALPHA * log - control::BETA * inner.last_log))
+                        / control::SAFETY)
+                        .clamp(1.0 / control::GROW, 1.0 / control::SHRINK);
                 let next = h / factor;
                 inner.h = if rejected_before { next.min(h) } else { next };
                 inner.last_log = log.max(control::LEAST_LOG);
@@ -118,14 +132,22 @@ impl Sliding {
 
 /// The field where tanh is `w`.
 #[inline(always)]
-fn at<F: VectorField<N>, const N: usize>(field: &F, x: &SVector<f64, N>, w: f64) -> SVector<f64, N> {
+fn at<F: VectorField<N>, const N: usize>(
+    field: &F,
+    x: &SVector<f64, N>,
+    w: f64,
+) -> SVector<f64, N> {
     let f = field.eval(&x.map(|x| Given::new(x, w)));
     SVector::from_fn(|i, _| f[i].value())
 }
 
 /// The longest step from `x` that moves u by [`STRIDE`] at most, whatever tanh is.
 #[inline(always)]
-fn longest<F: VectorField<N>, const N: usize>(field: &F, layer: &Layer<N>, x: &SVector<f64, N>) -> f64 {
+fn longest<F: VectorField<N>, const N: usize>(
+    field: &F,
+    layer: &Layer<N>,
+    x: &SVector<f64, N>,
+) -> f64 {
     let [minus, plus] = [-1.0, 1.0].map(|w| layer.gradient.dot(&at(field, x, w)).abs());
     STRIDE / minus.max(plus)
 }
@@ -143,11 +165,18 @@ struct Start<'a, F, const N: usize> {
 impl<F: VectorField<N>, const N: usize> Start<'_, F, N> {
     /// The derivatives of x and w, so far away; of w nothing is taken if tanh is to be `EXACT`.
     #[inline(always)]
-    fn derivative<const EXACT: bool>(&self, dx: SVector<f64, N>, dw: f64) -> (SVector<f64, N>, f64) {
+    fn derivative<const EXACT: bool>(
+        &self,
+        dx: SVector<f64, N>,
+        dw: f64,
+    ) -> (SVector<f64, N>, f64) {
         let Self { field, layer, x0, w0, .. } = self;
         let x = x0 + dx;
-        let w =
-            if EXACT { moved(*w0, layer.gradient.dot(&dx), layer.gradient.dot(&x) + layer.constant) } else { w0 + dw };
+        let w = if EXACT {
+            moved(*w0, layer.gradient.dot(&dx), layer.gradient.dot(&x) + layer.constant)
+        } else {
+            w0 + dw
+        };
         let k = at(*field, &x, w);
         (k, (1.0 - w * w) * layer.gradient.dot(&k))
     }
@@ -158,7 +187,8 @@ impl<F: VectorField<N>, const N: usize> Start<'_, F, N> {
         let k1 = self.k1;
         let q1 = (1.0 - self.w0 * self.w0) * self.layer.gradient.dot(&k1);
         let (k2, q2) = self.derivative::<EXACT>(k1 * (h * A21), q1 * (h * A21));
-        let (k3, q3) = self.derivative::<EXACT>(k1 * (h * A31) + k2 * (h * A32), q1 * (h * A31) + q2 * (h * A32));
+        let (k3, q3) = self
+            .derivative::<EXACT>(k1 * (h * A31) + k2 * (h * A32), q1 * (h * A31) + q2 * (h * A32));
         let (k4, q4) = self.derivative::<EXACT>(
             k1 * (h * A41) + k2 * (h * A42) + k3 * (h * A43),
             q1 * (h * A41) + q2 * (h * A42) + q3 * (h * A43),
@@ -171,13 +201,15 @@ impl<F: VectorField<N>, const N: usize> Start<'_, F, N> {
             k1 * (h * A61) + k2 * (h * A62) + k3 * (h * A63) + k4 * (h * A64) + k5 * (h * A65),
             q1 * (h * A61) + q2 * (h * A62) + q3 * (h * A63) + q4 * (h * A64) + q5 * (h * A65),
         );
-        let way = k1 * (h * A71) + k3 * (h * A73) + k4 * (h * A74) + k5 * (h * A75) + k6 * (h * A76);
+        let way =
+            k1 * (h * A71) + k3 * (h * A73) + k4 * (h * A74) + k5 * (h * A75) + k6 * (h * A76);
         ([k3, k4, k5, k6], way)
     }
 }
 
-/// tanh u, `d` away from where tanh is `w`: near by from tanh d, whose series is soon at an end, and the addition theorem, else anew. Roundings of 1 add up
-/// from step to step, but in u they are at most some 1e-12 each, and x is eps times that.
+/// tanh u, `d` away from where tanh is `w`: near by from tanh d, whose series is soon at an end,
+/// and the addition theorem, else anew. Roundings of 1 add up from step to step, but in u they are
+/// at most some 1e-12 each, and x is eps times that.
 #[inline(always)]
 fn moved(w: f64, d: f64, u: f64) -> f64 {
     let d2 = d * d;

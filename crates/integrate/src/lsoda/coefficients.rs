@@ -1,19 +1,21 @@
 //! The two families in Nordsieck form, from their defining polynomials.
 //!
-//! With y_j = h^j x^(j)/j! for j = 0..q, a step is y <- P y + l e, where P is the Pascal triangle (the Taylor
-//! prediction) and e = h f(x) - (P y)_1 the correction. A method is its vector l. Gear (1971) and Hindmarsh (1983)
-//! give l through a generating polynomial L(s) = sum_j l_j s^j, normalised to l_1 = 1:
+//! With y_j = h^j x^(j)/j! for j = 0..q, a step is y <- P y + l e, where P is the Pascal triangle
+//! (the Taylor prediction) and e = h f(x) - (P y)_1 the correction. A method is its vector l. Gear
+//! (1971) and Hindmarsh (1983) give l through a generating polynomial L(s) = sum_j l_j s^j,
+//! normalised to l_1 = 1:
 //!
 //! ```text
 //! Adams-Moulton of order q:  L'(s) = (s + 1)(s + 2)...(s + q - 1) / (q - 1)!,   L(-1) = 0
-//! BDF of order q:            L(s) = (s + 1)(s + 2)...(s + q) / K,               K such that l_1 = 1
+//! BDF of order q:            L(s) = (s + 1)(s + 2)...(s + q) / K,            K such that l_1 = 1
 //! ```
 //!
-//! The leading term of the local error is C_q h^(q+1) x^(q+1): C_q = |gamma*_q| with the Moulton coefficient
-//! gamma*_q = (1/q!) int_{-1}^0 s (s + 1)...(s + q - 1) ds (Hairer, Norsett & Wanner 1993, sec. III.1) for Adams, and
-//! 1/(q + 1) for BDF, in the convention of Radhakrishnan & Hindmarsh (1993), sec. 2. What a program has are e (which is
-//! h^(q+1) x^(q+1) for Adams and that over l_0 for BDF), the difference of two e's, and y_q. [`Formula`] keeps
-//! the divisors that turn norms of these into errors at the orders q, q + 1 and q - 1.
+//! The leading term of the local error is C_q h^(q+1) x^(q+1): C_q = |gamma*_q| with the Moulton
+//! coefficient gamma*_q = (1/q!) int_{-1}^0 s (s + 1)...(s + q - 1) ds (Hairer, Norsett & Wanner
+//! 1993, sec. III.1) for Adams, and 1/(q + 1) for BDF, in the convention of Radhakrishnan &
+//! Hindmarsh (1993), sec. 2. What a program has are e (which is h^(q+1) x^(q+1) for Adams and that
+//! over l_0 for BDF), the difference of two e's, and y_q. [`Formula`] keeps the divisors that turn
+//! norms of these into errors at the orders q, q + 1 and q - 1.
 
 /// The highest order of the Adams-Moulton family.
 pub(super) const ADAMS_ORDERS: usize = 12;
@@ -33,11 +35,13 @@ pub(super) struct Formula {
     pub same: f64,
     /// |e - e_before| / `higher` is the error at order q + 1.
     pub higher: f64,
-    /// The corrector's iteration has converged where what is left of it is below this: an error of 1/(2 (q + 2)).
+    /// The corrector's iteration has converged where what is left of it is below this: an error of
+    /// 1/(2 (q + 2)).
     pub converged: f64,
 }
 
-const NOTHING: Formula = Formula { l: [0.0; COLUMNS], lower: 0.0, same: 0.0, higher: 0.0, converged: 0.0 };
+const NOTHING: Formula =
+    Formula { l: [0.0; COLUMNS], lower: 0.0, same: 0.0, higher: 0.0, converged: 0.0 };
 
 /// The product p(s) (s + root), for a polynomial of degree `degree`.
 const fn times(p: [f64; COLUMNS], degree: usize, root: f64) -> [f64; COLUMNS] {
@@ -133,8 +137,9 @@ pub(super) static BDF: [Formula; BDF_ORDERS] = {
     table
 };
 
-/// Error of the BDF formula over error of the Adams formula of the same order, for the same y_(q+1), orders 1 to 5 at indices 0 to 4: an e stands for
-/// l_q e, whatever the family. From 1 (order 1, the same formula) upwards.
+/// Error of the BDF formula over error of the Adams formula of the same order, for the same
+/// y_(q+1), orders 1 to 5 at indices 0 to 4: an e stands for l_q e, whatever the family. From 1
+/// (order 1, the same formula) upwards.
 pub(super) static ERROR_RATIO: [f64; BDF_ORDERS] = {
     let mut ratios = [0.0; BDF_ORDERS];
     let mut q = 1;
@@ -146,7 +151,8 @@ pub(super) static ERROR_RATIO: [f64; BDF_ORDERS] = {
     ratios
 };
 
-/// How far along the negative real axis the predictor-corrector Adams methods of orders 1 to 12 are stable, as
+/// How far along the negative real axis the predictor-corrector Adams methods of orders 1 to 12 are
+/// stable, as
 /// |h lambda|: the values of Petzold (1983), who chose them a little inside the region.
 pub(super) static ADAMS_STABILITY: [f64; ADAMS_ORDERS] =
     [0.5, 0.575, 0.55, 0.45, 0.35, 0.25, 0.20, 0.15, 0.10, 0.075, 0.050, 0.025];
@@ -162,7 +168,15 @@ mod tests {
     /// Hairer, Norsett & Wanner (1993), table III.1.3 (gamma*_j), and Gear (1971), table 9.1 (l).
     #[test]
     fn adams_moulton_by_the_book() {
-        let gamma = [1.0 / 2.0, 1.0 / 12.0, 1.0 / 24.0, 19.0 / 720.0, 3.0 / 160.0, 863.0 / 60480.0, 275.0 / 24192.0];
+        let gamma = [
+            1.0 / 2.0,
+            1.0 / 12.0,
+            1.0 / 24.0,
+            19.0 / 720.0,
+            3.0 / 160.0,
+            863.0 / 60480.0,
+            275.0 / 24192.0,
+        ];
         for (q, g) in (1..).zip(gamma) {
             close(ADAMS[q - 1].same, 1.0 / g);
         }
@@ -172,7 +186,8 @@ mod tests {
         }
         close(ADAMS[1].lower, 1.0);
         close(ADAMS[2].lower, 2.0);
-        // l_0 of order q is the coefficient of f(x1): 95/288 at order 5 is 251/720 of the formula of order 5.
+        // l_0 of order q is the coefficient of f(x1): 95/288 at order 5 is 251/720 of the formula
+        // of order 5.
         close(ADAMS[4].l[0], 251.0 / 720.0);
     }
 
@@ -187,12 +202,13 @@ mod tests {
         close(BDF[4].lower, 1.0 / 24.0);
     }
 
-    /// y <- P y + l e is exact for polynomials of degree q when e = 0; for x' = 0 started off the solution, L(-1) = 0
-    /// (Adams) keeps x unchanged by stale derivatives.
+    /// y <- P y + l e is exact for polynomials of degree q when e = 0; for x' = 0 started off the
+    /// solution, L(-1) = 0 (Adams) keeps x unchanged by stale derivatives.
     #[test]
     fn adams_polynomials_vanish_at_minus_one() {
         for (q, formula) in (1..).zip(&ADAMS) {
-            let at: f64 = (0..=q).map(|j| if j % 2 == 0 { formula.l[j] } else { -formula.l[j] }).sum();
+            let at: f64 =
+                (0..=q).map(|j| if j % 2 == 0 { formula.l[j] } else { -formula.l[j] }).sum();
             assert!(at.abs() < 1e-12, "order {q}: {at}");
         }
     }

@@ -1,11 +1,11 @@
-//! LSODA: variable-order, variable-step multistep integration that chooses by itself between the Adams-Moulton family
-//! (orders 1 to 12, functional iteration) for non-stiff stretches and the BDF family (orders 1 to 5, Newton
-//! iteration) for stiff ones.
+//! LSODA: variable-order, variable-step multistep integration that chooses by itself between the
+//! Adams-Moulton family (orders 1 to 12, functional iteration) for non-stiff stretches and the BDF
+//! family (orders 1 to 5, Newton iteration) for stiff ones.
 //!
-//! Written from the literature: Hindmarsh, ODEPACK, a systematized collection of ODE solvers (1983); Petzold, Automatic
-//! selection of methods for solving stiff and nonstiff systems (1983); Radhakrishnan & Hindmarsh, Description and use
-//! of LSODE (1993); Gear (1971); Hairer, Norsett & Wanner (1993), ch. III; Hairer & Wanner (1996), ch. V. Names there
-//! and here:
+//! Written from the literature: Hindmarsh, ODEPACK, a systematized collection of ODE solvers
+//! (1983); Petzold, Automatic selection of methods for solving stiff and nonstiff systems (1983);
+//! Radhakrishnan & Hindmarsh, Description and use of LSODE (1993); Gear (1971); Hairer, Norsett &
+//! Wanner (1993), ch. III; Hairer & Wanner (1996), ch. V. Names there and here:
 //!
 //! | here | there |
 //! |---|---|
@@ -25,9 +25,11 @@
 //! differ from ODEPACK's by as much as ODEPACK's own counts scatter: steps by at most 14.6 %,
 //! evaluations by at most 11.4 %.
 //!
-//! Every constant and decision of step, order and method selection, of the corrector's convergence and of the failures was also compared, line by
-//! line, with ODEPACK's own text (LSODA, STODA; public domain). They are the same, but for three things that are meant: the Jacobian is exact and not
-//! a difference quotient, powers in the selection are taken to about 1e-14 (`rough_pow`), and a change that a step decides on is carried out when the next one begins.
+//! Every constant and decision of step, order and method selection, of the corrector's convergence
+//! and of the failures was also compared, line by line, with ODEPACK's own text (LSODA, STODA;
+//! public domain). They are the same, but for three things that are meant: the Jacobian is exact
+//! and not a difference quotient, powers in the selection are taken to about 1e-14 (`rough_pow`),
+//! and a change that a step decides on is carried out when the next one begins.
 
 mod coefficients;
 mod nordsieck;
@@ -38,7 +40,9 @@ use serde::{Deserialize, Serialize};
 
 use super::guard::Redoable;
 use super::linear::Lu;
-use super::step::{Driven, Failure, Interpolant, Statistics, Steady, Step, Stepper, Tolerance, finite};
+use super::step::{
+    Driven, Failure, Interpolant, Statistics, Steady, Step, Stepper, Tolerance, finite,
+};
 use coefficients::{ADAMS, ADAMS_ORDERS, ADAMS_STABILITY, BDF, BDF_ORDERS, ERROR_RATIO, Formula};
 use nordsieck::Nordsieck;
 use selection::*;
@@ -83,11 +87,12 @@ pub struct Switch {
     pub to: Family,
 }
 
-/// Switches kept for [`Lsoda::switches`]; a long hysteretic run has millions, and a step must not allocate.
+/// Switches kept for [`Lsoda::switches`]; a long hysteretic run has millions, and a step must not
+/// allocate.
 const SWITCHES_KEPT: usize = 256;
 
-/// What the selection at the end of a step decided. Carried out when the next step begins, so that until then the
-/// history is the dense output of the step that was made.
+/// What the selection at the end of a step decided. Carried out when the next step begins, so that
+/// until then the history is the dense output of the step that was made.
 #[derive(Clone, Copy, Debug)]
 struct Change {
     family: Family,
@@ -224,7 +229,8 @@ impl<const N: usize> Lsoda<N> {
         self.pending.map_or(self.family, |change| change.family)
     }
 
-    /// The first switches of family since the stepper was made (at most 256); their full number is in the statistics.
+    /// The first switches of family since the stepper was made (at most 256); their full number is
+    /// in the statistics.
     pub fn switches(&self) -> &[Switch] {
         &self.switches
     }
@@ -264,8 +270,9 @@ impl<const N: usize> Lsoda<N> {
         self.weights = self.history.x().map(|x| 1.0 / (rtol * x.abs() + atol));
     }
 
-    /// The first step, Radhakrishnan & Hindmarsh (1993), sec. 3.5: such that an Euler step would make an error
-    /// well below the tolerance, for a solution that varies either on the scale of `t` or as fast as f says.
+    /// The first step, Radhakrishnan & Hindmarsh (1993), sec. 3.5: such that an Euler step would
+    /// make an error well below the tolerance, for a solution that varies either on the scale of
+    /// `t` or as fast as f says.
     fn first_step(&self, derivative: &SVector<f64, N>) -> f64 {
         let Tolerance { rtol, atol } = self.tolerance;
         let mut tolerance = rtol;
@@ -304,8 +311,8 @@ impl<const N: usize> Lsoda<N> {
         self.until_selection = self.order + 1;
     }
 
-    /// Goes over to another order; a higher one gets its column from the last correction: the change of
-    /// y_q over a step, l_q e, is h^(q+1) x^(q+1)/q!.
+    /// Goes over to another order; a higher one gets its column from the last correction: the
+    /// change of y_q over a step, l_q e, is h^(q+1) x^(q+1)/q!.
     fn change_order(&mut self, order: usize) {
         if order > self.order {
             let scale = self.formula().l[self.order] / order as f64;
@@ -338,7 +345,11 @@ impl<const N: usize> Lsoda<N> {
     }
 
     /// Evaluates the Jacobian and factorises I - h l_0 J.
-    fn make_matrix(&mut self, field: &dyn Driven<N>, x: &SVector<f64, N>) -> Result<(), NotConverged> {
+    fn make_matrix(
+        &mut self,
+        field: &dyn Driven<N>,
+        x: &SVector<f64, N>,
+    ) -> Result<(), NotConverged> {
         let j = field.jacobian(self.t, x);
         let h = self.h * self.formula().l[0];
         self.statistics.jacobians += 1;
@@ -352,8 +363,9 @@ impl<const N: usize> Lsoda<N> {
         if self.matrix.is_some() { Ok(()) } else { Err(NotConverged) }
     }
 
-    /// Solves the corrector equation e = h f(y_0 + l_0 e) - y_1 from e = 0, by functional iteration (Adams) or Newton
-    /// iteration with a kept matrix (BDF). Returns the error of the step in units of the tolerance.
+    /// Solves the corrector equation e = h f(y_0 + l_0 e) - y_1 from e = 0, by functional iteration
+    /// (Adams) or Newton iteration with a kept matrix (BDF). Returns the error of the step in units
+    /// of the tolerance.
     fn correct(&mut self, field: &dyn Driven<N>) -> Result<f64, NotConverged> {
         let formula = self.formula();
         let l0 = formula.l[0];
@@ -392,16 +404,22 @@ impl<const N: usize> Lsoda<N> {
                 };
                 x = y0 + self.correction * l0;
                 let mut converged = change <= 100.0 * size * EPSILON;
-                // Functional iteration may not stop on the first pass: a rate is known only from the second on.
+                // Functional iteration may not stop on the first pass: a rate is known only from
+                // the second on.
                 if !converged && !self.held && (iteration > 0 || self.family == Family::Bdf) {
                     if iteration > 0 {
-                        let rate = if change <= 1024.0 * change_before { change / change_before } else { 1024.0 };
+                        let rate = if change <= 1024.0 * change_before {
+                            change / change_before
+                        } else {
+                            1024.0
+                        };
                         largest_rate = larger(largest_rate, rate);
                         self.rate = larger(0.2 * self.rate, rate);
                     }
                     if change * (1.5 * self.rate).min(1.0) <= tolerance {
                         converged = true;
-                        self.lipschitz_seen = larger(self.lipschitz_seen, largest_rate / (self.h * l0));
+                        self.lipschitz_seen =
+                            larger(self.lipschitz_seen, largest_rate / (self.h * l0));
                         if self.lipschitz_seen != 0.0 {
                             self.lipschitz = self.lipschitz_seen;
                         }
@@ -428,13 +446,16 @@ impl<const N: usize> Lsoda<N> {
         }
     }
 
-    /// Whether no order allows a step that is worth it, by the errors at the next lower, this and the next higher order, and stability is far
-    /// from dictating one: so most selections end, without a root. False may also mean that it is not known.
+    /// Whether no order allows a step that is worth it, by the errors at the next lower, this and
+    /// the next higher order, and stability is far from dictating one: so most selections end,
+    /// without a root. False may also mean that it is not known.
     fn nothing_to_gain(&self, lower: f64, same: f64, higher: f64) -> bool {
         let q = self.order;
         let stable = || {
             let least = 1.1 * LEAST_GAIN * (self.h * self.lipschitz).max(1e-6);
-            ADAMS_STABILITY[q.max(2) - 2..ADAMS_ORDERS.min(q + 1)].iter().all(|limit| *limit > least)
+            ADAMS_STABILITY[q.max(2) - 2..ADAMS_ORDERS.min(q + 1)]
+                .iter()
+                .all(|limit| *limit > least)
         };
         lower > NO_GAIN_LOWER[q - 1]
             && same > NO_GAIN_SAME[q]
@@ -442,8 +463,8 @@ impl<const N: usize> Lsoda<N> {
             && (self.family == Family::Bdf || stable())
     }
 
-    /// The order and the step ratio for going on, from `error` at the present order. After a failed step
-    /// (`failures` > 0) no higher order is considered. `None`: leave both as they are.
+    /// The order and the step ratio for going on, from `error` at the present order. After a failed
+    /// step (`failures` > 0) no higher order is considered. `None`: leave both as they are.
     fn select(&mut self, error: f64, failures: u32) -> Option<Change> {
         let (q, formula) = (self.order, self.formula());
         let may_rise = failures == 0 && q < self.family.highest_order();
@@ -452,7 +473,8 @@ impl<const N: usize> Lsoda<N> {
         } else {
             f64::INFINITY
         };
-        let lower_error = if q > 1 { self.norm(self.history.column(q)) / formula.lower } else { f64::INFINITY };
+        let lower_error =
+            if q > 1 { self.norm(self.history.column(q)) / formula.lower } else { f64::INFINITY };
         if failures == 0 && self.nothing_to_gain(lower_error, error, higher_error) {
             if self.family == Family::Adams {
                 self.lipschitz_seen = 0.0;
@@ -496,7 +518,8 @@ impl<const N: usize> Lsoda<N> {
         Some(Change { family: self.family, order, ratio })
     }
 
-    /// Petzold's test: the longest steps that the two families could take now, and which is worth it.
+    /// Petzold's test: the longest steps that the two families could take now, and which is worth
+    /// it.
     fn consider_switch(&self, error: f64) -> Option<Change> {
         let (q, size) = (self.order, self.predicted_size);
         match self.family {
@@ -505,15 +528,22 @@ impl<const N: usize> Lsoda<N> {
                     return None;
                 }
                 if error <= 100.0 * size * EPSILON || self.lipschitz_seen == 0.0 {
-                    // The estimates are lost in rounding. Only a step that stability holds down is a sign.
-                    return self.stability_bound.then_some(Change { family: Family::Bdf, order: q, ratio: 2.0 });
+                    // The estimates are lost in rounding. Only a step that stability holds down is
+                    // a sign.
+                    return self.stability_bound.then_some(Change {
+                        family: Family::Bdf,
+                        order: q,
+                        ratio: 2.0,
+                    });
                 }
                 // The same derivative, through the other formula's constants.
                 let bdf_error = error * ERROR_RATIO[q - 1];
-                // At equal accuracy BDF is never the longer step by SWITCH_RATIO (see [`ERROR_RATIO`]), so stability must
-                // decide: BDF's growth, at most 1/(bias error^(1/(q+1))), against SWITCH_RATIO times the stable growth.
-                // Raised to the power q + 1 this needs no root; nearly every step ends here.
-                let bound = self.lipschitz * self.h / (SWITCH_RATIO * BIAS_SAME * ADAMS_STABILITY[q - 1]);
+                // At equal accuracy BDF is never the longer step by SWITCH_RATIO (see
+                // [`ERROR_RATIO`]), so stability must decide: BDF's growth, at most 1/(bias
+                // error^(1/(q+1))), against SWITCH_RATIO times the stable growth. Raised to the
+                // power q + 1 this needs no root; nearly every step ends here.
+                let bound =
+                    self.lipschitz * self.h / (SWITCH_RATIO * BIAS_SAME * ADAMS_STABILITY[q - 1]);
                 let mut power = 1.000_001 * bound;
                 for _ in 0..q {
                     power *= bound;
@@ -523,7 +553,11 @@ impl<const N: usize> Lsoda<N> {
                 }
                 let adams = self.adams_growth(error, q, self.lipschitz);
                 let bdf = growth(BIAS_SAME, bdf_error, q);
-                (bdf >= SWITCH_RATIO * adams).then_some(Change { family: Family::Bdf, order: q, ratio: bdf })
+                (bdf >= SWITCH_RATIO * adams).then_some(Change {
+                    family: Family::Bdf,
+                    order: q,
+                    ratio: bdf,
+                })
             }
             Family::Bdf => {
                 let adams_error = error / ERROR_RATIO[q - 1];
@@ -547,7 +581,8 @@ impl<const N: usize> Lsoda<N> {
     fn adams_growth(&self, error: f64, q: usize, lipschitz: f64) -> f64 {
         let accurate = growth(BIAS_SAME, error, q);
         let scaled = lipschitz * self.h;
-        let stable = if scaled * accurate > 1e-5 { ADAMS_STABILITY[q - 1] / scaled } else { 2.0 * accurate };
+        let stable =
+            if scaled * accurate > 1e-5 { ADAMS_STABILITY[q - 1] / scaled } else { 2.0 * accurate };
         accurate.min(stable)
     }
 
@@ -627,7 +662,8 @@ impl<const N: usize> Lsoda<N> {
         statistics.stiff_steps += u64::from(self.family == Family::Bdf);
         statistics.highest_order = statistics.highest_order.max(self.order as u64);
 
-        // A first step may be below the spacing of numbers at t and soon grows; a run of such steps will not.
+        // A first step may be below the spacing of numbers at t and soon grows; a run of such steps
+        // will not.
         self.standing_still = if self.t > t0 { 0 } else { self.standing_still + 1 };
         let x1 = *self.history.x();
         if !finite(&x1) {
@@ -642,7 +678,8 @@ impl<const N: usize> Lsoda<N> {
         Ok(Step { t0, t1: self.t, x0, x1, interpolant: &self.history })
     }
 
-    /// After repeated failures the history is not to be believed: keep x alone, at order 1 and a tenth of the step.
+    /// After repeated failures the history is not to be believed: keep x alone, at order 1 and a
+    /// tenth of the step.
     fn start_over(&mut self, field: &dyn Driven<N>) {
         self.h *= SHRINK_RESET;
         let x = *self.history.x();
@@ -654,8 +691,8 @@ impl<const N: usize> Lsoda<N> {
     }
 }
 
-/// The larger of two numbers, the first if the second is none. `f64::max` minds a NaN in the first too, which takes four more instructions in a chain
-/// that every iteration waits for.
+/// The larger of two numbers, the first if the second is none. `f64::max` minds a NaN in the first
+/// too, which takes four more instructions in a chain that every iteration waits for.
 #[inline(always)]
 fn larger(known: f64, new: f64) -> f64 {
     if new > known { new } else { known }
@@ -715,7 +752,8 @@ impl<const N: usize> Redoable<N> for Lsoda<N> {
 }
 
 impl<const N: usize> Lsoda<N> {
-    /// After an accepted step: switch the family, or think over step and order, or leave things as they are.
+    /// After an accepted step: switch the family, or think over step and order, or leave things as
+    /// they are.
     fn look_ahead(&mut self, error: f64) {
         self.until_switch_test -= 1;
         if self.until_switch_test < 0
@@ -731,7 +769,9 @@ impl<const N: usize> Lsoda<N> {
         self.until_selection -= 1;
         match self.until_selection {
             0 => self.pending = self.select(error, 0),
-            1 if self.order < self.family.highest_order() => self.correction_before = self.correction,
+            1 if self.order < self.family.highest_order() => {
+                self.correction_before = self.correction
+            }
             _ => {}
         }
     }

@@ -52,8 +52,8 @@ impl<const N: usize> Nordsieck<N> {
         }
     }
 
-    /// For one order, so that the columns stay in registers from the first addition to the last: through memory each would wait for the one
-    /// before to be written and read again.
+    /// For one order, so that the columns stay in registers from the first addition to the last:
+    /// through memory each would wait for the one before to be written and read again.
     #[inline]
     fn predict_of<const ORDER: usize>(&mut self) {
         let mut y = self.y;
@@ -94,9 +94,9 @@ impl<const N: usize> Nordsieck<N> {
     }
 }
 
-/// The Nordsieck polynomial, over the step that was corrected last and has not been rescaled since. It misses that
-/// step's start by about the local error, as the dense output of a multistep method does: it is the new polynomial, not
-/// the one before.
+/// The Nordsieck polynomial, over the step that was corrected last and has not been rescaled since.
+/// It misses that step's start by about the local error, as the dense output of a multistep method
+/// does: it is the new polynomial, not the one before.
 impl<const N: usize> Interpolant<N> for Nordsieck<N> {
     fn at(&self, theta: f64) -> SVector<f64, N> {
         let s = theta - 1.0;
@@ -117,7 +117,8 @@ impl<const N: usize> Interpolant<N> for Nordsieck<N> {
     fn reach(&self, coordinate: usize) -> f64 {
         self.y[1..=self.degree].iter().map(|y| y[coordinate].abs()).sum()
     }
-    /// Term by term, s from -1 to 0: s + s^2 is at most 1/4 in size, s^k and its chord differ by less than 1.
+    /// Term by term, s from -1 to 0: s + s^2 is at most 1/4 in size, s^k and its chord differ by
+    /// less than 1.
     fn bend(&self, coordinate: usize) -> f64 {
         let y = &self.y[..=self.degree];
         let second = y.get(2).map_or(0.0, |y| 0.25 * y[coordinate].abs());

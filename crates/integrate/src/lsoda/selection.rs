@@ -1,8 +1,8 @@
 //! Constants and formulas of step, order and method selection, apart from the loop that uses them.
 //!
-//! If a step of order q made the error D (tolerance 1), the step that would just meet the tolerance is longer by
-//! D^(-1/(q+1)). Gear (1971) and Hindmarsh (1983) divide this by a bias, larger for the changes that are to be
-//! discouraged, and take the order that allows the longest step.
+//! If a step of order q made the error D (tolerance 1), the step that would just meet the tolerance
+//! is longer by D^(-1/(q+1)). Gear (1971) and Hindmarsh (1983) divide this by a bias, larger for
+//! the changes that are to be discouraged, and take the order that allows the longest step.
 
 use super::coefficients::{ADAMS_ORDERS, BDF_ORDERS};
 use twofold_num::elementary::rough_pow;
@@ -25,7 +25,8 @@ pub(super) const GROWTH_AFTER_FAILURE: f64 = 2.0;
 pub(super) const SHRINK_NOT_CONVERGED: f64 = 0.25;
 /// Largest factor on the step after the second error-test failure in one step.
 pub(super) const SHRINK_REPEATED: f64 = 0.2;
-/// After three, the derivatives in the history are not to be trusted: a tenth of the step, and order 1.
+/// After three, the derivatives in the history are not to be trusted: a tenth of the step, and
+/// order 1.
 pub(super) const SHRINK_RESET: f64 = 0.1;
 /// Failures of one kind in one step before the integration is given up.
 pub(super) const MOST_FAILURES: u32 = 10;
@@ -39,15 +40,18 @@ pub(super) const MATRIX_DRIFT: f64 = 0.3;
 pub(super) const FIRST_RATE: f64 = 0.7;
 /// Steps between a change of method and the next thought of one, Petzold (1983).
 pub(super) const STEPS_BEFORE_SWITCH: i32 = 20;
-/// How much longer the BDF step must be before Adams is left for it: a BDF step costs about that much more.
+/// How much longer the BDF step must be before Adams is left for it: a BDF step costs about that
+/// much more.
 pub(super) const SWITCH_RATIO: f64 = 5.0;
 
-/// The order-1-to-5 restriction of the stiffness test: an Adams order above needs accuracy, not stability.
+/// The order-1-to-5 restriction of the stiffness test: an Adams order above needs accuracy, not
+/// stability.
 pub(super) const SWITCH_ORDERS: usize = BDF_ORDERS;
 
 const _: () = assert!(SWITCH_ORDERS <= ADAMS_ORDERS);
 
-/// The factor by which the step may grow at `order` if its error was `error`. The 1e-6 keeps it finite at error 0.
+/// The factor by which the step may grow at `order` if its error was `error`. The 1e-6 keeps it
+/// finite at error 0.
 pub(super) fn growth(bias: f64, error: f64, order: usize) -> f64 {
     1.0 / (bias * (rough_pow(error, ROOTS[order]) + 1e-6))
 }
@@ -63,8 +67,8 @@ static ROOTS: [f64; ADAMS_ORDERS + 2] = {
     roots
 };
 
-/// Errors at the orders 0, 1, ... above which [`growth`] stays below [`LEAST_GAIN`]: 1 / (bias LEAST_GAIN), to the power order + 1, and a
-/// millionth more for the roundings.
+/// Errors at the orders 0, 1, ... above which [`growth`] stays below [`LEAST_GAIN`]: 1 / (bias
+/// LEAST_GAIN), to the power order + 1, and a millionth more for the roundings.
 const fn no_gain(bias: f64) -> [f64; ADAMS_ORDERS + 2] {
     let base = 1.0 / (bias * LEAST_GAIN);
     let mut errors = [1.000_001 * base; ADAMS_ORDERS + 2];
@@ -86,11 +90,17 @@ mod tests {
 
     #[test]
     fn above_these_errors_no_order_gains_enough_and_below_them_each_does() {
-        for (bias, errors) in [(BIAS_SAME, NO_GAIN_SAME), (BIAS_LOWER, NO_GAIN_LOWER), (BIAS_HIGHER, NO_GAIN_HIGHER)] {
+        for (bias, errors) in
+            [(BIAS_SAME, NO_GAIN_SAME), (BIAS_LOWER, NO_GAIN_LOWER), (BIAS_HIGHER, NO_GAIN_HIGHER)]
+        {
             for (order, error) in errors.into_iter().enumerate() {
                 assert!(growth(bias, error, order) < LEAST_GAIN, "bias {bias}, order {order}");
-                // The 1e-6 beside the root counts for up to that much of the gain, as often as the order says in the error.
-                assert!(growth(bias, error * (1.0 - 4e-5), order) > LEAST_GAIN, "bias {bias}, order {order}");
+                // The 1e-6 beside the root counts for up to that much of the gain, as often as the
+                // order says in the error.
+                assert!(
+                    growth(bias, error * (1.0 - 4e-5), order) > LEAST_GAIN,
+                    "bias {bias}, order {order}"
+                );
             }
         }
     }

@@ -1,4 +1,5 @@
-//! Orders of convergence with step and order held, and what the controlled method conserves, damps and forgets.
+//! Orders of convergence with step and order held, and what the controlled method conserves, damps
+//! and forgets.
 
 use super::*;
 use nalgebra::vector;
@@ -62,8 +63,12 @@ fn every_adams_order_converges_at_its_order() {
     let coarse = [2000, 200, 200, 100, 80, 60, 50, 45, 40, 36, 34, 32];
     for (order, n) in (1..=12).zip(coarse) {
         let (p, dense) = observed_order(Family::Adams, order, n);
-        // Close to the order from either side: neither a lower-order slip nor a test that sees only rounding.
-        assert!((p - order as f64).abs() < 0.1 * order as f64 + 0.15, "order {order}: observed {p}");
+        // Close to the order from either side: neither a lower-order slip nor a test that sees only
+        // rounding.
+        assert!(
+            (p - order as f64).abs() < 0.1 * order as f64 + 0.15,
+            "order {order}: observed {p}"
+        );
         assert!(dense > 0.85 * order as f64, "order {order}: dense output {dense}");
     }
 }
@@ -128,7 +133,8 @@ fn conserves_linear_invariants() {
     struct Reactions;
     impl VectorField<3> for Reactions {
         fn eval<S: Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
-            let (slow, back, fast) = (x[0].scale(0.04), x[1].scale(1e4) * x[2], x[1].squared().scale(3e7));
+            let (slow, back, fast) =
+                (x[0].scale(0.04), x[1].scale(1e4) * x[2], x[1].squared().scale(3e7));
             vector![back - slow, slow - back - fast, fast]
         }
     }
@@ -139,10 +145,12 @@ fn conserves_linear_invariants() {
     assert!(lsoda.statistics().stiff_steps > 0);
 }
 
-/// A fast transient onto a slow curve: Adams through the first, BDF along the second with steps far beyond 1/lambda.
+/// A fast transient onto a slow curve: Adams through the first, BDF along the second with steps far
+/// beyond 1/lambda.
 #[test]
 fn stiff_decay_is_left_to_bdf() {
-    /// Prothero & Robinson (1974): x' = -lambda (x - cos t) - sin t with t as a state; x = cos t after the transient.
+    /// Prothero & Robinson (1974): x' = -lambda (x - cos t) - sin t with t as a state; x = cos t
+    /// after the transient.
     struct ProtheroRobinson;
     impl VectorField<2> for ProtheroRobinson {
         fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
@@ -162,7 +170,8 @@ fn stiff_decay_is_left_to_bdf() {
 /// And back: once the fast mode is switched off, Adams returns.
 #[test]
 fn adams_returns_when_stiffness_ends() {
-    /// x' = -1e4 s(t) (x - cos t) - sin t with s going smoothly from 1 to 0 at t = 5, and t as a state.
+    /// x' = -1e4 s(t) (x - cos t) - sin t with s going smoothly from 1 to 0 at t = 5, and t as a
+    /// state.
     struct Fading;
     impl VectorField<2> for Fading {
         fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
@@ -178,7 +187,8 @@ fn adams_returns_when_stiffness_ends() {
     assert!((5.0..9.0).contains(&lsoda.switches()[1].t));
 }
 
-/// A restart forgets everything but the statistics: the second half is, bit for bit, a new stepper's.
+/// A restart forgets everything but the statistics: the second half is, bit for bit, a new
+/// stepper's.
 #[test]
 fn restart_forgets() {
     let field = Hysteretic {
@@ -251,8 +261,12 @@ fn failures_are_named() {
     // x = 1/(1 - t) has no value at t = 1.
     let mut lsoda = Lsoda::new(Tolerance { rtol: 1e-8, atol: 1e-8 });
     lsoda.restart(&Explosion, 0.0, vector![1.0], 2.0, f64::INFINITY).unwrap();
-    let failure = (0..100_000).find_map(|_| lsoda.step(&Explosion).err()).expect("the solution ends at t = 1");
-    let (Failure::StepUnderflow { t, .. } | Failure::NotFinite { t, .. } | Failure::NotConverged { t, .. }) = failure
+    let failure = (0..100_000)
+        .find_map(|_| lsoda.step(&Explosion).err())
+        .expect("the solution ends at t = 1");
+    let (Failure::StepUnderflow { t, .. }
+    | Failure::NotFinite { t, .. }
+    | Failure::NotConverged { t, .. }) = failure
     else {
         panic!("{failure}")
     };
@@ -269,21 +283,26 @@ fn bdf_is_never_the_more_accurate_formula() {
     }
 }
 
-/// What stability leaves of a step is a length, |lambda| h = Petzold's bound, however long the step that it is asked at; where accuracy allows less, it
-/// is accuracy's.
+/// What stability leaves of a step is a length, |lambda| h = Petzold's bound, however long the step
+/// that it is asked at; where accuracy allows less, it is accuracy's.
 #[test]
 fn the_longest_stable_step_does_not_depend_on_the_step_at_hand() {
-    for (lipschitz, h) in [(20.0, 1e-4), (20.0, 2e-3), (20.0, 0.5), (3e3, 1e-4), (3e3, 2e-3), (3e3, 0.5)] {
+    for (lipschitz, h) in
+        [(20.0, 1e-4), (20.0, 2e-3), (20.0, 0.5), (3e3, 1e-4), (3e3, 2e-3), (3e3, 0.5)]
+    {
         let longest = held(Family::Adams, 3, h).adams_growth(1e-18, 3, lipschitz) * h;
         assert!((longest * lipschitz / 0.55 - 1.0).abs() < 1e-14, "{lipschitz} {h}: {longest}");
     }
     for lipschitz in [1.0, 1e-3] {
-        assert_eq!(held(Family::Adams, 3, 1e-4).adams_growth(1e-4, 3, lipschitz), growth(BIAS_SAME, 1e-4, 3));
+        assert_eq!(
+            held(Family::Adams, 3, 1e-4).adams_growth(1e-4, 3, lipschitz),
+            growth(BIAS_SAME, 1e-4, 3)
+        );
     }
 }
 
-/// Petzold's test, said once more without its shortcut: BDF takes over where the step that accuracy leaves it is five times what accuracy and stability
-/// leave Adams.
+/// Petzold's test, said once more without its shortcut: BDF takes over where the step that accuracy
+/// leaves it is five times what accuracy and stability leave Adams.
 #[test]
 fn bdf_takes_over_where_its_step_is_five_times_as_long() {
     let (mut stays, mut switches) = (0, 0);
@@ -293,11 +312,15 @@ fn bdf_takes_over_where_its_step_is_five_times_as_long() {
             for reach in [0.02, 0.3, 2.0, 20.0, 300.0] {
                 for error in [1e-9, 1e-4, 0.1, 0.9] {
                     let mut lsoda = held(Family::Adams, order, h);
-                    (lsoda.lipschitz, lsoda.lipschitz_seen, lsoda.predicted_size) = (reach / h, 1.0, 1.0);
-                    let adams = growth(BIAS_SAME, error, order).min(ADAMS_STABILITY[order - 1] / reach);
+                    (lsoda.lipschitz, lsoda.lipschitz_seen, lsoda.predicted_size) =
+                        (reach / h, 1.0, 1.0);
+                    let adams =
+                        growth(BIAS_SAME, error, order).min(ADAMS_STABILITY[order - 1] / reach);
                     let bdf = growth(BIAS_SAME, error * ERROR_RATIO[order - 1], order);
                     let change = lsoda.consider_switch(error);
-                    let said = format!("order {order}, h {h}, |lambda| h {reach}, error {error}: {adams} {bdf}");
+                    let said = format!(
+                        "order {order}, h {h}, |lambda| h {reach}, error {error}: {adams} {bdf}"
+                    );
                     assert_eq!(change.is_some(), bdf >= SWITCH_RATIO * adams, "{said}");
                     match change {
                         Some(change) => {

@@ -2,9 +2,10 @@
 //! or a run that is killed, never sees half a file, and an existing file stays until its successor
 //! is whole.
 //!
-//! What is not a regular file (a pipe, a terminal, an open descriptor such as /dev/stdout) is written to and never replaced. A
-//! symbolic link is followed, and what it leads to is replaced, not the link. A temporary file is locked by the process that
-//! writes it, so that another process can tell those of the dead from those of the living and remove them.
+//! What is not a regular file (a pipe, a terminal, an open descriptor such as /dev/stdout) is
+//! written to and never replaced. A symbolic link is followed, and what it leads to is replaced,
+//! not the link. A temporary file is locked by the process that writes it, so that another process
+//! can tell those of the dead from those of the living and remove them.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File, Metadata, OpenOptions, TryLockError};
@@ -37,14 +38,16 @@ impl FileError {
     }
 }
 
-/// Writes `bytes` to `path`, making its folder; all or nothing. A file that is replaced keeps its permissions; a new one can be read by
-/// everybody.
+/// Writes `bytes` to `path`, making its folder; all or nothing. A file that is replaced keeps its
+/// permissions; a new one can be read by everybody.
 ///
 /// # Errors
-/// If the place cannot be written, is a folder, or is a file that is protected against writing; what was there is unharmed.
+/// If the place cannot be written, is a folder, or is a file that is protected against writing;
+/// what was there is unharmed.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     match place(path).map_err(FileError::new("write", path))? {
-        // Appending, because an open descriptor's file may hold what came before us, and a pipe does not mind.
+        // Appending, because an open descriptor's file may hold what came before us, and a pipe
+        // does not mind.
         Place::Stream => OpenOptions::new()
             .append(true)
             .open(path)
@@ -53,7 +56,8 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
         Place::File { at, old } => {
             let folder = folder_of(&at);
             fs::create_dir_all(folder).map_err(FileError::new("create the folder", folder))?;
-            let temporary = Temporary::new_in(folder).map_err(FileError::new("write in", folder))?;
+            let temporary =
+                Temporary::new_in(folder).map_err(FileError::new("write in", folder))?;
             temporary
                 .file()
                 .write_all(bytes)
@@ -65,7 +69,8 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     }
 }
 
-/// A file that grows: written like [`write()`], part by part, and in its place only when it is finished.
+/// A file that grows: written like [`write()`], part by part, and in its place only when it is
+/// finished.
 pub struct Growing {
     path: PathBuf,
     to: Growth,
@@ -83,13 +88,17 @@ impl Growing {
     /// As [`write()`].
     pub fn begin(path: &Path) -> Result<Self, FileError> {
         let to = match place(path).map_err(FileError::new("write", path))? {
-            Place::Stream => {
-                Growth::Stream(OpenOptions::new().append(true).open(path).map_err(FileError::new("write", path))?)
-            }
+            Place::Stream => Growth::Stream(
+                OpenOptions::new()
+                    .append(true)
+                    .open(path)
+                    .map_err(FileError::new("write", path))?,
+            ),
             Place::File { at, old } => {
                 let folder = folder_of(&at);
                 fs::create_dir_all(folder).map_err(FileError::new("create the folder", folder))?;
-                let temporary = Temporary::new_in(folder).map_err(FileError::new("write in", folder))?;
+                let temporary =
+                    Temporary::new_in(folder).map_err(FileError::new("write in", folder))?;
                 Growth::File { temporary, at, old: Box::new(old) }
             }
         };
@@ -118,7 +127,8 @@ impl Growing {
         if let Some(instead) = instead {
             match place(instead).map_err(FileError::new("write", instead))? {
                 Place::Stream => {
-                    let why = io::Error::new(io::ErrorKind::AlreadyExists, "it is no ordinary file");
+                    let why =
+                        io::Error::new(io::ErrorKind::AlreadyExists, "it is no ordinary file");
                     return Err(FileError::new("write", instead)(why));
                 }
                 Place::File { at: other, old: there } => (at, *old) = (other, there),
@@ -133,7 +143,8 @@ impl Growing {
     }
 }
 
-/// Tries whether [`write()`] can write to `path`, and leaves everything as it is: for use before a long computation.
+/// Tries whether [`write()`] can write to `path`, and leaves everything as it is: for use before a
+/// long computation.
 ///
 /// # Errors
 /// As [`write()`].
@@ -143,7 +154,8 @@ pub fn try_place(path: &Path) -> Result<(), FileError> {
         Place::Stream => Ok(()),
         Place::File { at, old } => {
             if cfg!(windows) && old.is_some() {
-                // A spreadsheet that shows a file there does not let it be replaced: better said now than after an hour.
+                // A spreadsheet that shows a file there does not let it be replaced: better said
+                // now than after an hour.
                 OpenOptions::new().append(true).open(&at).map_err(FileError::new("write", path))?;
             }
             try_folder(folder_of(&at))
@@ -151,7 +163,8 @@ pub fn try_place(path: &Path) -> Result<(), FileError> {
     }
 }
 
-/// Tries whether files can be made in `folder`, or if it is not there, in the nearest folder above it that is.
+/// Tries whether files can be made in `folder`, or if it is not there, in the nearest folder above
+/// it that is.
 ///
 /// # Errors
 /// If they cannot.
@@ -183,7 +196,10 @@ fn place(path: &Path) -> io::Result<Place> {
             Ok(found) => found,
             Err(e) if e.kind() == io::ErrorKind::NotFound => {
                 if followed > 0 && !folder_of(&at).is_dir() {
-                    let why = format!("it is a link into a folder that is not there, {}", folder_of(&at).display());
+                    let why = format!(
+                        "it is a link into a folder that is not there, {}",
+                        folder_of(&at).display()
+                    );
                     return Err(io::Error::new(io::ErrorKind::NotFound, why));
                 }
                 return Ok(Place::File { at, old: None });
@@ -197,7 +213,10 @@ fn place(path: &Path) -> io::Result<Place> {
         } else if !found.is_file() {
             return Ok(Place::Stream);
         } else if found.permissions().readonly() {
-            return Err(io::Error::new(io::ErrorKind::PermissionDenied, "the file is protected against writing"));
+            return Err(io::Error::new(
+                io::ErrorKind::PermissionDenied,
+                "the file is protected against writing",
+            ));
         } else {
             return Ok(Place::File { at, old: Some(found) });
         }
@@ -215,7 +234,8 @@ fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Gives a new file the permissions of the one it replaces; those of a published file, whatever the umask, if it replaces none.
+/// Gives a new file the permissions of the one it replaces; those of a published file, whatever the
+/// umask, if it replaces none.
 fn like(file: &File, old: Option<&Metadata>) -> io::Result<()> {
     #[cfg(unix)]
     {
@@ -236,7 +256,8 @@ const SUFFIX: &str = ".tmp";
 const RANDOM: usize = 6;
 
 /// What this process has under way, for [`abandon`].
-static UNDER_WAY: Mutex<UnderWay> = Mutex::new(UnderWay { temporaries: BTreeSet::new(), swept: BTreeSet::new() });
+static UNDER_WAY: Mutex<UnderWay> =
+    Mutex::new(UnderWay { temporaries: BTreeSet::new(), swept: BTreeSet::new() });
 
 struct UnderWay {
     temporaries: BTreeSet<PathBuf>,
@@ -302,7 +323,8 @@ impl Temporary {
         // that fails while the file is open.
         let (open, temporary) = file.into_parts();
         let done = temporary.keep().map_err(|e| e.error).and_then(|temporary| {
-            patiently(|| fs::rename(&temporary, place)).inspect_err(|_| drop(fs::remove_file(&temporary)))
+            patiently(|| fs::rename(&temporary, place))
+                .inspect_err(|_| drop(fs::remove_file(&temporary)))
         });
         drop(open);
         drop(mine);
@@ -323,7 +345,10 @@ fn patiently(mut act: impl FnMut() -> io::Result<()>) -> io::Result<()> {
     try_again(&mut act, &in_use)
 }
 
-fn try_again(act: &mut dyn FnMut() -> io::Result<()>, in_use: &dyn Fn(&io::Error) -> bool) -> io::Result<()> {
+fn try_again(
+    act: &mut dyn FnMut() -> io::Result<()>,
+    in_use: &dyn Fn(&io::Error) -> bool,
+) -> io::Result<()> {
     for _ in 0..TRIES {
         match act() {
             Err(e) if in_use(&e) => thread::sleep(PAUSE),
@@ -348,7 +373,9 @@ pub fn sweep(folder: &Path) -> usize {
     };
     let mut removed = 0;
     for entry in entries.flatten().filter(stale) {
-        let Ok(file) = OpenOptions::new().read(true).write(true).open(entry.path()) else { continue };
+        let Ok(file) = OpenOptions::new().read(true).write(true).open(entry.path()) else {
+            continue;
+        };
         // The lock is held until the file is gone: its maker, if it lives, sees one or the other.
         if file.try_lock().is_ok() && fs::remove_file(entry.path()).is_ok() {
             removed += 1;
@@ -357,8 +384,8 @@ pub fn sweep(folder: &Path) -> usize {
     removed
 }
 
-/// Removes the temporary files of this process. Afterwards no write of this process begins or ends any more (it waits for ever): only
-/// for a process that is about to leave.
+/// Removes the temporary files of this process. Afterwards no write of this process begins or ends
+/// any more (it waits for ever): only for a process that is about to leave.
 pub fn abandon() {
     let mine = under_way();
     for path in &mine.temporaries {
@@ -421,7 +448,8 @@ pub(super) fn plain(what: &Metadata) -> io::Result<()> {
         kind if kind.is_file() => Ok(()),
         kind if kind.is_dir() => Err(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder")),
         _ => {
-            let why = "it is no plain file (a pipe, a socket or a device); give a copy of what is in it";
+            let why =
+                "it is no plain file (a pipe, a socket or a device); give a copy of what is in it";
             Err(io::Error::new(io::ErrorKind::InvalidInput, why))
         }
     }
@@ -451,7 +479,8 @@ pub fn read_text(path: &Path) -> Result<String, FileError> {
     open_plain(path).and_then(text).map_err(FileError::new("read", path))
 }
 
-/// Reads a whole text of at most [`LARGEST_TEXT`] bytes from a stream; its `name` is for the message.
+/// Reads a whole text of at most [`LARGEST_TEXT`] bytes from a stream; its `name` is for the
+/// message.
 ///
 /// # Errors
 /// As [`read_text`].
@@ -480,8 +509,10 @@ mod tests {
     use super::*;
 
     fn names(folder: &Path) -> Vec<String> {
-        let mut names: Vec<_> =
-            fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        let mut names: Vec<_> = fs::read_dir(folder)
+            .unwrap()
+            .map(|e| e.unwrap().file_name().into_string().unwrap())
+            .collect();
         names.sort();
         names
     }
@@ -504,7 +535,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let blocker = folder.path().join("blocker");
         write(&blocker, b"").unwrap();
-        for error in [write(&blocker.join("x.png"), b"").unwrap_err(), try_place(&blocker.join("x.png")).unwrap_err()] {
+        for error in [
+            write(&blocker.join("x.png"), b"").unwrap_err(),
+            try_place(&blocker.join("x.png")).unwrap_err(),
+        ] {
             assert!(error.to_string().contains("blocker"), "{error}");
         }
         let error = write(folder.path(), b"").unwrap_err().to_string();
@@ -594,14 +628,17 @@ mod tests {
     fn the_dead_are_swept_and_the_living_are_not() {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
-        for name in [".twofold-aB3dE6.tmp", ".twofold-aB3dE6", ".twofold-my-notes.tmp", "aB3dE6.tmp"] {
+        for name in
+            [".twofold-aB3dE6.tmp", ".twofold-aB3dE6", ".twofold-my-notes.tmp", "aB3dE6.tmp"]
+        {
             fs::write(at(name), b"half").unwrap();
         }
         let living = at(".twofold-Living.tmp");
         let held = File::create(&living).unwrap();
         held.lock().unwrap();
         write(&at("x"), b"x").unwrap();
-        let left = [".twofold-Living.tmp", ".twofold-aB3dE6", ".twofold-my-notes.tmp", "aB3dE6.tmp", "x"];
+        let left =
+            [".twofold-Living.tmp", ".twofold-aB3dE6", ".twofold-my-notes.tmp", "aB3dE6.tmp", "x"];
         assert_eq!(names(folder.path()), left);
         drop(held);
         assert_eq!(sweep(folder.path()), 1);
@@ -624,7 +661,9 @@ mod tests {
             let writers: Vec<_> = (0..2)
                 .map(|w| {
                     let folder = folder.path();
-                    scope.spawn(move || (0..200).all(|i| write(&folder.join(format!("{w}-{i}")), b"whole").is_ok()))
+                    scope.spawn(move || {
+                        (0..200).all(|i| write(&folder.join(format!("{w}-{i}")), b"whole").is_ok())
+                    })
                 })
                 .collect();
             let whole = writers.into_iter().map(|w| w.join().unwrap()).collect::<Vec<_>>();
@@ -642,7 +681,12 @@ mod tests {
         let path = folder.path().join("x");
         fs::write(&path, b"1234").unwrap();
         still_there(&[(path.clone(), 4)]).unwrap();
-        assert!(still_there(&[(path.clone(), 5)]).unwrap_err().to_string().contains("4 bytes instead of 5"));
+        assert!(
+            still_there(&[(path.clone(), 5)])
+                .unwrap_err()
+                .to_string()
+                .contains("4 bytes instead of 5")
+        );
         fs::remove_file(&path).unwrap();
         assert!(still_there(&[(path, 4)]).is_err());
     }
@@ -732,7 +776,8 @@ mod tests {
     #[test]
     fn what_is_under_way_is_known_until_it_is_done() {
         let folder = tempfile::tempdir().unwrap();
-        let known = || under_way().temporaries.iter().filter(|p| p.starts_with(folder.path())).count();
+        let known =
+            || under_way().temporaries.iter().filter(|p| p.starts_with(folder.path())).count();
         let first = Temporary::new_in(folder.path()).unwrap();
         let second = Temporary::new_in(folder.path()).unwrap();
         assert_eq!(known(), 2);
@@ -762,7 +807,10 @@ mod tests {
         // Not for ever, and not for what will not pass.
         let (never, tried) = refused_times(usize::MAX, io::ErrorKind::ResourceBusy);
         assert_eq!((never, tried), (Err(io::ErrorKind::ResourceBusy), TRIES + 1));
-        assert_eq!(refused_times(3, io::ErrorKind::StorageFull), (Err(io::ErrorKind::StorageFull), 1));
+        assert_eq!(
+            refused_times(3, io::ErrorKind::StorageFull),
+            (Err(io::ErrorKind::StorageFull), 1)
+        );
     }
 
     /// What cannot be put in its place leaves nothing, and what is there stays.
@@ -791,7 +839,10 @@ mod tests {
         drop(alone);
         try_place(&path).unwrap();
         write(&path, b"new").unwrap();
-        assert_eq!((read(&path).unwrap().as_slice(), names(folder.path())), (&b"new"[..], vec!["x".to_owned()]));
+        assert_eq!(
+            (read(&path).unwrap().as_slice(), names(folder.path())),
+            (&b"new"[..], vec!["x".to_owned()])
+        );
     }
 
     /// Windows: a file that another process reads is replaced when it is closed.
@@ -808,7 +859,10 @@ mod tests {
         });
         write(&path, b"new").unwrap();
         letting_go.join().unwrap();
-        assert_eq!((read(&path).unwrap().as_slice(), names(folder.path())), (&b"new"[..], vec!["x".to_owned()]));
+        assert_eq!(
+            (read(&path).unwrap().as_slice(), names(folder.path())),
+            (&b"new"[..], vec!["x".to_owned()])
+        );
     }
 
     #[test]
@@ -817,6 +871,8 @@ mod tests {
         let path = folder.path().join("x");
         write(&path, "two\nlines, é\n".as_bytes()).unwrap();
         assert_eq!(read_text(&path).unwrap(), "two\nlines, é\n");
-        assert!(read_text(&folder.path().join("y")).unwrap_err().to_string().contains("cannot read"));
+        assert!(
+            read_text(&folder.path().join("y")).unwrap_err().to_string().contains("cannot read")
+        );
     }
 }

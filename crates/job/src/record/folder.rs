@@ -44,8 +44,8 @@ const DEPTH: usize = 4;
 /// The most that is read of a folder: all full-length figures have some 250 MB.
 const LARGEST_TREE: u64 = 4 << 30;
 
-/// Reads every file under `folder` whose path inside it is `wanted`, sorted by path. Hidden files and folders are passed over, and
-/// so are names that are not Unicode.
+/// Reads every file under `folder` whose path inside it is `wanted`, sorted by path. Hidden files
+/// and folders are passed over, and so are names that are not Unicode.
 ///
 /// # Errors
 /// If the folder or a file cannot be read, or there is more of them than fits in memory.
@@ -141,7 +141,10 @@ mod tests {
         let found = read_tree(folder.path(), &|p| p.ends_with(".txt")).unwrap().files;
         let paths: Vec<&str> = found.iter().map(|f| f.path.as_str()).collect();
         assert_eq!(paths, ["a/c.txt", "b.txt"]);
-        assert_eq!((found[0].folder(), found[0].name(), found[0].bytes.as_slice()), ("a", "c.txt", &b"a/c.txt"[..]));
+        assert_eq!(
+            (found[0].folder(), found[0].name(), found[0].bytes.as_slice()),
+            ("a", "c.txt", &b"a/c.txt"[..])
+        );
         assert_eq!(found[1].folder(), "");
     }
 
@@ -174,7 +177,8 @@ mod tests {
         let paths: Vec<&str> = tree.files.iter().map(|f| f.path.as_str()).collect();
         assert_eq!(paths, ["1/2/3/4/in.txt"]);
         let after = |already: u64| {
-            let mut walk = Walk { wanted: &|_| true, files: Vec::new(), dangling: Vec::new(), bytes: already };
+            let mut walk =
+                Walk { wanted: &|_| true, files: Vec::new(), dangling: Vec::new(), bytes: already };
             walk.folder(folder.path(), "", DEPTH)
         };
         after(LARGEST_TREE - 5).unwrap();
@@ -187,6 +191,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         std::os::unix::fs::symlink("b", folder.path().join("a")).unwrap();
         std::os::unix::fs::symlink("a", folder.path().join("b")).unwrap();
-        assert!(read_tree(folder.path(), &|_| true).unwrap_err().to_string().contains("cannot read"));
+        assert!(
+            read_tree(folder.path(), &|_| true).unwrap_err().to_string().contains("cannot read")
+        );
     }
 }

@@ -97,10 +97,12 @@ impl Hash {
     }
 }
 
-/// The JSON bytes that are hashed: keys of every object in the order of their bytes, no spaces, shortest round-trip numbers. The order
-/// is made here, because the JSON library's own depends on a cargo feature that any dependency can turn on.
+/// The JSON bytes that are hashed: keys of every object in the order of their bytes, no spaces,
+/// shortest round-trip numbers. The order is made here, because the JSON library's own depends on a
+/// cargo feature that any dependency can turn on.
 pub fn canonical_json<T: Serialize>(value: &T) -> Vec<u8> {
-    let value = serde_json::to_value(value).expect("specs are plain data: string keys, no failing serialisers");
+    let value = serde_json::to_value(value)
+        .expect("specs are plain data: string keys, no failing serialisers");
     let mut bytes = Vec::new();
     write_canonical(&value, &mut bytes);
     bytes
@@ -178,7 +180,10 @@ mod tests {
 
     #[test]
     fn known_digest() {
-        assert_eq!(Hash::of(b"abc").as_str(), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+        assert_eq!(
+            Hash::of(b"abc").as_str(),
+            "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
+        );
     }
 
     #[test]
@@ -194,7 +199,11 @@ mod tests {
             b: &'static str,
             a: bool,
         }
-        let value = Declared { zeta: 1e-5, alpha: vec![Some(1), None], words: Inner { b: "\"\n", a: true } };
+        let value = Declared {
+            zeta: 1e-5,
+            alpha: vec![Some(1), None],
+            words: Inner { b: "\"\n", a: true },
+        };
         let want = r#"{"alpha":[1,null],"words":{"a":true,"b":"\"\n"},"zeta":0.00001}"#;
         assert_eq!(String::from_utf8(canonical_json(&value)).unwrap(), want);
         // The same object from text in two orders.
@@ -211,8 +220,15 @@ mod tests {
         assert_eq!(text, format!("\"{}\"", good.as_str()));
         assert_eq!(serde_json::from_str::<Hash>(&text).unwrap(), good);
         let upper = text.to_uppercase();
-        for bad in ["\"\"", "\"abc\"", &text.replace('b', "g"), &upper, &text.replace("ba", "b"), "\"\\u001b[2J\"", "1"]
-        {
+        for bad in [
+            "\"\"",
+            "\"abc\"",
+            &text.replace('b', "g"),
+            &upper,
+            &text.replace("ba", "b"),
+            "\"\\u001b[2J\"",
+            "1",
+        ] {
             assert!(serde_json::from_str::<Hash>(bad).is_err(), "{bad}");
         }
         let error = Hash::try_from("\u{1b}".repeat(1000)).unwrap_err().to_string();

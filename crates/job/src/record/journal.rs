@@ -1,8 +1,9 @@
 //! A file that grows line by line; a kill at any moment leaves all whole lines.
 //!
-//! Every line carries a digest of itself and is written by one call to the system. A last line that was cut short is dropped when the
-//! journal is opened again; a line that was damaged otherwise is an error, because what it said cannot be known. The process that
-//! writes holds a lock on the file.
+//! Every line carries a digest of itself and is written by one call to the system. A last line that
+//! was cut short is dropped when the journal is opened again; a line that was damaged otherwise is
+//! an error, because what it said cannot be known. The process that writes holds a lock on the
+//! file.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -22,12 +23,15 @@ pub struct Journal {
 const DIGEST: usize = 12;
 
 impl Journal {
-    /// Opens the journal at `path` for writing, making it and its folder if they are not there. Returns it with the whole lines that it holds.
+    /// Opens the journal at `path` for writing, making it and its folder if they are not there.
+    /// Returns it with the whole lines that it holds.
     ///
     /// # Errors
-    /// If the file cannot be read or written, another process writes it, or it is damaged before its last line.
+    /// If the file cannot be read or written, another process writes it, or it is damaged before
+    /// its last line.
     pub fn open(path: &Path) -> Result<(Self, Vec<String>), FileError> {
-        let failed = |source| FileError { action: "open the journal", path: path.to_path_buf(), source };
+        let failed =
+            |source| FileError { action: "open the journal", path: path.to_path_buf(), source };
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(failed)?;
         }
@@ -36,8 +40,13 @@ impl Journal {
             Err(e) if e.kind() == io::ErrorKind::NotFound => {}
             Err(e) => return Err(failed(e)),
         }
-        let mut file =
-            OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path).map_err(failed)?;
+        let mut file = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .open(path)
+            .map_err(failed)?;
         file.try_lock().map_err(|e| match e {
             TryLockError::WouldBlock => failed(io::Error::other("another process is writing it")),
             TryLockError::Error(e) => failed(e),
@@ -56,7 +65,9 @@ impl Journal {
     pub fn read(path: &Path) -> Result<Vec<String>, FileError> {
         let bytes = super::files::read(path)?;
         let found = lines(&bytes);
-        Ok(found.map_err(|source| FileError { action: "read", path: path.to_path_buf(), source })?.0)
+        Ok(found
+            .map_err(|source| FileError { action: "read", path: path.to_path_buf(), source })?
+            .0)
     }
 
     /// Appends a line.
@@ -92,7 +103,8 @@ fn digest(line: &str) -> String {
 /// The whole lines, and how many bytes they are.
 fn lines(bytes: &[u8]) -> io::Result<(Vec<String>, usize)> {
     let whole = bytes.iter().rposition(|b| *b == b'\n').map_or(0, |i| i + 1);
-    let text = std::str::from_utf8(&bytes[..whole]).map_err(|e| io::Error::new(io::ErrorKind::InvalidData, e))?;
+    let text = std::str::from_utf8(&bytes[..whole])
+        .map_err(|e| io::Error::new(io::ErrorKind::InvalidData, e))?;
     let mut found = Vec::new();
     for (i, line) in text.lines().enumerate() {
         match line.rsplit_once('\t') {

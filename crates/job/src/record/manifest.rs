@@ -1,7 +1,8 @@
 //! Manifests: the hashes of a figure, layer by layer.
 //!
-//! A picture has a hash for its spec, its data, its verdict, its pixels and each of its files. The first layer that differs
-//! names the part of the program that changed: spec (the question), data (numerics), verdict (judgement), pixels (drawing), file (encoding).
+//! A picture has a hash for its spec, its data, its verdict, its pixels and each of its files. The
+//! first layer that differs names the part of the program that changed: spec (the question), data
+//! (numerics), verdict (judgement), pixels (drawing), file (encoding).
 
 use serde::{Deserialize, Serialize};
 
@@ -125,7 +126,8 @@ pub enum ManifestError {
     },
     /// Another format version.
     #[error(
-        "{name} is a manifest of version {found}, this program reads version {VERSION}; make it anew with `twofold bless`, or use the release that made it"
+        "{name} is a manifest of version {found}, this program reads version {VERSION}; make it \
+            anew with `twofold bless`, or use the release that made it"
     )]
     Version {
         /// Where it came from.
@@ -135,7 +137,8 @@ pub enum ManifestError {
     },
     /// A name that no figure, picture or panel can have.
     #[error(
-        "{name} names something {bad:?}: a name has letters, digits, \".\", \"_\" and \"-\", at most {LONGEST_NAME} of them, and does not begin with \".\""
+        "{name} names something {bad:?}: a name has letters, digits, \".\", \"_\" and \"-\", at \
+            most {LONGEST_NAME} of them, and does not begin with \".\""
     )]
     Name {
         /// Where it came from.
@@ -156,10 +159,14 @@ pub enum ManifestError {
 /// The longest name of a figure, picture or panel.
 const LONGEST_NAME: usize = 100;
 
-/// Whether a name can stand in a path and on a terminal: it cannot leave its folder, hide, or steer anything.
+/// Whether a name can stand in a path and on a terminal: it cannot leave its folder, hide, or steer
+/// anything.
 pub fn is_plain_name(name: &str) -> bool {
     let plain = |b: u8| b.is_ascii_alphanumeric() || matches!(b, b'.' | b'_' | b'-');
-    !name.is_empty() && name.len() <= LONGEST_NAME && !name.starts_with('.') && name.bytes().all(plain)
+    !name.is_empty()
+        && name.len() <= LONGEST_NAME
+        && !name.starts_with('.')
+        && name.bytes().all(plain)
 }
 
 impl Manifest {
@@ -167,7 +174,8 @@ impl Manifest {
     ///
     /// # Errors
     ///
-    /// If the text is not JSON, of an unknown version, names a file outside its folder, or lists a picture twice.
+    /// If the text is not JSON, of an unknown version, names a file outside its folder, or lists a
+    /// picture twice.
     pub fn parse(text: &str, name: &str) -> Result<Self, ManifestError> {
         let syntax = |source| ManifestError::Syntax { name: name.to_owned(), source };
         // The version decides how the rest is read, so it is looked at alone first.
@@ -180,14 +188,23 @@ impl Manifest {
         // Not from `value`, which has kept only the last of two fields of one name.
         let manifest: Self = serde_json::from_str(text).map_err(syntax)?;
         let pictures = manifest.pictures.iter();
-        let names = pictures.flat_map(|p| std::iter::once(&p.name).chain(p.panels.iter().map(|q| &q.label)));
+        let names = pictures
+            .flat_map(|p| std::iter::once(&p.name).chain(p.panels.iter().map(|q| &q.label)));
         let heads = [&manifest.figure, &manifest.made_by];
         if let Some(bad) = heads.into_iter().chain(names).find(|n| !is_plain_name(n)) {
-            return Err(ManifestError::Name { name: name.to_owned(), bad: bad.chars().take(200).collect() });
+            return Err(ManifestError::Name {
+                name: name.to_owned(),
+                bad: bad.chars().take(200).collect(),
+            });
         }
         let pictures = manifest.pictures.iter().enumerate();
-        match pictures.skip(1).find(|(i, p)| manifest.pictures[..*i].iter().any(|q| q.name == p.name)) {
-            Some((_, twice)) => Err(ManifestError::Twice { name: name.to_owned(), picture: twice.name.clone() }),
+        match pictures
+            .skip(1)
+            .find(|(i, p)| manifest.pictures[..*i].iter().any(|q| q.name == p.name))
+        {
+            Some((_, twice)) => {
+                Err(ManifestError::Twice { name: name.to_owned(), picture: twice.name.clone() })
+            }
             None => Ok(manifest),
         }
     }
@@ -214,7 +231,8 @@ pub struct Difference {
     pub panels: Vec<String>,
 }
 
-/// Labels of panels in a sentence: each once, with how many have it. What a panel of ours asks is often one question of a hundred of a kind.
+/// Labels of panels in a sentence: each once, with how many have it. What a panel of ours asks is
+/// often one question of a hundred of a kind.
 pub fn listed(panels: &[String]) -> String {
     let mut counted: Vec<(&str, usize)> = Vec::new();
     for panel in panels {
@@ -258,7 +276,8 @@ impl PictureEntry {
         };
         let mut labels = Vec::new();
         for (i, panel) in self.panels.iter().enumerate() {
-            // Questions of one kind have one label: the first is held against the first, the second against the second.
+            // Questions of one kind have one label: the first is held against the first, the second
+            // against the second.
             let before = self.panels[..i].iter().filter(|p| p.label == panel.label).count();
             let other = actual.panels.iter().filter(|p| p.label == panel.label).nth(before);
             if other.is_none_or(|other| !same(panel, other)) {
@@ -275,7 +294,8 @@ mod tests {
 
     fn entry() -> PictureEntry {
         let h = |s: &str| Hash::of(s.as_bytes());
-        let panel = |l: &str| PanelEntry { label: l.into(), spec: h("s"), data: h("d"), verdict: None };
+        let panel =
+            |l: &str| PanelEntry { label: l.into(), spec: h("s"), data: h("d"), verdict: None };
         PictureEntry {
             name: "fig7-printed".into(),
             spec: h("1"),
@@ -293,11 +313,19 @@ mod tests {
     fn panels_of_one_label_are_told_apart_by_their_order() {
         let h = |s: &str| Hash::of(s.as_bytes());
         let with = |data: [&str; 3]| {
-            let panels = data.map(|d| PanelEntry { label: "leaving".into(), spec: h("s"), data: h(d), verdict: None });
+            let panels = data.map(|d| PanelEntry {
+                label: "leaving".into(),
+                spec: h("s"),
+                data: h(d),
+                verdict: None,
+            });
             PictureEntry { data: h(&data.join(" ")), panels: panels.to_vec(), ..entry() }
         };
         let difference = with(["a", "b", "c"]).first_difference(&with(["a", "x", "c"])).unwrap();
-        assert_eq!((difference.layer, difference.panels), (Layer::Data, vec!["leaving".to_owned()]));
+        assert_eq!(
+            (difference.layer, difference.panels),
+            (Layer::Data, vec!["leaving".to_owned()])
+        );
         let swapped = with(["a", "b", "c"]).first_difference(&with(["b", "a", "c"])).unwrap();
         assert_eq!(swapped.panels.len(), 2);
     }
@@ -333,8 +361,12 @@ mod tests {
     #[test]
     fn names_cannot_leave_their_folder_or_steer_a_terminal() {
         let manifest = |figure: &str, name: &str, label: &str| {
-            let mut m =
-                Manifest { version: VERSION, figure: figure.into(), made_by: "0".into(), pictures: vec![entry()] };
+            let mut m = Manifest {
+                version: VERSION,
+                figure: figure.into(),
+                made_by: "0".into(),
+                pictures: vec![entry()],
+            };
             m.pictures[0].name = name.into();
             m.pictures[0].panels[0].label = label.into();
             Manifest::parse(&String::from_utf8(m.to_json()).unwrap(), "m.json")
@@ -355,7 +387,9 @@ mod tests {
             "é",
             &"a".repeat(101),
         ] {
-            for wrong in [manifest(bad, "p", "i"), manifest("fig7", bad, "i"), manifest("fig7", "p", bad)] {
+            for wrong in
+                [manifest(bad, "p", "i"), manifest("fig7", bad, "i"), manifest("fig7", "p", bad)]
+            {
                 let error = wrong.unwrap_err();
                 assert!(matches!(error, ManifestError::Name { .. }), "{bad}: {error}");
                 assert!(!error.to_string().contains('\u{1b}'));
@@ -365,7 +399,12 @@ mod tests {
 
     #[test]
     fn round_trip() {
-        let m = Manifest { version: VERSION, figure: "fig7".into(), made_by: "0.1.0".into(), pictures: vec![entry()] };
+        let m = Manifest {
+            version: VERSION,
+            figure: "fig7".into(),
+            made_by: "0.1.0".into(),
+            pictures: vec![entry()],
+        };
         assert_eq!(Manifest::parse(std::str::from_utf8(&m.to_json()).unwrap(), "m").unwrap(), m);
     }
 
@@ -410,17 +449,26 @@ mod tests {
             expected.first_difference(&fewer).unwrap(),
             Difference { layer: Layer::Spec, panels: vec!["i".into()] }
         );
-        assert_eq!(fewer.first_difference(&expected).unwrap(), Difference { layer: Layer::Spec, panels: Vec::new() });
+        assert_eq!(
+            fewer.first_difference(&expected).unwrap(),
+            Difference { layer: Layer::Spec, panels: Vec::new() }
+        );
     }
 
     /// A panel's statements are looked at though the picture's hash of them all is as it was.
     #[test]
     fn every_statement_of_a_panel_is_looked_at() {
         let mut expected = entry();
-        let verdict = VerdictEntry { claim: "c".into(), found: "f".into(), agrees: true, sha256: Hash::of(b"v") };
+        let verdict = VerdictEntry {
+            claim: "c".into(),
+            found: "f".into(),
+            agrees: true,
+            sha256: Hash::of(b"v"),
+        };
         expected.panels[1].verdict = Some(verdict);
-        let verdict =
-            |p: &mut PictureEntry, change: fn(&mut VerdictEntry)| p.panels[1].verdict.iter_mut().for_each(change);
+        let verdict = |p: &mut PictureEntry, change: fn(&mut VerdictEntry)| {
+            p.panels[1].verdict.iter_mut().for_each(change)
+        };
         type Change<'a> = &'a dyn Fn(&mut PictureEntry);
         let changes: [(Layer, Change<'_>); 7] = [
             (Layer::Spec, &|p| p.panels[1].spec = Hash::of(b"other")),
@@ -441,14 +489,22 @@ mod tests {
 
     #[test]
     fn nothing_is_said_twice() {
-        let m =
-            Manifest { version: VERSION, figure: "fig7".into(), made_by: "0".into(), pictures: vec![entry(), entry()] };
-        let error = Manifest::parse(&String::from_utf8(m.to_json()).unwrap(), "m.json").unwrap_err().to_string();
+        let m = Manifest {
+            version: VERSION,
+            figure: "fig7".into(),
+            made_by: "0".into(),
+            pictures: vec![entry(), entry()],
+        };
+        let error = Manifest::parse(&String::from_utf8(m.to_json()).unwrap(), "m.json")
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("m.json lists fig7-printed twice"), "{error}");
         let once = Manifest { pictures: vec![entry()], ..m };
         let text = String::from_utf8(once.to_json()).unwrap();
         let twice = text.replacen("\"figure\"", "\"figure\": \"fig8\", \"figure\"", 1);
-        assert!(Manifest::parse(&twice, "m.json").unwrap_err().to_string().contains("duplicate field"));
+        assert!(
+            Manifest::parse(&twice, "m.json").unwrap_err().to_string().contains("duplicate field")
+        );
     }
 
     #[test]
@@ -465,7 +521,15 @@ mod tests {
 
     #[test]
     fn layers_are_called_as_in_messages() {
-        let layers = [Layer::Spec, Layer::Data, Layer::Verdict, Layer::Pixels, Layer::Png, Layer::Svg, Layer::Pdf];
+        let layers = [
+            Layer::Spec,
+            Layer::Data,
+            Layer::Verdict,
+            Layer::Pixels,
+            Layer::Png,
+            Layer::Svg,
+            Layer::Pdf,
+        ];
         let names = ["spec", "data", "verdict", "pixels", "PNG file", "SVG file", "PDF file"];
         assert_eq!(layers.map(Layer::name), names);
         assert!(layers.is_sorted());

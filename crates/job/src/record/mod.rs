@@ -1,6 +1,7 @@
 //! Everything that touches the file system: data files, hashes, manifests.
 //!
-//! Functions that make bytes live elsewhere and are pure; here they are named, hashed, and put in place by one rename.
+//! Functions that make bytes live elsewhere and are pure; here they are named, hashed, and put in
+//! place by one rename.
 //!
 //! ```
 //! use twofold_job::record::Hash;

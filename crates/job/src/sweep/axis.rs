@@ -107,7 +107,8 @@ pub enum Values {
         /// How many.
         count: u64,
     },
-    /// Evenly spaced in the logarithm, both ends included, rounded to 15 digits so that 1e-3..1 in 4 has 0.01 in it.
+    /// Evenly spaced in the logarithm, both ends included, rounded to 15 digits so that 1e-3..1 in
+    /// 4 has 0.01 in it.
     Log {
         /// The first.
         from: f64,
@@ -153,7 +154,8 @@ pub struct AxisError {
 }
 
 /// The forms of an axis, for error messages and help.
-pub const FORMS: &str = "NAME=VALUES with VALUES one of a,b,c; FROM..TO:COUNT; FROM..TO:log:COUNT; STEP*COUNT; FROM..TO or FROM..TO:log for random \
+pub const FORMS: &str = "NAME=VALUES with VALUES one of a,b,c; FROM..TO:COUNT; FROM..TO:log:COUNT; \
+    STEP*COUNT; FROM..TO or FROM..TO:log for random \
                          draws; for seed and stream FIRST..LAST";
 
 impl fmt::Display for Coordinate {
@@ -162,7 +164,9 @@ impl fmt::Display for Coordinate {
             Coordinate::Parameter(name) => write!(f, "params.{name}"),
             Coordinate::Start(name) => write!(f, "start.{name}"),
             Coordinate::Shift(name) => write!(f, "shift.{name}"),
-            other => f.write_str(PLAIN.iter().find(|(_, c)| c == other).map_or("", |(name, _)| name)),
+            other => {
+                f.write_str(PLAIN.iter().find(|(_, c)| c == other).map_or("", |(name, _)| name))
+            }
         }
     }
 }
@@ -184,16 +188,21 @@ impl FromStr for Coordinate {
     type Err = String;
     fn from_str(text: &str) -> Result<Self, String> {
         match text.split_once('.') {
-            Some(("params", name)) if !name.is_empty() => Ok(Coordinate::Parameter(name.to_owned())),
+            Some(("params", name)) if !name.is_empty() => {
+                Ok(Coordinate::Parameter(name.to_owned()))
+            }
             Some(("start", name)) if !name.is_empty() => Ok(Coordinate::Start(name.to_owned())),
             Some(("shift", name)) if !name.is_empty() => Ok(Coordinate::Shift(name.to_owned())),
-            _ => PLAIN.iter().find(|(name, _)| *name == text).map(|(_, c)| c.clone()).ok_or_else(|| {
-                let known: Vec<&str> = PLAIN.iter().map(|(name, _)| *name).collect();
-                format!(
-                    "\"{text}\" cannot be varied; choose among params.NAME, start.NAME, shift.NAME, {}",
-                    known.join(", ")
-                )
-            }),
+            _ => PLAIN.iter().find(|(name, _)| *name == text).map(|(_, c)| c.clone()).ok_or_else(
+                || {
+                    let known: Vec<&str> = PLAIN.iter().map(|(name, _)| *name).collect();
+                    format!(
+                        "\"{text}\" cannot be varied; choose among params.NAME, start.NAME, \
+                        shift.NAME, {}",
+                        known.join(", ")
+                    )
+                },
+            ),
         }
     }
 }
@@ -203,12 +212,15 @@ impl FromStr for Axis {
 
     fn from_str(text: &str) -> Result<Self, AxisError> {
         let wrong = |problem: String| AxisError { axis: text.to_owned(), problem };
-        let (name, values) =
-            text.split_once('=').ok_or_else(|| wrong(format!("there is no \"=\"; give it as {FORMS}")))?;
+        let (name, values) = text
+            .split_once('=')
+            .ok_or_else(|| wrong(format!("there is no \"=\"; give it as {FORMS}")))?;
         let coordinate: Coordinate = name.trim().parse().map_err(wrong)?;
         let values = values.trim();
         let axis = match coordinate {
-            Coordinate::Method => Values::Names(values.split(',').map(|v| v.trim().to_owned()).collect()),
+            Coordinate::Method => {
+                Values::Names(values.split(',').map(|v| v.trim().to_owned()).collect())
+            }
             Coordinate::Seed | Coordinate::Stream => whole(values).map_err(wrong)?,
             _ => numbers(values).map_err(wrong)?,
         };
@@ -222,10 +234,14 @@ impl fmt::Display for Axis {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}=", self.coordinate)?;
         match &self.values {
-            Values::Numbers(v) if matches!(self.coordinate, Coordinate::Seed | Coordinate::Stream) => {
+            Values::Numbers(v)
+                if matches!(self.coordinate, Coordinate::Seed | Coordinate::Stream) =>
+            {
                 f.write_str(&v.iter().map(|x| format!("{x:.0}")).collect::<Vec<_>>().join(","))
             }
-            Values::Numbers(v) => f.write_str(&v.iter().map(|x| format!("{x:?}")).collect::<Vec<_>>().join(",")),
+            Values::Numbers(v) => {
+                f.write_str(&v.iter().map(|x| format!("{x:?}")).collect::<Vec<_>>().join(","))
+            }
             Values::Names(v) => f.write_str(&v.join(",")),
             Values::Whole { from, to } => write!(f, "{from}..{to}"),
             Values::Multiples { of, count } => write!(f, "{of:?}*{count}"),
@@ -266,15 +282,20 @@ fn numbers(text: &str) -> Result<Values, String> {
 }
 
 fn whole(text: &str) -> Result<Values, String> {
-    let one =
-        |t: &str| t.trim().parse::<u64>().map_err(|_| format!("\"{}\" is not a whole number from 0 on", t.trim()));
+    let one = |t: &str| {
+        t.trim()
+            .parse::<u64>()
+            .map_err(|_| format!("\"{}\" is not a whole number from 0 on", t.trim()))
+    };
     match text.split_once("..") {
         Some((from, to)) => Ok(Values::Whole { from: one(from)?, to: one(to)? }),
         None => {
             // f64 holds whole numbers up to 2^53; beyond it a list is given as ranges.
             let list: Vec<u64> = text.split(',').map(one).collect::<Result<_, _>>()?;
             if list.iter().any(|v| *v > 1 << 53) {
-                return Err("a list holds numbers up to 2^53; give larger ones as FIRST..LAST".into());
+                return Err(
+                    "a list holds numbers up to 2^53; give larger ones as FIRST..LAST".into()
+                );
             }
             Ok(Values::Numbers(list.into_iter().map(|v| v as f64).collect()))
         }
@@ -288,7 +309,8 @@ impl Axis {
     ///
     /// If there are none, or they cannot be spaced as asked, or names are not those of methods.
     pub fn validate(&self) -> Result<(), AxisError> {
-        let wrong = |problem: &str| Err(AxisError { axis: self.to_string(), problem: problem.to_owned() });
+        let wrong =
+            |problem: &str| Err(AxisError { axis: self.to_string(), problem: problem.to_owned() });
         let finite = |v: &[f64]| v.iter().all(|x| x.is_finite());
         let integer = matches!(self.coordinate, Coordinate::Seed | Coordinate::Stream);
         match (&self.values, &self.coordinate) {
@@ -305,13 +327,18 @@ impl Axis {
                     return wrong("give FIRST..LAST in rising order, up to 2^63");
                 }
             }
-            (Values::Whole { .. }, _) => return wrong("ranges of whole numbers are for seed and stream"),
+            (Values::Whole { .. }, _) => {
+                return wrong("ranges of whole numbers are for seed and stream");
+            }
             (Values::Numbers(v), _) if integer => {
-                if v.is_empty() || v.iter().any(|x| !(0.0..9.1e15).contains(x) || x.fract() != 0.0) {
+                if v.is_empty() || v.iter().any(|x| !(0.0..9.1e15).contains(x) || x.fract() != 0.0)
+                {
                     return wrong("give whole numbers from 0 on");
                 }
             }
-            (_, Coordinate::Seed | Coordinate::Stream) => return wrong("give whole numbers from 0 on"),
+            (_, Coordinate::Seed | Coordinate::Stream) => {
+                return wrong("give whole numbers from 0 on");
+            }
             (Values::Numbers(v), _) => {
                 if v.is_empty() || !finite(v) {
                     return wrong("give finite numbers");
@@ -353,7 +380,9 @@ impl Axis {
             Values::Numbers(v) => v.len() as u64,
             Values::Names(v) => v.len() as u64,
             Values::Whole { from, to } => to - from + 1,
-            Values::Multiples { count, .. } | Values::Linear { count, .. } | Values::Log { count, .. } => *count,
+            Values::Multiples { count, .. }
+            | Values::Linear { count, .. }
+            | Values::Log { count, .. } => *count,
             Values::Uniform { .. } | Values::LogUniform { .. } => 1,
         }
     }
@@ -380,7 +409,9 @@ impl Axis {
                 })
             }
             Values::Uniform { from, to } => Entry::Number(from + (to - from) * u),
-            Values::LogUniform { from, to } => Entry::Number(exp10(log10(*from) + (log10(*to) - log10(*from)) * u)),
+            Values::LogUniform { from, to } => {
+                Entry::Number(exp10(log10(*from) + (log10(*to) - log10(*from)) * u))
+            }
         }
     }
 
@@ -391,7 +422,11 @@ impl Axis {
             Coordinate::Seed | Coordinate::Stream => ColumnKind::Integer,
             _ => ColumnKind::Number,
         };
-        Column::new(&self.coordinate.to_string(), if kind == ColumnKind::Word { "" } else { "1" }, kind)
+        Column::new(
+            &self.coordinate.to_string(),
+            if kind == ColumnKind::Word { "" } else { "1" },
+            kind,
+        )
     }
 }
 
@@ -408,7 +443,9 @@ impl Coordinate {
         let component = |run: &RunSpec, name: &str| {
             let states = run.system.coordinates();
             let place = states.iter().position(|s| *s == name);
-            place.ok_or_else(|| format!("the system has no state {name}; it has {}", states.join(", ")))
+            place.ok_or_else(|| {
+                format!("the system has no state {name}; it has {}", states.join(", "))
+            })
         };
         let whole = match value {
             Entry::Integer(v) => u64::try_from(*v).unwrap_or(0),
@@ -435,7 +472,9 @@ impl Coordinate {
             Coordinate::MaxStep => run.method.step_cap = StepCap::Absolute(number),
             Coordinate::TEnd => run.t_end = number,
             Coordinate::Interval => match run.switch {
-                SwitchSpec::Filippov { .. } => return Err("restarts belong to smoothed and hysteretic runs".into()),
+                SwitchSpec::Filippov { .. } => {
+                    return Err("restarts belong to smoothed and hysteretic runs".into());
+                }
                 _ => run.schedule.restart_every = Some(number),
             },
             Coordinate::Eps => match &mut run.switch {
@@ -446,7 +485,9 @@ impl Coordinate {
                     return Err("the sharp delayed switch has no eps; give the run one".into());
                 }
                 SwitchSpec::Relay { .. } => return Err("a relay has no eps; vary its band".into()),
-                SwitchSpec::Filippov { .. } => return Err("the discontinuous system has no eps".into()),
+                SwitchSpec::Filippov { .. } => {
+                    return Err("the discontinuous system has no eps".into());
+                }
             },
             Coordinate::EpsPrime => match &mut run.switch {
                 SwitchSpec::Hysteretic { eps_prime, .. } => *eps_prime = number,
@@ -462,7 +503,8 @@ impl Coordinate {
             },
             Coordinate::Sigma => match &mut run.switch {
                 SwitchSpec::Smoothed {
-                    transition: t @ (Transition::Tanh | Transition::PerturbedTanh { .. }), ..
+                    transition: t @ (Transition::Tanh | Transition::PerturbedTanh { .. }),
+                    ..
                 }
                 | SwitchSpec::Delayed {
                     transition: Some(t @ (Transition::Tanh | Transition::PerturbedTanh { .. })),
@@ -473,8 +515,13 @@ impl Coordinate {
                 _ => return Err("sigma perturbs the smoothed switch with tanh".into()),
             },
             Coordinate::KickEvery | Coordinate::KickSize => {
-                let kick = run.schedule.kick.as_mut().ok_or("there are no kicks to vary; give the run some")?;
-                *(if *self == Coordinate::KickEvery { &mut kick.every } else { &mut kick.size }) = number;
+                let kick = run
+                    .schedule
+                    .kick
+                    .as_mut()
+                    .ok_or("there are no kicks to vary; give the run some")?;
+                *(if *self == Coordinate::KickEvery { &mut kick.every } else { &mut kick.size }) =
+                    number;
             }
             Coordinate::Seed | Coordinate::Stream => {
                 let is_seed = *self == Coordinate::Seed;
@@ -483,17 +530,23 @@ impl Coordinate {
                     *(if is_seed { &mut kick.seed } else { &mut kick.stream }) = whole;
                     random = true;
                 }
-                if let SwitchSpec::Filippov { exit: ExitRule::Random { seed, stream, .. }, .. } = &mut run.switch {
+                if let SwitchSpec::Filippov {
+                    exit: ExitRule::Random { seed, stream, .. }, ..
+                } = &mut run.switch
+                {
                     *(if is_seed { seed } else { stream }) = whole;
                     random = true;
                 }
                 if !random {
-                    return Err("nothing in this run is random; give it kicks or a random exit rule".into());
+                    return Err(
+                        "nothing in this run is random; give it kicks or a random exit rule".into(),
+                    );
                 }
             }
             Coordinate::Method => {
                 let found = Method::ALL.into_iter().find(|m| m.name() == value.word());
-                run.method.name = found.ok_or_else(|| format!("there is no method {}", value.word()))?;
+                run.method.name =
+                    found.ok_or_else(|| format!("there is no method {}", value.word()))?;
             }
         }
         Ok(())
@@ -559,13 +612,18 @@ mod tests {
         assert_eq!(Axis { coordinate: Seed, values: whole(last, last) }.validate(), Ok(()));
     }
 
-    /// An end with more digits than a grid's values are rounded to is hit exactly; so is 1/3 of a range.
+    /// An end with more digits than a grid's values are rounded to is hit exactly; so is 1/3 of a
+    /// range.
     #[test]
     fn grids_end_where_they_are_asked_to() {
         // And in binary 0.2 + (0.9 - 0.2) is not 0.9.
         for (from, to) in [(0.1 + 0.2, 1.1 * 1.1), (0.2, 0.9)] {
-            let log = Axis { coordinate: Coordinate::Rtol, values: Values::Log { from, to, count: 4 } };
-            let linear = Axis { coordinate: Coordinate::Rtol, values: Values::Linear { from, to, count: 4 } };
+            let log =
+                Axis { coordinate: Coordinate::Rtol, values: Values::Log { from, to, count: 4 } };
+            let linear = Axis {
+                coordinate: Coordinate::Rtol,
+                values: Values::Linear { from, to, count: 4 },
+            };
             for axis in [log, linear] {
                 assert_eq!((axis.value(0, 0.0), axis.value(3, 0.0)), (from.into(), to.into()));
                 assert!(axis.value(1, 0.0).value() > from && axis.value(2, 0.0).value() < to);
@@ -588,25 +646,37 @@ mod tests {
         let section = Observation::Section { coordinate: 1, value: 0.0 };
         let system = Caricature::with_reinjection(0.1, 1e-5).into();
         let mut tanh = crate::cases::run(system, SwitchSpec::tanh(1e-3), 20.0, section);
-        tanh.schedule.kick = Some(Kick { every: 0.3, size: 1e-3, law: KickLaw::Sphere, seed: 9, stream: 5 });
-        let hysteretic = RunSpec { switch: SwitchSpec::hysteretic(1e-3, Relaxation::Single), ..tanh.clone() };
+        tanh.schedule.kick =
+            Some(Kick { every: 0.3, size: 1e-3, law: KickLaw::Sphere, seed: 9, stream: 5 });
+        let hysteretic =
+            RunSpec { switch: SwitchSpec::hysteretic(1e-3, Relaxation::Single), ..tanh.clone() };
         let law = SlidingLaw::Uniform { longest: 1.0 };
-        let filippov = |exit| RunSpec { switch: SwitchSpec::Filippov { exit, funnel: None }, ..hysteretic.clone() };
-        let random = |seed, stream| filippov(ExitRule::Random { law, plus_probability: 0.5, seed, stream });
+        let filippov = |exit| RunSpec {
+            switch: SwitchSpec::Filippov { exit, funnel: None },
+            ..hysteretic.clone()
+        };
+        let random =
+            |seed, stream| filippov(ExitRule::Random { law, plus_probability: 0.5, seed, stream });
         let mut plain = filippov(ExitRule::AtOnce { side: Side::Plus });
         plain.schedule.kick = None;
-        let arctan =
-            RunSpec { switch: SwitchSpec::Smoothed { eps: 1e-3, transition: Transition::Arctan }, ..plain.clone() };
+        let arctan = RunSpec {
+            switch: SwitchSpec::Smoothed { eps: 1e-3, transition: Transition::Arctan },
+            ..plain.clone()
+        };
         let delayed = RunSpec { switch: SwitchSpec::delayed(1e-3), ..plain.clone() };
         let relay = RunSpec { switch: SwitchSpec::relay(1e-3), ..plain.clone() };
         let changed = |run: &RunSpec, text: &str| {
             let axis: Axis = text.parse().unwrap();
             let mut run = run.clone();
-            axis.coordinate.apply(&mut run, &axis.value(0, 0.5)).map(|()| serde_json::to_value(&run).unwrap())
+            axis.coordinate
+                .apply(&mut run, &axis.value(0, 0.5))
+                .map(|()| serde_json::to_value(&run).unwrap())
         };
         type Change = fn(&mut RunSpec);
         let cases: [(&RunSpec, &str, Change); 23] = [
-            (&tanh, "params.alpha=0.2", |r| r.system = Caricature::with_reinjection(0.2, 1e-5).into()),
+            (&tanh, "params.alpha=0.2", |r| {
+                r.system = Caricature::with_reinjection(0.2, 1e-5).into()
+            }),
             (&tanh, "start.y=7", |r| r.start[1] = 7.0),
             (&tanh, "shift.z=0.25", |r| r.start[2] = 1.25),
             (&tanh, "rtol=1e-6", |r| r.method.tolerance.rtol = 1e-6),
@@ -628,7 +698,10 @@ mod tests {
                 *eps_prime = 1e-4;
             }),
             (&tanh, "sigma=0.5", |r| {
-                r.switch = SwitchSpec::Smoothed { eps: 1e-3, transition: Transition::PerturbedTanh { sigma: 0.5 } };
+                r.switch = SwitchSpec::Smoothed {
+                    eps: 1e-3,
+                    transition: Transition::PerturbedTanh { sigma: 0.5 },
+                };
             }),
             (&tanh, "kick-every=0.7", |r| r.schedule.kick.as_mut().unwrap().every = 0.7),
             (&tanh, "kick-size=0.7", |r| r.schedule.kick.as_mut().unwrap().size = 0.7),
@@ -648,9 +721,14 @@ mod tests {
         }
         // Two perturbed: the new one alone.
         let SwitchSpec::Smoothed { eps, .. } = tanh.switch else { panic!() };
-        let sigma = |sigma| SwitchSpec::Smoothed { eps, transition: Transition::PerturbedTanh { sigma } };
-        let perturbed = |s| serde_json::to_value(RunSpec { switch: sigma(s), ..tanh.clone() }).unwrap();
-        assert_eq!(changed(&RunSpec { switch: sigma(0.25), ..tanh.clone() }, "sigma=0.5"), Ok(perturbed(0.5)));
+        let sigma =
+            |sigma| SwitchSpec::Smoothed { eps, transition: Transition::PerturbedTanh { sigma } };
+        let perturbed =
+            |s| serde_json::to_value(RunSpec { switch: sigma(s), ..tanh.clone() }).unwrap();
+        assert_eq!(
+            changed(&RunSpec { switch: sigma(0.25), ..tanh.clone() }, "sigma=0.5"),
+            Ok(perturbed(0.5))
+        );
         // A random exit rule and kicks share their seed.
         let (both, seeded) = (random(1, 2), changed(&random(1, 2), "seed=8").unwrap());
         let mut wanted = random(8, 2);
@@ -695,7 +773,10 @@ mod tests {
             let axis: Axis = text.parse().unwrap();
             let column = axis.column();
             let name = text.split('=').next().unwrap();
-            assert_eq!((column.name.as_str(), column.unit.as_str(), column.kind()), (name, unit, kind));
+            assert_eq!(
+                (column.name.as_str(), column.unit.as_str(), column.kind()),
+                (name, unit, kind)
+            );
         }
     }
 

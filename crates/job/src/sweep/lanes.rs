@@ -18,15 +18,17 @@ use crate::table::Entry;
 use twofold_analyse::SectionRecorder;
 use twofold_analyse::path::MOST_POINTS;
 use twofold_instances::{self as instances, Lanes};
-use twofold_integrate::ensemble::{Common, End, EnsembleRun, InstructionSet, SectionPlane, Tolerances};
+use twofold_integrate::ensemble::{
+    Common, End, EnsembleRun, InstructionSet, SectionPlane, Tolerances,
+};
 use twofold_integrate::{DriveOptions, Monitor, StopReason, Summary};
 use twofold_system::{BindError, BoundField, Field, ParameterBatch};
 
 /// Fewer cells than this are computed one after the other.
 const FEWEST: usize = 3;
 
-/// So many cells of one equation run by themselves, compiled where that is possible; with fewer, lanes would stay empty that cells of
-/// other parameters can have.
+/// So many cells of one equation run by themselves, compiled where that is possible; with fewer,
+/// lanes would stay empty that cells of other parameters can have.
 const ENOUGH: usize = 32;
 
 /// Number of pending exponents at which they are computed together: enough to fill the lanes twice,
@@ -53,7 +55,8 @@ impl Cell {
     fn plane(&self) -> Option<SectionPlane> {
         let run = self.run();
         let method = &run.method;
-        let plain = method.name == Method::Dopri5 && method.precision.is_none() && method.order.is_none();
+        let plain =
+            method.name == Method::Dopri5 && method.precision.is_none() && method.order.is_none();
         match (run.switch, run.observe) {
             (SwitchSpec::Smoothed { .. }, Observation::Section { coordinate, value })
                 if plain && STATES.contains(&run.system.dimension()) && run.validate().is_ok() =>
@@ -68,7 +71,9 @@ impl Cell {
     fn row(&self, ending: Result<Ending, JobError>) -> Row {
         match ending {
             Ok(ending) => Row::found(self.number, self.settings.clone(), &self.key, ending.outcome),
-            Err(error) => Row::failed(self.number, self.settings.clone(), Some(&self.key), error.to_string()),
+            Err(error) => {
+                Row::failed(self.number, self.settings.clone(), Some(&self.key), error.to_string())
+            }
         }
     }
 
@@ -76,7 +81,9 @@ impl Cell {
     fn equation(&self) -> Option<Field> {
         let run = self.run();
         match run.switch {
-            SwitchSpec::Smoothed { eps, transition } => Some(Field::smoothed(&run.system, transition, eps)),
+            SwitchSpec::Smoothed { eps, transition } => {
+                Some(Field::smoothed(&run.system, transition, eps))
+            }
             _ => None,
         }
     }
@@ -86,7 +93,8 @@ impl Cell {
         a.system == b.system && a.switch == b.switch
     }
 
-    /// Whether both have one section: what all lanes share besides the operations of their equations.
+    /// Whether both have one section: what all lanes share besides the operations of their
+    /// equations.
     fn is_asked_like(&self, other: &Self) -> bool {
         let (a, b) = (self.run(), other.run());
         a.observe == b.observe && a.method.name == b.method.name
@@ -103,7 +111,8 @@ struct Group {
 }
 
 impl Group {
-    /// Those among `cells` that share lanes, together; cells of one equation that are many share them with no others.
+    /// Those among `cells` that share lanes, together; cells of one equation that are many share
+    /// them with no others.
     fn all(cells: Vec<Cell>) -> Vec<Self> {
         let mut of_one: Vec<Self> = Vec::new();
         for cell in cells {
@@ -120,11 +129,13 @@ impl Group {
                 })),
             }
         }
-        let (mut groups, few): (Vec<Self>, Vec<Self>) = of_one.into_iter().partition(|g| g.cells.len() >= ENOUGH);
+        let (mut groups, few): (Vec<Self>, Vec<Self>) =
+            of_one.into_iter().partition(|g| g.cells.len() >= ENOUGH);
         let apart = groups.len();
         for group in few {
             let batch = |other: &&mut Self| {
-                other.cells[0].is_asked_like(&group.cells[0]) && other.equation.is_like(&group.equation)
+                other.cells[0].is_asked_like(&group.cells[0])
+                    && other.equation.is_like(&group.equation)
             };
             match groups[apart..].iter_mut().find(batch) {
                 Some(other) => {
@@ -153,7 +164,11 @@ struct Both<'a> {
 
 impl Monitor for Both<'_> {
     fn reached(&self, t: f64) -> ControlFlow<()> {
-        if self.enough.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { self.display.reached(t) }
+        if self.enough.load(Ordering::Relaxed) {
+            ControlFlow::Break(())
+        } else {
+            self.display.reached(t)
+        }
     }
 }
 
@@ -167,7 +182,10 @@ impl Sweep {
     /// Whether these two rows would share lanes on this machine, so that computing many at once
     /// pays.
     pub fn share_lanes(&self, a: u64, b: u64) -> bool {
-        let cells = [a, b].into_iter().filter_map(|number| self.cell(number)).filter(|cell| cell.plane().is_some());
+        let cells = [a, b]
+            .into_iter()
+            .filter_map(|number| self.cell(number))
+            .filter(|cell| cell.plane().is_some());
         InstructionSet::best() != InstructionSet::Portable
             && Group::all(cells.collect()).iter().any(|group| group.cells.len() == 2)
     }
@@ -178,8 +196,10 @@ impl Sweep {
         Some(Cell { number, settings: self.settings(number), question, key })
     }
 
-    /// Computes the rows of these numbers, and gives each to `take` as it is finished, which says whether it wants more: the rows that [`Sweep::row`] makes, bit for bit.
-    /// Those that have the operations of their equation and the section in common run side by side in the lanes of vector registers, where the machine has any.
+    /// Computes the rows of these numbers, and gives each to `take` as it is finished, which says
+    /// whether it wants more: the rows that [`Sweep::row`] makes, bit for bit. Those that have the
+    /// operations of their equation and the section in common run side by side in the lanes of
+    /// vector registers, where the machine has any.
     ///
     /// # Errors
     ///
@@ -208,7 +228,10 @@ impl Sweep {
         let mut cells = Vec::new();
         let mut single = Vec::new();
         for &number in numbers {
-            match self.cell(number).filter(|cell| set != InstructionSet::Portable && cell.plane().is_some()) {
+            match self
+                .cell(number)
+                .filter(|cell| set != InstructionSet::Portable && cell.plane().is_some())
+            {
                 Some(cell) => cells.push(cell),
                 None => single.push(number),
             }
@@ -250,9 +273,16 @@ impl Sweep {
     }
 
     /// A row that lanes do not compute; without its exponent, if lanes may compute that.
-    fn begun(&self, set: InstructionSet, number: u64, progress: &dyn Progress) -> Result<Begun, JobError> {
+    fn begun(
+        &self,
+        set: InstructionSet,
+        number: u64,
+        progress: &dyn Progress,
+    ) -> Result<Begun, JobError> {
         let smoothed = |cell: &Cell| matches!(cell.run().switch, SwitchSpec::Smoothed { .. });
-        let Some(cell) = self.cell(number).filter(|cell| set != InstructionSet::Portable && smoothed(cell)) else {
+        let Some(cell) =
+            self.cell(number).filter(|cell| set != InstructionSet::Portable && smoothed(cell))
+        else {
             return Ok(Begun::Row(self.row(number, progress)?));
         };
         let executor = Executor::new(None, progress);
@@ -315,7 +345,8 @@ fn side_by_side<const N: usize>(
     let first = cells[0].run();
     let plane = cells[0].plane();
     let runs: Vec<EnsembleRun<N>> = cells.iter().map(|cell| options(cell.run())).collect();
-    // y and z, as `OutcomeQuestion` looks at them; systems that have such a corner have three states. No state is above infinity.
+    // y and z, as `OutcomeQuestion` looks at them; systems that have such a corner have three
+    // states. No state is above infinity.
     let corners: Vec<SVector<f64, N>> = cells
         .iter()
         .map(|cell| match far::corner(cell.run()) {
@@ -323,11 +354,18 @@ fn side_by_side<const N: usize>(
             None => SVector::repeat(f64::INFINITY),
         })
         .collect();
-    let corners = corners.iter().any(|corner| corner[N - 1] < f64::INFINITY).then_some(&corners[..]);
+    let corners =
+        corners.iter().any(|corner| corner[N - 1] < f64::INFINITY).then_some(&corners[..]);
     let display = progress.begin("cells side by side", first.t_end);
     let monitor = Both { display: &*display, enough };
     let tolerances: Vec<_> = cells.iter().map(|cell| cell.run().method.tolerance).collect();
-    let common = Common { tolerances: Tolerances::Each(&tolerances), plane, corners, carried: None, monitor: &monitor };
+    let common = Common {
+        tolerances: Tolerances::Each(&tolerances),
+        plane,
+        corners,
+        carried: None,
+        monitor: &monitor,
+    };
     let section = match plane {
         Some(SectionPlane { coordinate, value }) => SectionRecorder::<N>::new(coordinate, value),
         None => SectionRecorder::<N>::new(0, 0.0),
@@ -419,9 +457,12 @@ fn exponents(
     for (i, Waiting { cell, answer, exponent }) in waiting.into_iter().enumerate() {
         let known = match &found {
             Some(found) => Ok(found[i]),
-            None => Executor::new(None, progress).ask(&*exponent).map(|answer| exponent.found(&answer)),
+            None => {
+                Executor::new(None, progress).ask(&*exponent).map(|answer| exponent.found(&answer))
+            }
         };
-        let outcome = known.and_then(|exponent| cells[cell].question.with_exponent(&answer, exponent));
+        let outcome =
+            known.and_then(|exponent| cells[cell].question.with_exponent(&answer, exponent));
         if outcome == Err(JobError::Interrupted) {
             return Err(JobError::Interrupted);
         }
@@ -492,12 +533,14 @@ mod tests {
         sweep.rows_together(&numbers, &groups, &mut take).unwrap();
         rows.sort_by_key(Row::number);
         let rows: Vec<String> = rows.iter().map(Row::line).collect();
-        let alone: Vec<String> = numbers.iter().map(|row| sweep.row(*row, &()).unwrap().line()).collect();
+        let alone: Vec<String> =
+            numbers.iter().map(|row| sweep.row(*row, &()).unwrap().line()).collect();
         assert_eq!(rows, alone);
         groups.0.into_inner().unwrap()
     }
 
-    /// Three cells and more share lanes, in systems of two to four states, with files' equations and compiled ones.
+    /// Three cells and more share lanes, in systems of two to four states, with files' equations
+    /// and compiled ones.
     #[test]
     fn three_cells_share_lanes() {
         if InstructionSet::best() == InstructionSet::Portable {
@@ -534,7 +577,10 @@ mod tests {
         let run = cases::run(turning, SwitchSpec::tanh(1e-2), 300.0, observe);
         let sweep = Sweep::new(run, vec!["shift.x=1e-3*5".parse().unwrap()], None).unwrap();
         let mut none = |row: Row| panic!("row {}", row.number());
-        assert_eq!(sweep.rows_together(&[0, 1, 2, 3, 4], &Never, &mut none), Err(JobError::Interrupted));
+        assert_eq!(
+            sweep.rows_together(&[0, 1, 2, 3, 4], &Never, &mut none),
+            Err(JobError::Interrupted)
+        );
         let mut taken = 0;
         let mut two = |_: Row| {
             taken += 1;
@@ -544,7 +590,8 @@ mod tests {
         assert_eq!(taken, 2);
     }
 
-    /// Cells that differ in the width alone, in a system that switches: each has an equation of its own.
+    /// Cells that differ in the width alone, in a system that switches: each has an equation of its
+    /// own.
     #[test]
     fn widths_of_one_system_are_other_equations() {
         let caricature = System::from(Caricature::with_reinjection(0.1, 1e-5));

@@ -1,10 +1,13 @@
 //! Sweeps: one run with some of its numbers varied, and the outcome of each.
 //!
-//! A [`Sweep`] is a run, the [`Axis`] list over which it varies, and how often random axes are drawn. Its cells are numbered; a cell is a question
-//! ([`OutcomeQuestion`]) with a key of its own and becomes a row of a table: its settings, and where it ends. A cell that fails is a row with its reason.
+//! A [`Sweep`] is a run, the [`Axis`] list over which it varies, and how often random axes are
+//! drawn. Its cells are numbered; a cell is a question ([`OutcomeQuestion`]) with a key of its own
+//! and becomes a row of a table: its settings, and where it ends. A cell that fails is a row with
+//! its reason.
 //!
-//! Rows depend on nothing but their number: [`Rows`] computed anywhere, in any order and any parts ([`Shard`]), by processes that were killed
-//! and resumed, merge to the same bytes. Random axes are drawn and kicks are seeded by the row's number.
+//! Rows depend on nothing but their number: [`Rows`] computed anywhere, in any order and any parts
+//! ([`Shard`]), by processes that were killed and resumed, merge to the same bytes. Random axes are
+//! drawn and kicks are seeded by the row's number.
 //!
 //! ```
 //! use twofold_job::{Executor, spec::*, sweep::{Rows, Shard, Sweep}};
@@ -18,7 +21,8 @@
 //!     schedule: Default::default(),
 //!     observe: Observation::Section { coordinate: 1, value: 0.0 },
 //! };
-//! let sweep = Sweep::new(run, vec!["params.alpha=0.1,0.2".parse()?, "interval=20,40".parse()?], None)?;
+//! let axes = vec!["params.alpha=0.1,0.2".parse()?, "interval=20,40".parse()?];
+//! let sweep = Sweep::new(run, axes, None)?;
 //! let mut rows = [1, 2].map(|k| {
 //!     let mut rows = Rows::of(sweep.clone());
 //!     for row in (Shard { k, n: 2 }).rows(&sweep) {
@@ -59,7 +63,8 @@ use twofold_num::random::RandomStream;
 /// Maximum number of rows of a sweep.
 pub const MOST_ROWS: u64 = 1_000_000_000;
 
-/// Marks the streams from which random axes are drawn, so that they share no numbers with the kicks of runs of the same seed.
+/// Marks the streams from which random axes are drawn, so that they share no numbers with the kicks
+/// of runs of the same seed.
 const DRAWS: u64 = 0x5377_6565_7000_0000;
 
 /// A run with some of its numbers varied.
@@ -151,12 +156,15 @@ impl std::str::FromStr for Shard {
         let parts = text.split_once('/').map(|(k, n)| (k.trim().parse(), n.trim().parse()));
         match parts {
             Some((Ok(k), Ok(n))) if (1..=n).contains(&k) => Ok(Shard { k, n }),
-            _ => Err(format!("\"{text}\" is not a shard; give K/N with K from 1 to N, such as 2/8")),
+            _ => {
+                Err(format!("\"{text}\" is not a shard; give K/N with K from 1 to N, such as 2/8"))
+            }
         }
     }
 }
 
-/// The settings of a row, axis by axis, the last axis running fastest; random axes by a draw from [0, 1) each.
+/// The settings of a row, axis by axis, the last axis running fastest; random axes by a draw from
+/// [0, 1) each.
 pub(crate) fn grid(over: &[Axis], row: u64, draws: &[f64]) -> Vec<Entry> {
     let mut rest = row % over.iter().map(Axis::count).product::<u64>();
     let one = |(axis, u): (&Axis, &f64)| {
@@ -174,8 +182,9 @@ impl Sweep {
     ///
     /// # Errors
     ///
-    /// If an axis would have no effect or gives what another gives, if random axes and draws do not come together, or there are too many
-    /// rows. A cell whose numbers are wrong is no error here but a row.
+    /// If an axis would have no effect or gives what another gives, if random axes and draws do not
+    /// come together, or there are too many rows. A cell whose numbers are wrong is no error here
+    /// but a row.
     pub fn new(run: RunSpec, over: Vec<Axis>, random: Option<Draws>) -> Result<Self, SweepError> {
         run.validate()?;
         for (i, axis) in over.iter().enumerate() {
@@ -183,8 +192,13 @@ impl Sweep {
             for other in &over[..i] {
                 use Coordinate::{Atol, Rtol, Tolerance};
                 let pair = (&axis.coordinate, &other.coordinate);
-                if pair.0 == pair.1 || matches!(pair, (Tolerance, Rtol | Atol) | (Rtol | Atol, Tolerance)) {
-                    return Err(SweepError::Twice(other.coordinate.to_string(), axis.coordinate.to_string()));
+                if pair.0 == pair.1
+                    || matches!(pair, (Tolerance, Rtol | Atol) | (Rtol | Atol, Tolerance))
+                {
+                    return Err(SweepError::Twice(
+                        other.coordinate.to_string(),
+                        axis.coordinate.to_string(),
+                    ));
                 }
             }
             let mut tried = run.clone();
@@ -198,15 +212,19 @@ impl Sweep {
                     "an axis FROM..TO is drawn at random: say how often, or give FROM..TO:COUNT",
                 ));
             }
-            (false, Some(_)) => return Err(SweepError::Draws("no axis is drawn at random: give one as FROM..TO")),
-            (true, Some(Draws { count: 0, .. })) => return Err(SweepError::Draws("give one draw or more")),
+            (false, Some(_)) => {
+                return Err(SweepError::Draws("no axis is drawn at random: give one as FROM..TO"));
+            }
+            (true, Some(Draws { count: 0, .. })) => {
+                return Err(SweepError::Draws("give one draw or more"));
+            }
             _ => {}
         }
         let sweep = Self { run, over, random, thresholds: Thresholds::default() };
-        let rows: u128 = sweep
-            .over
-            .iter()
-            .fold(u128::from(random.map_or(1, |r| r.count)), |n, axis| n.saturating_mul(u128::from(axis.count())));
+        let rows: u128 =
+            sweep.over.iter().fold(u128::from(random.map_or(1, |r| r.count)), |n, axis| {
+                n.saturating_mul(u128::from(axis.count()))
+            });
         if rows > u128::from(MOST_ROWS) { Err(SweepError::TooMany(rows)) } else { Ok(sweep) }
     }
 
@@ -225,8 +243,9 @@ impl Sweep {
         self.random
     }
 
-    /// The same with another number of draws. They run slowest: the rows of the smaller sweep are the first rows of the larger one, with the same
-    /// numbers and contents. `None` without random axes.
+    /// The same with another number of draws. They run slowest: the rows of the smaller sweep are
+    /// the first rows of the larger one, with the same numbers and contents. `None` without random
+    /// axes.
     pub fn with_draws(&self, count: u64) -> Option<Self> {
         let random = Some(Draws { count, ..self.random? });
         Some(Self { random, ..self.clone() })
@@ -251,8 +270,11 @@ impl Sweep {
     pub fn settings(&self, row: u64) -> Vec<Entry> {
         let mut random = RandomStream::new(self.random.map_or(0, |r| r.seed) ^ DRAWS, row);
         // Drawn in the order of the axes, whatever the grid.
-        let draws: Vec<f64> =
-            self.over.iter().map(|axis| if axis.is_random() { random.uniform() } else { 0.0 }).collect();
+        let draws: Vec<f64> = self
+            .over
+            .iter()
+            .map(|axis| if axis.is_random() { random.uniform() } else { 0.0 })
+            .collect();
         grid(&self.over, row, &draws)
     }
 
@@ -265,11 +287,14 @@ impl Sweep {
         let mut run = self.run.clone();
         let varied = |c: &Coordinate| self.over.iter().any(|axis| axis.coordinate == *c);
         if !varied(&Coordinate::Stream) {
-            // Chance of its own in every row: the same kicks from neighbouring starts would not be independent runs.
+            // Chance of its own in every row: the same kicks from neighbouring starts would not be
+            // independent runs.
             if let Some(kick) = &mut run.schedule.kick {
                 kick.stream = kick.stream.wrapping_add(row);
             }
-            if let SwitchSpec::Filippov { exit: ExitRule::Random { stream, .. }, .. } = &mut run.switch {
+            if let SwitchSpec::Filippov { exit: ExitRule::Random { stream, .. }, .. } =
+                &mut run.switch
+            {
                 *stream = stream.wrapping_add(row);
             }
         }
@@ -277,7 +302,9 @@ impl Sweep {
         // A shift is added to a start, so it comes after it.
         let is_shift = |axis: &&(&Axis, Entry)| matches!(axis.0.coordinate, Coordinate::Shift(_));
         let pairs: Vec<(&Axis, Entry)> = self.over.iter().zip(settings).collect();
-        for (axis, value) in pairs.iter().filter(|p| !is_shift(p)).chain(pairs.iter().filter(is_shift)) {
+        for (axis, value) in
+            pairs.iter().filter(|p| !is_shift(p)).chain(pairs.iter().filter(is_shift))
+        {
             axis.coordinate.apply(&mut run, value)?;
         }
         Ok(OutcomeQuestion(Classification { run, thresholds: self.thresholds }))
@@ -295,7 +322,8 @@ impl Sweep {
             Err(reason) => return Ok(Row::failed(row, settings, None, reason)),
         };
         let key = question_hash(&question);
-        // An executor of its own: what it has computed is forgotten with it, however many rows there are.
+        // An executor of its own: what it has computed is forgotten with it, however many rows
+        // there are.
         let answer = Executor::new(None, progress).ask(&question);
         match answer.and_then(|a| Ok(a.fact::<Outcome>("outcome")?)) {
             Ok(outcome) => Ok(Row::found(row, settings, &key, outcome)),
@@ -343,16 +371,26 @@ mod tests {
         assert_eq!(shifts.len(), 30, "every row has a draw of its own");
         // Frozen: a row's draw is a function of seed and number alone.
         assert_eq!(sweep.settings(3)[1], sweep.settings(3)[1]);
-        assert_ne!(sweep.settings(3)[1], Entry::Number(RandomStream::new(1, 3).uniform_in(-1.0, 1.0)));
+        assert_ne!(
+            sweep.settings(3)[1],
+            Entry::Number(RandomStream::new(1, 3).uniform_in(-1.0, 1.0))
+        );
     }
 
     #[test]
     fn a_seed_and_a_number_make_a_draw() {
-        let sweep =
-            |count, seed| Sweep::new(run(), axes(&["shift.x=-1..1", "eps=1e-2,1e-3"]), Some(Draws { count, seed }));
+        let sweep = |count, seed| {
+            Sweep::new(
+                run(),
+                axes(&["shift.x=-1..1", "eps=1e-2,1e-3"]),
+                Some(Draws { count, seed }),
+            )
+        };
         let draw = |seed, row| sweep(3, seed).unwrap().settings(row)[0].value();
-        let mut draws: Vec<f64> =
-            (0..4).flat_map(|seed| (0..6).map(move |row| (seed, row))).map(|(s, r)| draw(s, r)).collect();
+        let mut draws: Vec<f64> = (0..4)
+            .flat_map(|seed| (0..6).map(move |row| (seed, row)))
+            .map(|(s, r)| draw(s, r))
+            .collect();
         draws.sort_by(f64::total_cmp);
         draws.dedup();
         assert_eq!(draws.len(), 24, "every seed's rows have draws of their own");
@@ -406,7 +444,8 @@ mod tests {
             let error = Sweep::new(run(), axes(&texts), None).unwrap_err().to_string();
             assert!(error.contains(word), "{texts:?}: {error}");
         }
-        let error = Sweep::new(run(), axes(&["rtol=1e-6"]), Some(Draws { count: 2, seed: 0 })).unwrap_err();
+        let error =
+            Sweep::new(run(), axes(&["rtol=1e-6"]), Some(Draws { count: 2, seed: 0 })).unwrap_err();
         assert!(error.to_string().contains("no axis"), "{error}");
         let many = axes(&["seed=0..99999999", "stream=0..99999999"]);
         let kick = Some(Kick { every: 0.3, size: 1e-3, law: KickLaw::Sphere, seed: 0, stream: 0 });
@@ -418,7 +457,8 @@ mod tests {
     fn every_row_of_a_kicked_run_has_kicks_of_its_own() {
         let kick = Some(Kick { every: 0.3, size: 1e-3, law: KickLaw::Sphere, seed: 9, stream: 5 });
         let kicked = RunSpec { schedule: Schedule { restart_every: None, kick }, ..run() };
-        let stream = |sweep: &Sweep, row| sweep.question(row).unwrap().0.run.schedule.kick.unwrap().stream;
+        let stream =
+            |sweep: &Sweep, row| sweep.question(row).unwrap().0.run.schedule.kick.unwrap().stream;
         let sweep = Sweep::new(kicked.clone(), axes(&["shift.x=1e-9*4"]), None).unwrap();
         assert_eq!([0, 1, 3].map(|row| stream(&sweep, row)), [5, 6, 8]);
         let sweep = Sweep::new(kicked, axes(&["stream=3,3"]), None).unwrap();
@@ -434,7 +474,8 @@ mod tests {
             seed: 1,
             stream: 0,
         };
-        let run = RunSpec { switch: SwitchSpec::Filippov { exit, funnel: None }, t_end: 300.0, ..run() };
+        let run =
+            RunSpec { switch: SwitchSpec::Filippov { exit, funnel: None }, t_end: 300.0, ..run() };
         let sweep = Sweep::new(run, axes(&["shift.x=1e-9*2"]), None).unwrap();
         let rows = [0, 1].map(|row| sweep.row(row, &()).unwrap());
         assert!(rows.iter().all(|r| r.outcome().starts_with("noisy")), "{rows:?}");
@@ -461,8 +502,11 @@ mod tests {
     #[test]
     fn an_outcome_that_is_not_far_is_the_classification() {
         let run = RunSpec { t_end: 400.0, ..run() };
-        let outcome: Outcome =
-            Executor::quiet().ask(&OutcomeQuestion(Classification::of(run.clone()))).unwrap().fact("outcome").unwrap();
+        let outcome: Outcome = Executor::quiet()
+            .ask(&OutcomeQuestion(Classification::of(run.clone())))
+            .unwrap()
+            .fact("outcome")
+            .unwrap();
         let evidence = Classification::of(run).ask(&Executor::quiet()).unwrap();
         assert_eq!(outcome.crossings, evidence.crossings as u64);
         assert_eq!(outcome.exponent, evidence.lyapunov.map(|l| l.value));
@@ -472,7 +516,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(48))]
 
-        /// Whatever the parts, their order, how they were cut short and how often a row was computed: the same bytes.
+        /// Whatever the parts, their order, how they were cut short and how often a row was
+        /// computed: the same bytes.
         #[test]
         fn merging_gives_the_same_bytes_however_the_rows_came(
             owners in prop::collection::vec(0_usize..4, 12),
@@ -486,7 +531,8 @@ mod tests {
                 axes(&["params.alpha=0.1,0.2", "eps=1e-2,-1,1e-3"]),
                 None,
             ).unwrap();
-            let sweep = Sweep { random: Some(Draws { count: 2, seed: 3 }), over: [sweep.over, axes(&["shift.x=0..1e-9"])].concat(), ..sweep };
+            let sweep = Sweep { random: Some(Draws { count: 2, seed: 3 }), over: [sweep.over,
+                axes(&["shift.x=0..1e-9"])].concat(), ..sweep };
             let row = |i: usize| sweep.row(i as u64, &()).unwrap();
             let mut whole = Rows::of(sweep.clone());
             let mut parts: Vec<Rows> = (0..4).map(|_| Rows::of(sweep.clone())).collect();
@@ -498,7 +544,8 @@ mod tests {
                 parts[(i + 1) % 4].insert(row(i)).unwrap();
             }
             // A part goes through a file, a journal or CSV, or stays in memory.
-            let mut parts: Vec<Option<Rows>> = parts.into_iter().zip(&kinds).map(|(part, kind)| Some(match kind {
+            let mut parts: Vec<Option<Rows>> = parts.into_iter().zip(&kinds).map(|(part,
+                kind)| Some(match kind {
                 0 => Rows::from_journal(&part.journal()).unwrap(),
                 1 => Rows::from_csv(&part.csv()).unwrap(),
                 _ => part,

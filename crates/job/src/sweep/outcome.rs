@@ -16,8 +16,8 @@ use twofold_analyse::attractor::{Evidence, Verdict};
 use twofold_analyse::lyapunov::Exponent;
 use twofold_integrate::Monitor;
 
-/// What a run settles on, as [`Classification`] has it, or that it ends at a rest ([`rest`]), or that it goes to the far state: the region that
-/// no orbit leaves. Fact: `outcome` ([`Outcome`]).
+/// What a run settles on, as [`Classification`] has it, or that it ends at a rest ([`rest`]), or
+/// that it goes to the far state: the region that no orbit leaves. Fact: `outcome` ([`Outcome`]).
 #[derive(Clone, Debug, PartialEq)]
 pub struct OutcomeQuestion(pub Classification);
 
@@ -25,12 +25,14 @@ pub struct OutcomeQuestion(pub Classification);
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Outcome {
-    /// In a word: `rest`, `period-1`, `leaving-period-1` (turns around it and moves away), `quasi-periodic`, `irregular`, `undecided`, `noisy`,
-    /// `noisy-around-period-1`, `far`, `escaped`, `too-few`.
+    /// In a word: `rest`, `period-1`, `leaving-period-1` (turns around it and moves away),
+    /// `quasi-periodic`, `irregular`, `undecided`, `noisy`, `noisy-around-period-1`, `far`,
+    /// `escaped`, `too-few`.
     pub word: String,
     /// Period of the closed orbit, 0 where there is none.
     pub period: u64,
-    /// From then on the run only turns around that orbit; of a far run, when it entered the region without return.
+    /// From then on the run only turns around that orbit; of a far run, when it entered the region
+    /// without return.
     pub captured_at: Option<f64>,
     /// From then on it is there.
     pub settled_at: Option<f64>,
@@ -59,14 +61,16 @@ pub struct Outcome {
 pub struct Ending {
     /// What the run settles on.
     pub outcome: Outcome,
-    /// The points of a closed orbit in the plane of the section, in the order of the motion, or the state at rest; else nothing.
+    /// The points of a closed orbit in the plane of the section, in the order of the motion, or the
+    /// state at rest; else nothing.
     pub place: Vec<Vec<f64>>,
 }
 
 impl Ending {
     fn of(evidence: &Evidence, answer: &Answer) -> Result<Self, JobError> {
         let cycle = evidence.verdict.cycle();
-        let place = cycle.map_or(Vec::new(), |c| c.points.iter().take(c.period).map(|p| p.u.to_vec()).collect());
+        let place = cycle
+            .map_or(Vec::new(), |c| c.points.iter().take(c.period).map(|p| p.u.to_vec()).collect());
         Ok(Self { outcome: Outcome::of(evidence, answer)?, place })
     }
 }
@@ -158,7 +162,8 @@ impl Question for OutcomeQuestion {
 
     fn compute(&self, executor: &Executor<'_>, monitor: &dyn Monitor) -> Result<Answer, JobError> {
         let answer = self.run(executor, monitor)?;
-        Ok(Answer::of_tables(Vec::new()).with_fact("outcome", &self.judged(executor, &answer)?.outcome))
+        Ok(Answer::of_tables(Vec::new())
+            .with_fact("outcome", &self.judged(executor, &answer)?.outcome))
     }
 }
 
@@ -173,7 +178,11 @@ impl OutcomeQuestion {
     /// # Errors
     ///
     /// Whatever the computation met.
-    pub(super) fn run(&self, executor: &Executor<'_>, monitor: &dyn Monitor) -> Result<Answer, JobError> {
+    pub(super) fn run(
+        &self,
+        executor: &Executor<'_>,
+        monitor: &dyn Monitor,
+    ) -> Result<Answer, JobError> {
         let run = &self.0.run;
         match (&self.is_far(), run.switch) {
             // Filippov motion has no layer to be stiff in: it gets to its end.
@@ -193,7 +202,11 @@ impl OutcomeQuestion {
     /// # Errors
     ///
     /// Whatever the computation met.
-    pub fn ending(&self, executor: &Executor<'_>, monitor: &dyn Monitor) -> Result<Ending, JobError> {
+    pub fn ending(
+        &self,
+        executor: &Executor<'_>,
+        monitor: &dyn Monitor,
+    ) -> Result<Ending, JobError> {
         self.judged(executor, &self.run(executor, monitor)?)
     }
 
@@ -205,7 +218,9 @@ impl OutcomeQuestion {
     fn judged(&self, executor: &Executor<'_>, answer: &Answer) -> Result<Ending, JobError> {
         match self.so_far(executor, answer)? {
             SoFar::Judged(outcome) => Ok(outcome),
-            SoFar::Awaits(exponent) => self.with_exponent(answer, exponent.found(&*executor.ask(&*exponent)?)),
+            SoFar::Awaits(exponent) => {
+                self.with_exponent(answer, exponent.found(&*executor.ask(&*exponent)?))
+            }
         }
     }
 
@@ -214,7 +229,11 @@ impl OutcomeQuestion {
     /// # Errors
     ///
     /// As [`OutcomeQuestion::judged`].
-    pub(super) fn so_far(&self, executor: &Executor<'_>, answer: &Answer) -> Result<SoFar<Ending>, JobError> {
+    pub(super) fn so_far(
+        &self,
+        executor: &Executor<'_>,
+        answer: &Answer,
+    ) -> Result<SoFar<Ending>, JobError> {
         if answer.stop == Stop::Interrupted {
             return Err(JobError::Interrupted);
         }
@@ -237,7 +256,11 @@ impl OutcomeQuestion {
     /// # Errors
     ///
     /// If the answer is none to the run's question.
-    pub(super) fn with_exponent(&self, answer: &Answer, exponent: Option<Exponent>) -> Result<Ending, JobError> {
+    pub(super) fn with_exponent(
+        &self,
+        answer: &Answer,
+        exponent: Option<Exponent>,
+    ) -> Result<Ending, JobError> {
         Ending::of(&self.0.with_exponent(answer, exponent)?, answer)
     }
 }
@@ -266,7 +289,12 @@ mod tests {
             radius: 1e-3,
             captured_at: 100.0,
             settled_at: Some(200.0),
-            approach: per_time.map(|per_time| Rate { per_time, standard_error: 1e-4, from: 1.0, to: 2.0 }),
+            approach: per_time.map(|per_time| Rate {
+                per_time,
+                standard_error: 1e-4,
+                from: 1.0,
+                to: 2.0,
+            }),
             rotation: None,
         };
         let lyapunov = Some(Exponent { value: 0.25, standard_error: 0.01, duration: 1e4 });
@@ -286,13 +314,23 @@ mod tests {
             let cycle = verdict.cycle().cloned();
             let evidence = Evidence { verdict, lyapunov, crossings: 6, ..evidence.clone() };
             let found = Outcome::of(&evidence, &answer).unwrap();
-            assert_eq!((found.word.as_str(), found.crossings, found.end, found.steps), (word, 6, 20.0, 77));
-            let (captured, settled) = (cycle.as_ref().map(|_| 100.0), cycle.as_ref().map(|_| 200.0));
+            assert_eq!(
+                (found.word.as_str(), found.crossings, found.end, found.steps),
+                (word, 6, 20.0, 77)
+            );
+            let (captured, settled) =
+                (cycle.as_ref().map(|_| 100.0), cycle.as_ref().map(|_| 200.0));
             assert_eq!((found.captured_at, found.settled_at), (captured, settled));
-            assert_eq!((found.radius, found.turn), (cycle.as_ref().map(|_| 1e-3), cycle.as_ref().map(|_| 4.5)));
+            assert_eq!(
+                (found.radius, found.turn),
+                (cycle.as_ref().map(|_| 1e-3), cycle.as_ref().map(|_| 4.5))
+            );
             assert_eq!(found.period, if cycle.is_some() { 3 } else { 0 });
             let approach = cycle.and_then(|c| c.approach);
-            assert_eq!((found.rate, found.rate_error), (approach.map(|a| a.per_time), approach.map(|_| 1e-4)));
+            assert_eq!(
+                (found.rate, found.rate_error),
+                (approach.map(|a| a.per_time), approach.map(|_| 1e-4))
+            );
             assert_eq!((found.exponent, found.exponent_error), (Some(0.25), Some(0.01)));
         }
     }

@@ -15,7 +15,8 @@ use crate::table::{Column, ColumnKind, Entry, Table};
 const FORMAT: &str = "twofold-sweep";
 /// The version of that format. From version 2 on `data` is the digest of the heading, too.
 const VERSION: u64 = 2;
-/// Hexadecimal digits of a question's digest that a row carries: as many as fit a whole number of a table.
+/// Hexadecimal digits of a question's digest that a row carries: as many as fit a whole number of a
+/// table.
 const KEY: usize = 15;
 
 /// The outcome of a row that failed.
@@ -39,12 +40,16 @@ pub enum RowsError {
     OtherSweep(String, String),
     /// Two versions of the numerics.
     #[error(
-        "its rows were computed by another version of the numerics ({0}) than those before it ({1}): compute one of the parts \
+        "its rows were computed by another version of the numerics ({0}) than those before it \
+            ({1}): compute one of the parts \
          anew, or go on with it by `twofold sweep --resume --recheck N`"
     )]
     OtherNumerics(String, String),
     /// Two values.
-    #[error("row {0} has two different contents: they were computed by different versions, or one is damaged")]
+    #[error(
+        "row {0} has two different contents: they were computed by different versions, or one is \
+            damaged"
+    )]
     Conflict(u64),
 }
 
@@ -97,7 +102,12 @@ impl Row {
         Self { number, cells }
     }
 
-    pub(super) fn failed(number: u64, settings: Vec<Entry>, key: Option<&Hash>, reason: String) -> Self {
+    pub(super) fn failed(
+        number: u64,
+        settings: Vec<Entry>,
+        key: Option<&Hash>,
+        reason: String,
+    ) -> Self {
         let blank = || Entry::Number(f64::NAN);
         let mut cells = settings;
         cells.extend([key_entry(key), Entry::Word(FAILED.into()), Entry::Integer(0)]);
@@ -137,7 +147,8 @@ impl Row {
         }
     }
 
-    /// Whether it is the row of its number in this sweep, as far as that is known without computing it.
+    /// Whether it is the row of its number in this sweep, as far as that is known without computing
+    /// it.
     fn check(&self, sweep: &Sweep) -> Result<(), Malformed> {
         let wrong = |what: &str| Err(Malformed(format!("row {} {what}", self.number)));
         if self.number >= sweep.rows() {
@@ -156,7 +167,9 @@ impl Row {
             return wrong("has the key of another question");
         }
         let plain = |b: u8| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'-';
-        if !self.outcome().starts_with(|c: char| c.is_ascii_lowercase()) || !self.outcome().bytes().all(plain) {
+        if !self.outcome().starts_with(|c: char| c.is_ascii_lowercase())
+            || !self.outcome().bytes().all(plain)
+        {
             return wrong("has an outcome that is no word of ours");
         }
         if self.reason().is_some_and(|reason| reason.contains(char::is_control)) {
@@ -189,7 +202,9 @@ impl Row {
 
     fn of_line(line: &str, columns: &[Column]) -> Result<Self, Malformed> {
         let wrong = |what: &str| Malformed(format!("a row is {what}: {line}"));
-        let Ok(Value::Array(values)) = serde_json::from_str(line) else { return Err(wrong("not a list")) };
+        let Ok(Value::Array(values)) = serde_json::from_str(line) else {
+            return Err(wrong("not a list"));
+        };
         if values.len() != columns.len() {
             return Err(wrong("of another length than its heading says"));
         }
@@ -208,7 +223,9 @@ impl Row {
 
     fn of_cells(cells: Vec<Entry>) -> Result<Self, Malformed> {
         match cells.last() {
-            Some(Entry::Integer(number)) if *number >= 0 => Ok(Self { number: *number as u64, cells }),
+            Some(Entry::Integer(number)) if *number >= 0 => {
+                Ok(Self { number: *number as u64, cells })
+            }
             _ => Err(Malformed("a row has no number".into())),
         }
     }
@@ -270,7 +287,8 @@ impl Rows {
         self.lines.values().filter_map(move |line| Row::of_line(line, &columns).ok())
     }
 
-    /// The numbers of a shard that are not there, one after the other: a sweep may have more of them than fit in memory.
+    /// The numbers of a shard that are not there, one after the other: a sweep may have more of
+    /// them than fit in memory.
     pub fn missing(&self, shard: Shard) -> impl Iterator<Item = u64> + use<> {
         let there: BTreeSet<u64> = self.lines.keys().copied().collect();
         shard.rows(&self.sweep).filter(move |row| !there.contains(row))
@@ -302,7 +320,8 @@ impl Rows {
     ///
     /// # Errors
     ///
-    /// If it is of another sweep, no version of the numerics stands for both, or a row has two contents.
+    /// If it is of another sweep, no version of the numerics stands for both, or a row has two
+    /// contents.
     pub fn merge(&mut self, other: Rows) -> Result<(), RowsError> {
         // A part that names two versions was rechecked by one of them.
         if self.numerics.is_disjoint(&other.numerics) {
@@ -312,7 +331,8 @@ impl Rows {
         self.merge_rechecked(other)
     }
 
-    /// [`Rows::merge`], whatever version of the numerics computed the rows: for those of which some came out the same again.
+    /// [`Rows::merge`], whatever version of the numerics computed the rows: for those of which some
+    /// came out the same again.
     ///
     /// # Errors
     ///
@@ -320,7 +340,10 @@ impl Rows {
     pub fn merge_rechecked(&mut self, other: Rows) -> Result<(), RowsError> {
         let hashes = [self.sweep.hash(), other.sweep.hash()];
         if hashes[0] != hashes[1] {
-            return Err(RowsError::OtherSweep(hashes[0].short().to_owned(), hashes[1].short().to_owned()));
+            return Err(RowsError::OtherSweep(
+                hashes[0].short().to_owned(),
+                hashes[1].short().to_owned(),
+            ));
         }
         for (number, line) in other.lines {
             match self.lines.get(&number) {
@@ -335,10 +358,15 @@ impl Rows {
         Ok(())
     }
 
-    /// The rows that belong to the same sweep with another number of draws ([`Sweep::with_draws`]); `None` without random axes.
+    /// The rows that belong to the same sweep with another number of draws ([`Sweep::with_draws`]);
+    /// `None` without random axes.
     pub fn with_draws(&self, count: u64) -> Option<Self> {
         let sweep = self.sweep.with_draws(count)?;
-        let lines = self.lines.range(..sweep.rows()).map(|(number, line)| (*number, line.clone())).collect();
+        let lines = self
+            .lines
+            .range(..sweep.rows())
+            .map(|(number, line)| (*number, line.clone()))
+            .collect();
         Some(Self { sweep, numerics: self.numerics.clone(), lines })
     }
 
@@ -355,8 +383,8 @@ impl Rows {
         self.sweep.over.iter().map(super::Axis::column).chain(found_columns()).collect()
     }
 
-    /// The rows as a table, in order: a column for each axis, then what was found. Blank where there is nothing to say; `key` holds the
-    /// leading 60 bits of the question's digest.
+    /// The rows as a table, in order: a column for each axis, then what was found. Blank where
+    /// there is nothing to say; `key` holds the leading 60 bits of the question's digest.
     pub fn table(&self) -> Table {
         let mut table = Table::new("sweep", self.columns());
         for row in self.iter() {
@@ -419,13 +447,18 @@ impl Rows {
                 .zip(&table.columns)
                 .all(|(a, b)| a.name == b.name && a.unit == b.unit && a.kind() == b.kind());
         if !fits {
-            return Err(Malformed("its columns are not those of a sweep of this version".into()).into());
+            return Err(
+                Malformed("its columns are not those of a sweep of this version".into()).into()
+            );
         }
         for cells in table.rows() {
             rows.insert(Row::of_cells(cells)?)?;
         }
         if heading.about != rows.about() {
-            return Err(Malformed("its rows or its heading are not those that it was written with".into()).into());
+            return Err(Malformed(
+                "its rows or its heading are not those that it was written with".into(),
+            )
+            .into());
         }
         rows.checked()
     }
@@ -439,13 +472,15 @@ impl Rows {
         let Some((heading, rest)) = lines.split_first() else {
             return Err(Malformed("the journal has no heading".into()).into());
         };
-        let heading = serde_json::from_str(heading).map_err(|e| Malformed(format!("its heading: {e}")))?;
+        let heading =
+            serde_json::from_str(heading).map_err(|e| Malformed(format!("its heading: {e}")))?;
         let mut rows = Self::of_heading(&heading)?;
         let columns = rows.columns();
         for line in rest {
             // A journal that another version of the program continues names that version.
             if line.starts_with('{') {
-                let heading = serde_json::from_str(line).map_err(|e| Malformed(format!("its heading: {e}")))?;
+                let heading = serde_json::from_str(line)
+                    .map_err(|e| Malformed(format!("its heading: {e}")))?;
                 rows.merge_rechecked(Self::of_heading(&heading)?)?;
             } else {
                 rows.insert(Row::of_line(line, &columns)?)?;
@@ -463,12 +498,14 @@ impl Rows {
     fn of_heading(about: &Value) -> Result<Self, RowsError> {
         let wrong = |what: String| RowsError::from(Malformed(what));
         if about["format"] != FORMAT || about["version"] != VERSION {
-            return Err(wrong(format!("it does not say that it is a {FORMAT} of version {VERSION}")));
+            return Err(wrong(format!(
+                "it does not say that it is a {FORMAT} of version {VERSION}"
+            )));
         }
-        let sweep: Sweep =
-            serde_json::from_value(about["spec"].clone()).map_err(|e| wrong(format!("its spec: {e}")))?;
-        let numerics: BTreeSet<String> =
-            serde_json::from_value(about["numerics"].clone()).map_err(|e| wrong(format!("its numerics: {e}")))?;
+        let sweep: Sweep = serde_json::from_value(about["spec"].clone())
+            .map_err(|e| wrong(format!("its spec: {e}")))?;
+        let numerics: BTreeSet<String> = serde_json::from_value(about["numerics"].clone())
+            .map_err(|e| wrong(format!("its numerics: {e}")))?;
         if about["sweep"] != json!(sweep.hash()) {
             return Err(wrong("its spec is not the one that it was made with".into()));
         }
@@ -484,8 +521,12 @@ mod tests {
 
     fn sweep(axes: &[&str], draws: Option<u64>) -> Sweep {
         let section = Observation::Section { coordinate: 1, value: 0.0 };
-        let run =
-            crate::cases::run(Caricature::with_reinjection(1e-1, 1e-5).into(), SwitchSpec::tanh(1e-3), 60.0, section);
+        let run = crate::cases::run(
+            Caricature::with_reinjection(1e-1, 1e-5).into(),
+            SwitchSpec::tanh(1e-3),
+            60.0,
+            section,
+        );
         let axes = axes.iter().map(|a| a.parse().unwrap()).collect();
         Sweep::new(run, axes, draws.map(|count| crate::sweep::Draws { count, seed: 1 })).unwrap()
     }
@@ -542,7 +583,9 @@ mod tests {
             assert!(name == "eps" || table.numbers(name)[1].is_nan(), "{name}");
         }
         assert!(table.numbers("exponent_error").iter().all(|v| v.is_nan()));
-        for (name, values) in [("period", [3, 0]), ("crossings", [8, 0]), ("steps", [10, 0]), ("row", [0, 1])] {
+        for (name, values) in
+            [("period", [3, 0]), ("crossings", [8, 0]), ("steps", [10, 0]), ("row", [0, 1])]
+        {
             assert_eq!(table.integers(name), values, "{name}");
         }
         assert_eq!(table.words("outcome").collect::<Vec<_>>(), ["period-3", "failed"]);
@@ -555,7 +598,9 @@ mod tests {
     fn rows_of_other_draws_are_kept() {
         let axes = ["shift.x=0..1", "eps=1e-2,1e-3"];
         let mut rows = Rows::of(sweep(&axes, Some(3)));
-        (0..6).filter(|n| *n != 2).for_each(|n| rows.insert(failed(&sweep(&axes, Some(3)), n)).unwrap());
+        (0..6)
+            .filter(|n| *n != 2)
+            .for_each(|n| rows.insert(failed(&sweep(&axes, Some(3)), n)).unwrap());
         for (draws, kept) in [(1, vec![0, 1]), (2, vec![0, 1, 3]), (5, vec![0, 1, 3, 4, 5])] {
             let other = rows.with_draws(draws).unwrap();
             assert_eq!(other.sweep(), &sweep(&axes, Some(draws)));
@@ -644,7 +689,8 @@ mod tests {
         assert!(error.contains("other values of what is varied"), "{error}");
     }
 
-    /// Rows of two versions are not mixed, unless one was rechecked by the other: then the whole names both.
+    /// Rows of two versions are not mixed, unless one was rechecked by the other: then the whole
+    /// names both.
     #[test]
     fn versions_are_kept_side_by_side() {
         let sweep = sweep(&["eps=1e-2,1e-3"], None);
@@ -654,7 +700,10 @@ mod tests {
         let mut whole = Rows::from_journal(&[other, failed(&sweep, 1).line()]).unwrap();
         assert_eq!(whole.numerics().collect::<Vec<_>>(), ["another"]);
         let error = whole.merge(rows.clone()).unwrap_err().to_string();
-        assert!(error.contains("another version of the numerics") && error.contains(NUMERICS), "{error}");
+        assert!(
+            error.contains("another version of the numerics") && error.contains(NUMERICS),
+            "{error}"
+        );
         whole.merge_rechecked(rows.clone()).unwrap();
         assert_eq!((whole.len(), whole.numerics().count()), (2, 2));
         // A version that stands for both stands for each.
@@ -663,8 +712,8 @@ mod tests {
         assert_eq!(Rows::from_journal(&both).unwrap().journal(), whole.journal());
     }
 
-    /// Every way to have some of four rows in three parts: merged in any grouping and order they are the same rows, and one row with two contents is
-    /// refused wherever it stands.
+    /// Every way to have some of four rows in three parts: merged in any grouping and order they
+    /// are the same rows, and one row with two contents is refused wherever it stands.
     #[test]
     fn every_small_merge_is_a_union() {
         let run = RunSpec {
@@ -677,7 +726,9 @@ mod tests {
             observe: Observation::Section { coordinate: 1, value: 0.0 },
         };
         let sweep = Sweep::new(run, vec!["interval=1,2,3,4".parse().unwrap()], None).unwrap();
-        let row = |number: u64, reason: &str| Row::failed(number, sweep.settings(number), None, reason.to_owned());
+        let row = |number: u64, reason: &str| {
+            Row::failed(number, sweep.settings(number), None, reason.to_owned())
+        };
         let part = |set: u32| {
             let mut rows = Rows::of(sweep.clone());
             (0..4).filter(|i| set >> i & 1 == 1).for_each(|i| rows.insert(row(i, "why")).unwrap());
@@ -715,7 +766,10 @@ mod tests {
             let mut all: Vec<u64> = (1..=n).flat_map(|k| Shard { k, n }.rows(&sweep)).collect();
             for shard in (1..=n).map(|k| Shard { k, n }) {
                 let rows = part(5).missing(shard).collect::<Vec<_>>();
-                assert_eq!(rows, [1, 3].into_iter().filter(|row| shard.has(*row)).collect::<Vec<_>>());
+                assert_eq!(
+                    rows,
+                    [1, 3].into_iter().filter(|row| shard.has(*row)).collect::<Vec<_>>()
+                );
                 assert_eq!(part(5).missing_count(shard), rows.len() as u64);
                 assert_eq!(shard.count(&sweep), shard.rows(&sweep).count() as u64);
             }

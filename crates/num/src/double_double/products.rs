@@ -6,7 +6,8 @@
 //! (2005), whose error is that of twice the working precision. There are eight lanes whatever the
 //! machine has, so the bits are the same everywhere.
 
-// Loops by number over registers and lanes: iterators and closures may stay calls, compiled for the wrong instruction set.
+// Loops by number over registers and lanes: iterators and closures may stay calls, compiled for the
+// wrong instruction set.
 #![allow(clippy::needless_range_loop)]
 
 use pulp::bytemuck::cast_slice;
@@ -69,7 +70,8 @@ impl<const K: usize> WithSimd for In<'_, K> {
                 }
             }
             let lanes = |values: &[f64; LANES]| Registers::<S, K>::load(set, values);
-            let (a, a_low, b, b_low) = (lanes(&a_high), lanes(&a_low), lanes(&b_high), lanes(&b_low));
+            let (a, a_low, b, b_low) =
+                (lanes(&a_high), lanes(&a_low), lanes(&b_high), lanes(&b_low));
             let split = |a: Registers<S, K>| {
                 let t = number(SPLITTER) * a;
                 let high = t - (t - a);
@@ -139,13 +141,16 @@ mod tests {
             b in prop::collection::vec((-2.0..2.0_f64, -1.0..1.0_f64), 70),
         ) {
             let (a, b) = (numbers(&a), numbers(&b[..a.len()]));
-            let exact = |x: &DoubleDouble| MultiFloat::<4>::from_f64(x.high) + MultiFloat::from_f64(x.low);
+            let exact = |x: &DoubleDouble| MultiFloat::<4>::from_f64(x.high)
+                + MultiFloat::from_f64(x.low);
             let pairs = || a.iter().zip(b.iter().rev());
-            let wanted = pairs().fold(MultiFloat::<4>::from_f64(0.0), |sum, (a, b)| sum + exact(a) * exact(b));
+            let wanted = pairs().fold(MultiFloat::<4>::from_f64(0.0), |sum, (a,
+                b)| sum + exact(a) * exact(b));
             let size: f64 = pairs().map(|(a, b)| (a.high * b.high).abs()).sum();
             let sum = sum_of_products(&a, &b);
             let error = (exact(&sum) - wanted).to_f64().abs();
-            // Each of at most 9 terms a lane loses a few units of the rests, which are 2^-53 of what they belong to.
+            // Each of at most 9 terms a lane loses a few units of the rests, which are 2^-53 of
+            // what they belong to.
             prop_assert!(error <= 8.0 * DoubleDouble::EPSILON * size, "{error:e} of {size}");
             let ways = every_way(&a, &b);
             for (way, bits) in &ways[1..] {

@@ -1,14 +1,17 @@
 //! Our own elementary functions, written once for a number and for a bundle of lanes.
 //!
-//! Everything here is straight-line code: no branch on a value, no table, no fused multiply-add, only additions, products, quotients
-//! (each rounded once, as IEEE 754 demands) and operations on the bits of single numbers. Hence the same bits on every
-//! machine, with every instruction set, and in a lane as in a number by itself; and hence code that a compiler turns into
-//! vector instructions.
+//! Everything here is straight-line code: no branch on a value, no table, no fused multiply-add,
+//! only additions, products, quotients (each rounded once, as IEEE 754 demands) and operations on
+//! the bits of single numbers. Hence the same bits on every machine, with every instruction set,
+//! and in a lane as in a number by itself; and hence code that a compiler turns into vector
+//! instructions.
 //!
-//! Literature. Cody & Waite, Software Manual for the Elementary Functions (1980): reduction by a constant in two pieces.
-//! Dekker (1971): the exact sum of two numbers of known order. Tang, ACM TOMS 15, 144 (1989) and 18, 211 (1992): exp and expm1, where the error goes and how
-//! to keep it small. Muller, Elementary Functions (3rd ed. 2016), chs. 3, 11. Beebe, The Mathematical-Function Computation
-//! Handbook (2017), ch. 12: tanh. The polynomials interpolate at Chebyshev nodes, computed with 300 bits (`scripts/elementary.py`).
+//! Literature. Cody & Waite, Software Manual for the Elementary Functions (1980): reduction by a
+//! constant in two pieces. Dekker (1971): the exact sum of two numbers of known order. Tang, ACM
+//! TOMS 15, 144 (1989) and 18, 211 (1992): exp and expm1, where the error goes and how to keep it
+//! small. Muller, Elementary Functions (3rd ed. 2016), chs. 3, 11. Beebe, The Mathematical-Function
+//! Computation Handbook (2017), ch. 12: tanh. The polynomials interpolate at Chebyshev nodes,
+//! computed with 300 bits (`scripts/elementary.py`).
 
 use super::super::scalar::Arithmetic;
 
@@ -31,7 +34,8 @@ impl Pointwise for f64 {
     }
 }
 
-/// 1.5 * 2^52: added to a number below 2^51 in size it leaves the nearest integer in the last bits of the sum.
+/// 1.5 * 2^52: added to a number below 2^51 in size it leaves the nearest integer in the last bits
+/// of the sum.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
 
 /// From here on tanh rounds to 1: 1 - tanh x < 2 exp(-2 x) < 2^-54 from x = 19.0615 on.
@@ -40,8 +44,10 @@ pub const TANH_IS_ONE: f64 = 19.1;
 /// The polynomial with the coefficients `c`, lowest first, by Estrin's scheme for 7 coefficients.
 #[inline(always)]
 fn polynomial7<T: Pointwise>(u: T, c: [f64; 7]) -> T {
-    // Written out: `map` would stay a call, compiled for another instruction set than the lanes around it.
-    let [c0, c1, c2, c3] = [T::from_f64(c[0]), T::from_f64(c[1]), T::from_f64(c[2]), T::from_f64(c[3])];
+    // Written out: `map` would stay a call, compiled for another instruction set than the lanes
+    // around it.
+    let [c0, c1, c2, c3] =
+        [T::from_f64(c[0]), T::from_f64(c[1]), T::from_f64(c[2]), T::from_f64(c[3])];
     let [c4, c5, c6] = [T::from_f64(c[4]), T::from_f64(c[5]), T::from_f64(c[6])];
     let u2 = u * u;
     let (low, middle, high) = (c0 + c1 * u, c2 + c3 * u, c4 + c5 * u);
@@ -54,7 +60,8 @@ fn head<T: Pointwise>(x: T) -> T {
     x.map(|v| f64::from_bits(v.to_bits() & !((1 << 27) - 1)))
 }
 
-/// (tanh s - s)/s^3 on |s| <= ln(2)/4 as a polynomial in s^2: with it tanh s is approximated to 2^-60, relatively.
+/// (tanh s - s)/s^3 on |s| <= ln(2)/4 as a polynomial in s^2: with it tanh s is approximated to
+/// 2^-60, relatively.
 const TANH: [f64; 7] = [
     -0.333_333_333_333_333_3,
     0.133_333_333_333_328_36,
@@ -67,13 +74,15 @@ const TANH: [f64; 7] = [
 
 /// Hyperbolic tangent.
 ///
-/// With a = |x| = k ln(2)/2 + r, |r| <= ln(2)/4, T = tanh r and m = 2^-k: tanh a = [(1 - m) + (1 + m) T] / [(1 + m) + (1 - m) T]. T is
-/// an odd polynomial; numerator and denominator are kept as sums of two numbers, and one step of long division with
-/// exact products corrects the quotient. So the only error of size is the last rounding.
+/// With a = |x| = k ln(2)/2 + r, |r| <= ln(2)/4, T = tanh r and m = 2^-k: tanh a = [(1 - m) + (1 +
+/// m) T] / [(1 + m) + (1 - m) T]. T is an odd polynomial; numerator and denominator are kept as
+/// sums of two numbers, and one step of long division with exact products corrects the quotient. So
+/// the only error of size is the last rounding.
 #[inline(always)]
 pub fn tanh<T: Pointwise>(x: T) -> T {
     // The comparison is false for NaN, which goes through.
-    let (quotient, correction) = unrounded_tanh(x.map(|v| if v.abs() > TANH_IS_ONE { TANH_IS_ONE } else { v.abs() }));
+    let (quotient, correction) =
+        unrounded_tanh(x.map(|v| if v.abs() > TANH_IS_ONE { TANH_IS_ONE } else { v.abs() }));
     (quotient + correction).map2(x, f64::copysign)
 }
 
@@ -99,7 +108,8 @@ pub(super) fn unrounded_tanh<T: Pointwise>(a: T) -> (T, T) {
     let (minus, plus) = (one - m, one + m);
     let (minus_rest, plus_rest) = ((one - minus) - m, (one - plus) + m);
     let (ms, mc) = (m * s, m * c);
-    // (1 - m) + s + m s + (1 + m) c: each sum's first term is zero or the larger one, so that its error is exact (Dekker 1971).
+    // (1 - m) + s + m s + (1 + m) c: each sum's first term is zero or the larger one, so that its
+    // error is exact (Dekker 1971).
     let n1 = minus + s;
     let n2 = n1 + ms;
     let rest = (((minus - n1) + s) + ((n1 - n2) + ms)) + ((c + mc) + minus_rest);
@@ -120,8 +130,8 @@ pub(super) fn unrounded_tanh<T: Pointwise>(a: T) -> (T, T) {
     (quotient, remainder * inverse)
 }
 
-/// The same for 0 <= a <= ln(2)/4, to the bit: there k = 0 and m = 1, hence d = 2 without a rest, n and its rest are twice s + c, rounded, and
-/// what that leaves, and the quotient is s + c rounded.
+/// The same for 0 <= a <= ln(2)/4, to the bit: there k = 0 and m = 1, hence d = 2 without a rest, n
+/// and its rest are twice s + c, rounded, and what that leaves, and the quotient is s + c rounded.
 #[inline(always)]
 pub(super) fn unreduced_tanh(a: f64) -> f64 {
     let u = a * a;
@@ -130,8 +140,9 @@ pub(super) fn unreduced_tanh(a: f64) -> f64 {
 
 /// Exponential, base e.
 ///
-/// With x = k ln 2 + r, |r| <= ln(2)/2: e^x = 2^k e^r, e^r = 1 + r + r^2 Q(r), summed so that only the last rounding is of size
-/// (Tang 1989). The power of two is applied in two factors, so that results may be subnormal or overflow.
+/// With x = k ln 2 + r, |r| <= ln(2)/2: e^x = 2^k e^r, e^r = 1 + r + r^2 Q(r), summed so that only
+/// the last rounding is of size (Tang 1989). The power of two is applied in two factors, so that
+/// results may be subnormal or overflow.
 #[inline(always)]
 pub fn exp<T: Pointwise>(x: T) -> T {
     const ONE_OVER_LN_2: f64 = std::f64::consts::LOG2_E;
@@ -148,8 +159,12 @@ pub fn exp<T: Pointwise>(x: T) -> T {
         1.984_126_987_482_062_7e-4,
         2.480_158_732_554_774_3e-5,
     ];
-    const Q_HIGH: [f64; 4] =
-        [2.755_725_540_020_642_2e-6, 2.755_727_364_311_03e-7, 2.510_521_700_472_074_5e-8, 2.091_468_696_808_687_6e-9];
+    const Q_HIGH: [f64; 4] = [
+        2.755_725_540_020_642_2e-6,
+        2.755_727_364_311_03e-7,
+        2.510_521_700_472_074_5e-8,
+        2.091_468_696_808_687_6e-9,
+    ];
     let one = T::from_f64(1.0);
     // Beyond these the result is 0 or infinite anyway. NaN goes through.
     let x = x.map(|v| if v > 710.0 { 710.0 } else { v });
@@ -179,8 +194,8 @@ pub fn exp<T: Pointwise>(x: T) -> T {
     e * lower * upper
 }
 
-/// Logarithm, base 2, of a number that is not negative, for step control: to 2^-50 absolutely or relatively, whichever is larger.
-/// 0 counts as 2^-1077; infinity and NaN go through.
+/// Logarithm, base 2, of a number that is not negative, for step control: to 2^-50 absolutely or
+/// relatively, whichever is larger. 0 counts as 2^-1077; infinity and NaN go through.
 #[inline(always)]
 pub fn rough_log2<T: Pointwise>(x: T) -> T {
     // log2((1 + s)/(1 - s))/s as a polynomial in s^2, |s| <= (sqrt 2 - 1)/(sqrt 2 + 1).
@@ -205,15 +220,18 @@ pub fn rough_log2<T: Pointwise>(x: T) -> T {
         let biased = (v.to_bits().wrapping_sub(FIRST) >> 52).wrapping_add(2048) & 0xfff;
         f64::from_bits(4_503_599_627_370_496.0_f64.to_bits() | biased)
     });
-    // The difference above is negative for v < sqrt(1/2); two's complement in 12 bits makes 2048 + k of both.
+    // The difference above is negative for v < sqrt(1/2); two's complement in 12 bits makes 2048 +
+    // k of both.
     let exponent = exponent - T::from_f64(4_503_599_627_370_496.0 + 2048.0);
-    let mantissa = normal.map(|v| f64::from_bits(v.to_bits().wrapping_sub(v.to_bits().wrapping_sub(FIRST) & FIELD)));
+    let mantissa = normal
+        .map(|v| f64::from_bits(v.to_bits().wrapping_sub(v.to_bits().wrapping_sub(FIRST) & FIELD)));
     let s = (mantissa - one) / (mantissa + one);
     let result = (exponent + shift) + s * polynomial7(s * s, L);
     result.map2(x, |r, v| if v < f64::INFINITY { r } else { v })
 }
 
-/// 2^x for step control, to 2^-49 relatively. Results are kept between 2^-1022 and 2^1023; NaN goes through.
+/// 2^x for step control, to 2^-49 relatively. Results are kept between 2^-1022 and 2^1023; NaN goes
+/// through.
 #[inline(always)]
 pub fn rough_exp2<T: Pointwise>(x: T) -> T {
     // (2^f - 1)/f on |f| <= 1/2.
@@ -226,7 +244,8 @@ pub fn rough_exp2<T: Pointwise>(x: T) -> T {
         1.540_353_042_479_538e-4,
         1.525_267_290_047_53e-5,
     ];
-    const G_HIGH: [f64; 3] = [1.321_545_161_914_660_7e-6, 1.020_591_098_488_986_2e-7, 7.070_981_083_365_768e-9];
+    const G_HIGH: [f64; 3] =
+        [1.321_545_161_914_660_7e-6, 1.020_591_098_488_986_2e-7, 7.070_981_083_365_768e-9];
     let x = x.map(|v| if v > 1023.0 { 1023.0 } else { v });
     let x = x.map(|v| if v < -1022.0 { -1022.0 } else { v });
     let rounded = x + T::from_f64(ROUNDER);

@@ -22,7 +22,8 @@ struct Function {
     arguments: fn(u64) -> (f64, f64),
     /// Not less than the worst error found on 2^24 points, in units of the result's last place.
     worst: f64,
-    /// Frozen bits (FNV-1a) of the first 2^18 and 2^24 points, made once in release on x86-64; they must come out of every profile on every machine.
+    /// Frozen bits (FNV-1a) of the first 2^18 and 2^24 points, made once in release on x86-64; they
+    /// must come out of every profile on every machine.
     bits: [&'static str; 2],
 }
 
@@ -56,7 +57,8 @@ fn positive(index: u64) -> (f64, f64) {
     (x, 0.0)
 }
 
-/// For sine and cosine: some turns, many turns, all sizes up to 2^40, multiples of pi/2 with their neighbours.
+/// For sine and cosine: some turns, many turns, all sizes up to 2^40, multiples of pi/2 with their
+/// neighbours.
 fn angle(index: u64) -> (f64, f64) {
     let (fraction, sign) = chance(index);
     let x = match index % 16 {
@@ -70,7 +72,8 @@ fn angle(index: u64) -> (f64, f64) {
 
 /// For functions that level off: a few units, all sizes, near the ends of their formulas' ranges.
 fn levelling(index: u64) -> (f64, f64) {
-    const ENDS: [f64; 8] = [0.4375, 0.6875, 1.1875, 2.4375, 0.84375, 1.25, 2.857_142_857_142_857, 6.0];
+    const ENDS: [f64; 8] =
+        [0.4375, 0.6875, 1.1875, 2.4375, 0.84375, 1.25, 2.857_142_857_142_857, 6.0];
     let (fraction, sign) = chance(index);
     let x = match index % 4 {
         0 => 6.0 * fraction,
@@ -123,7 +126,10 @@ fn base_and_exponent(index: u64) -> (f64, f64) {
         // Anything that stays within range.
         _ => 640.0 * t * b / ln(base.max(1.0 / base).max(1.0 + 1e-9)),
     };
-    (base, if (exponent * ln(base)).abs() < 640.0 && exponent.abs() < MANY { exponent } else { 0.5 })
+    (
+        base,
+        if (exponent * ln(base)).abs() < 640.0 && exponent.abs() < MANY { exponent } else { 0.5 },
+    )
 }
 
 /// The angle of (x, y) by quadrants.
@@ -139,7 +145,8 @@ fn angle_of<T: Scalar>(y: T, x: T) -> T {
     }
 }
 
-/// Next to a zero, and after many turns, the reduction of double-double keeps fewer digits; there the longer number says it.
+/// Next to a zero, and after many turns, the reduction of double-double keeps fewer digits; there
+/// the longer number says it.
 fn relatively(x: DoubleDouble, y: DoubleDouble, longer: fn(Long) -> Long) -> DoubleDouble {
     if (y.high().abs() > 1e-4 && x.high().abs() < 1e6) || x.high().abs() < 0.5 {
         return y;
@@ -292,12 +299,15 @@ fn frozen(count: u64, which: usize) {
         assert_eq!(digest(count, result), f.bits[which], "{}", f.name);
     }
     // For step control: bits beside a stated error.
-    let rough =
-        [digest(count, |i| rough_log2(rough_arguments(i).0)), digest(count, |i| rough_exp2(rough_arguments(i).1))];
+    let rough = [
+        digest(count, |i| rough_log2(rough_arguments(i).0)),
+        digest(count, |i| rough_exp2(rough_arguments(i).1)),
+    ];
     assert_eq!(rough, ROUGH_BITS[which]);
 }
 
-const ROUGH_BITS: [[&str; 2]; 2] = [["e5ef2fae417d95d7", "69770c69e6c416d4"], ["08feb24410cd77fe", "5cbef64df6338a74"]];
+const ROUGH_BITS: [[&str; 2]; 2] =
+    [["e5ef2fae417d95d7", "69770c69e6c416d4"], ["08feb24410cd77fe", "5cbef64df6338a74"]];
 
 /// Any positive normal number for the logarithm, any exponent of one for the power.
 fn rough_arguments(index: u64) -> (f64, f64) {
@@ -309,7 +319,8 @@ fn below_the_stated_errors(exponent: u32) {
         let (size, x, y) = worst(f, 1 << exponent);
         println!("{}: worst error {size:.4} ulp on 2^{exponent} points, at {x:e}, {y:e}", f.name);
         assert!(size <= f.worst, "{}({x:e}, {y:e}): {size} ulp", f.name);
-        // The measurement itself must be able to see an error: rounding alone makes one of half a unit.
+        // The measurement itself must be able to see an error: rounding alone makes one of half a
+        // unit.
         assert!(size > 0.49, "{}: {size} ulp is too good to be true", f.name);
     }
 }
@@ -336,7 +347,8 @@ fn frozen_bits_of_the_others_2_24() {
     frozen(1 << 24, 1);
 }
 
-/// The oracle against numbers of 256 bits: it must be good to far below a unit, also next to the zeros of sine and logarithm.
+/// The oracle against numbers of 256 bits: it must be good to far below a unit, also next to the
+/// zeros of sine and logarithm.
 #[test]
 fn the_oracle_is_good_enough() {
     for f in &FUNCTIONS {
@@ -346,7 +358,8 @@ fn the_oracle_is_good_enough() {
                 let (x, y) = (f.arguments)(i);
                 let short = (f.oracle)(DoubleDouble::from_f64(x), DoubleDouble::from_f64(y));
                 let long = (f.longer)(Long::from_f64(x), Long::from_f64(y));
-                let gap = (Long::from_f64(short.high()) + Long::from_f64(short.low()) - long) / long;
+                let gap =
+                    (Long::from_f64(short.high()) + Long::from_f64(short.low()) - long) / long;
                 gap.to_f64().abs()
             })
             .reduce(|| 0.0, f64::max);
@@ -359,7 +372,11 @@ fn the_oracle_is_good_enough() {
 #[test]
 fn known_points() {
     for k in -1074..=1023 {
-        let x = if k < -1022 { f64::from_bits(1 << (k + 1074)) } else { f64::from_bits(((1023 + k) as u64) << 52) };
+        let x = if k < -1022 {
+            f64::from_bits(1 << (k + 1074))
+        } else {
+            f64::from_bits(((1023 + k) as u64) << 52)
+        };
         assert_eq!(log2(x), f64::from(k), "log2 of 2^{k}");
     }
     for k in 0..=22 {
@@ -368,7 +385,11 @@ fn known_points() {
     }
     for n in 1..=1000_u32 {
         let n = f64::from(n);
-        assert_eq!((sqrt(n * n), pow(n, 2.0), pow(n, 1.0), pow(n * n, 0.5)), (n, n * n, n, n), "{n}");
+        assert_eq!(
+            (sqrt(n * n), pow(n, 2.0), pow(n, 1.0), pow(n * n, 0.5)),
+            (n, n * n, n, n),
+            "{n}"
+        );
     }
 }
 
@@ -378,9 +399,14 @@ fn edges() {
     for f in [ln, log2, log10] as [fn(f64) -> f64; 3] {
         assert_eq!((f(1.0).to_bits(), f(0.0), f(-0.0), f(inf)), (0, -inf, -inf, inf));
         assert!(f(-1.0).is_nan() && f(-inf).is_nan() && f(nan).is_nan());
-        assert!(f(5e-324).is_finite() && f(5e-324) < f(f64::MIN_POSITIVE) && f(f64::MAX) > f(1e308));
+        assert!(
+            f(5e-324).is_finite() && f(5e-324) < f(f64::MIN_POSITIVE) && f(f64::MAX) > f(1e308)
+        );
     }
-    assert_eq!((exp10(inf), exp10(-inf), exp10(0.0), exp10(-400.0), exp10(309.0)), (inf, 0.0, 1.0, 0.0, inf));
+    assert_eq!(
+        (exp10(inf), exp10(-inf), exp10(0.0), exp10(-400.0), exp10(309.0)),
+        (inf, 0.0, 1.0, 0.0, inf)
+    );
     for f in [sin, atan, erf, sqrt] as [fn(f64) -> f64; 4] {
         assert!((f(0.0).to_bits(), f(-0.0).to_bits()) == (0, 1 << 63) && f(nan).is_nan());
     }
@@ -408,7 +434,9 @@ fn edges() {
     let half = std::f64::consts::FRAC_PI_2;
     assert_eq!((atan(inf), atan(-inf), atan(1e300)), (half, -half, half));
     assert_eq!((erf(inf), erf(-inf), erf(6.0), erf(1e300)), (1.0, -1.0, 1.0, 1.0));
-    assert!(sqrt(-1.0).is_nan() && sqrt(inf) == inf && sqrt(5e-324) == 2.222_758_749_485_077_5e-162);
+    assert!(
+        sqrt(-1.0).is_nan() && sqrt(inf) == inf && sqrt(5e-324) == 2.222_758_749_485_077_5e-162
+    );
     // C17, annex F.10.1.4 and F.10.4.4.
     let pi = std::f64::consts::PI;
     for (y, x, angle) in [
@@ -430,14 +458,24 @@ fn edges() {
     for y in [0.0, -0.0, 1.0, inf, nan] {
         assert_eq!((pow(1.0, y), pow(y, 0.0), pow(y, -0.0)), (1.0, 1.0, 1.0), "{y}");
     }
-    assert_eq!((pow(0.0, 3.0), pow(-0.0, 3.0).to_bits(), pow(0.0, -1.0), pow(-0.0, -1.0)), (0.0, 1 << 63, inf, -inf));
-    assert_eq!((pow(inf, -1.0), pow(inf, 2.0), pow(-inf, 3.0), pow(-1.0, inf)), (0.0, inf, -inf, 1.0));
-    assert_eq!((pow(2.0, 1024.0), pow(2.0, -1074.0), pow(2.0, -1076.0), pow(-2.0, 3.0)), (inf, 5e-324, 0.0, -8.0));
+    assert_eq!(
+        (pow(0.0, 3.0), pow(-0.0, 3.0).to_bits(), pow(0.0, -1.0), pow(-0.0, -1.0)),
+        (0.0, 1 << 63, inf, -inf)
+    );
+    assert_eq!(
+        (pow(inf, -1.0), pow(inf, 2.0), pow(-inf, 3.0), pow(-1.0, inf)),
+        (0.0, inf, -inf, 1.0)
+    );
+    assert_eq!(
+        (pow(2.0, 1024.0), pow(2.0, -1074.0), pow(2.0, -1076.0), pow(-2.0, 3.0)),
+        (inf, 5e-324, 0.0, -8.0)
+    );
     assert!(pow(-2.0, 0.5).is_nan() && pow(nan, 1.0).is_nan() && pow(2.0, nan).is_nan());
 }
 
-/// Beyond 2^31 the exponent's product with the logarithm is taken to a few digits less than elsewhere (a formula as old as fdlibm). Nothing here asks for such a
-/// power; how wrong it can be is stated, and stays so.
+/// Beyond 2^31 the exponent's product with the logarithm is taken to a few digits less than
+/// elsewhere (a formula as old as fdlibm). Nothing here asks for such a power; how wrong it can be
+/// is stated, and stays so.
 #[test]
 fn a_power_with_a_huge_exponent_is_worse() {
     let (base, exponent) = (9.999_997_930_386_283e-1, 2.439_820_356_416_447_6e9);
@@ -450,15 +488,24 @@ fn a_power_with_a_huge_exponent_is_worse() {
 fn symmetries() {
     for i in 0..1 << 14 {
         let (x, _) = angle(i);
-        assert_eq!((sin(-x).to_bits(), cos(-x).to_bits()), ((-sin(x)).to_bits(), cos(x).to_bits()), "{x:e}");
+        assert_eq!(
+            (sin(-x).to_bits(), cos(-x).to_bits()),
+            ((-sin(x)).to_bits(), cos(x).to_bits()),
+            "{x:e}"
+        );
         let (x, _) = levelling(i);
-        assert_eq!((atan(-x).to_bits(), erf(-x).to_bits()), ((-atan(x)).to_bits(), (-erf(x)).to_bits()), "{x:e}");
+        assert_eq!(
+            (atan(-x).to_bits(), erf(-x).to_bits()),
+            ((-atan(x)).to_bits(), (-erf(x)).to_bits()),
+            "{x:e}"
+        );
         let (y, x) = plane(i);
         assert_eq!(atan2(-y, x).to_bits(), (-atan2(y, x)).to_bits(), "{y:e}, {x:e}");
     }
 }
 
-/// Neighbours in order. Functions with errors above half a unit need not be: those that are not may fall by one unit, never by more.
+/// Neighbours in order. Functions with errors above half a unit need not be: those that are not may
+/// fall by one unit, never by more.
 #[test]
 fn order() {
     /// Name, function, arguments, whether neighbours are always in order.
@@ -513,6 +560,12 @@ fn rough_functions_2_24() {
             (gap / log2(x).abs().max(1.0), ((ours - exact) / exact).abs().to_f64())
         })
         .reduce(|| (0.0, 0.0), |a, b| (f64::max(a.0, b.0), f64::max(a.1, b.1)));
-    println!("rough_log2: {logarithm:e} absolutely or relatively; rough_exp2: {power:e} relatively (2^24 points)");
-    assert!(logarithm < 2.0_f64.power(-50) && power < 2.0_f64.power(-49), "{logarithm:e}, {power:e}");
+    println!(
+        "rough_log2: {logarithm:e} absolutely or relatively; rough_exp2: {power:e} relatively \
+            (2^24 points)"
+    );
+    assert!(
+        logarithm < 2.0_f64.power(-50) && power < 2.0_f64.power(-49),
+        "{logarithm:e}, {power:e}"
+    );
 }

@@ -14,15 +14,19 @@ use super::kernels;
 
 /// Up to here the kernel reduces by nothing: |x| 2/ln 2 rounds to 0 up to 0.17328.
 const UNREDUCED: f64 = 0.173;
-/// From there to here multiples of 1/128 are tabled, and then, where tanh hardly differs from 1, multiples of 1/16.
+/// From there to here multiples of 1/128 are tabled, and then, where tanh hardly differs from 1,
+/// multiples of 1/16.
 const CLOSE: f64 = 7.99;
 
-/// A table of tanh about the multiples of 1/`PER_UNIT` from the `FIRST` one on; `LENGTH` is a power of two.
+/// A table of tanh about the multiples of 1/`PER_UNIT` from the `FIRST` one on; `LENGTH` is a power
+/// of two.
 struct Table<const PER_UNIT: usize, const FIRST: usize, const LENGTH: usize>([Entry; LENGTH]);
 
-/// tanh about a: tanh(a + r) = value + value_rest + (slope + slope_rest) r + c2 r^2 + ... + c7 r^7, in one line of a cache.
+/// tanh about a: tanh(a + r) = value + value_rest + (slope + slope_rest) r + c2 r^2 + ... + c7 r^7,
+/// in one line of a cache.
 ///
-/// What multiplies r to a high power needs few bits. `slope` has six, so that its product with r, which has 47, is exact.
+/// What multiplies r to a high power needs few bits. `slope` has six, so that its product with r,
+/// which has 47, is exact.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 struct Entry {
@@ -40,17 +44,26 @@ struct Entry {
     apart: f32,
 }
 
-// exp(-2/128) and exp(-2/16). The sum above is then off by less than 2^-63 and 2^-46 of the slope, which at 8 is 2^-21.
-static CLOSE_BY: Table<128, 0, 1024> =
-    Table::of(DoubleDouble::new(0.984_496_437_005_408_5, -4.749_302_656_635_618_6e-17), 1.084_202_172_485_504_4e-19);
-static FAR_OUT: Table<16, 128, 256> =
-    Table::of(DoubleDouble::new(0.8824969025845955, -5.224526916735663e-17), 1.421_085_471_520_200_4e-14);
+// exp(-2/128) and exp(-2/16). The sum above is then off by less than 2^-63 and 2^-46 of the slope,
+// which at 8 is 2^-21.
+static CLOSE_BY: Table<128, 0, 1024> = Table::of(
+    DoubleDouble::new(0.984_496_437_005_408_5, -4.749_302_656_635_618_6e-17),
+    1.084_202_172_485_504_4e-19,
+);
+static FAR_OUT: Table<16, 128, 256> = Table::of(
+    DoubleDouble::new(0.8824969025845955, -5.224526916735663e-17),
+    1.421_085_471_520_200_4e-14,
+);
 
-impl<const PER_UNIT: usize, const FIRST: usize, const LENGTH: usize> Table<PER_UNIT, FIRST, LENGTH> {
-    /// 1.5 * 2^52 / PER_UNIT: added to a number it leaves the nearest multiple in the last bits of the sum.
+impl<const PER_UNIT: usize, const FIRST: usize, const LENGTH: usize>
+    Table<PER_UNIT, FIRST, LENGTH>
+{
+    /// 1.5 * 2^52 / PER_UNIT: added to a number it leaves the nearest multiple in the last bits of
+    /// the sum.
     const ROUNDER: f64 = 6_755_399_441_055_744.0 / PER_UNIT as f64;
 
-    /// `ratio` is exp(-2/PER_UNIT), `error` what the sum of an entry is off by at most, in units of its slope.
+    /// `ratio` is exp(-2/PER_UNIT), `error` what the sum of an entry is off by at most, in units of
+    /// its slope.
     const fn of(ratio: DoubleDouble, error: f64) -> Self {
         let one = DoubleDouble::new(1.0, 0.0);
         let mut table = [Entry::NONE; LENGTH];
@@ -62,8 +75,9 @@ impl<const PER_UNIT: usize, const FIRST: usize, const LENGTH: usize> Table<PER_U
                 let sum = one.plus(e);
                 let value = one.plus(e.negative()).divided_by(sum);
                 let slope = DoubleDouble::new(4.0, 0.0).times(e).divided_by(sum.times(sum));
-                let apart = kernel_error(i as f64 / PER_UNIT as f64, 0.5 / PER_UNIT as f64, slope.high())
-                    + error * slope.high();
+                let apart =
+                    kernel_error(i as f64 / PER_UNIT as f64, 0.5 / PER_UNIT as f64, slope.high())
+                        + error * slope.high();
                 table[i - FIRST] = Entry::of(value, slope, apart);
             }
             e = e.times(ratio);
@@ -129,18 +143,22 @@ impl Entry {
         let tail = r2 * (self.c2 + self.c3 * r) + (r2 * r2) * (self.c4 + r * high);
         // |value| > |p|: the error of their sum is exact (Dekker 1971).
         let sum = self.value + p;
-        let rest = ((self.value - sum) + p) + ((f64::from(self.value_rest) + r * self.slope_rest) + tail);
+        let rest =
+            ((self.value - sum) + p) + ((f64::from(self.value_rest) + r * self.slope_rest) + tail);
         let apart = f64::from(self.apart);
         (sum + (rest - apart) == sum + (rest + apart)).then_some(sum + rest)
     }
 }
 
-/// A bound on the kernel's error before its last rounding, within `reach` of `a`, where tanh has the given slope.
+/// A bound on the kernel's error before its last rounding, within `reach` of `a`, where tanh has
+/// the given slope.
 ///
-/// With s the reduced argument, at most 0.1733, u = 2^-53 and T = s + c as in [`kernels::tanh`]: r has an error of u |s|, hence c = r^3 P one of u |s|^3; the
-/// roundings of c, six in product and polynomial and one in the difference, come to less than 2.4 u |s|^3, as |P| <= 1/3, and P itself is right to 2^-60 |s|. What
-/// T errs by, tanh errs by 1.05 times the slope of. In numerator and denominator two roundings each of (1 +- m) c follow, whose effect is at most 2.42 of 2/3
-/// u |s|^3, for |1 +- m| and tanh go together; those of the quotient's correction are below 2^-78.
+/// With s the reduced argument, at most 0.1733, u = 2^-53 and T = s + c as in [`kernels::tanh`]: r
+/// has an error of u |s|, hence c = r^3 P one of u |s|^3; the roundings of c, six in product and
+/// polynomial and one in the difference, come to less than 2.4 u |s|^3, as |P| <= 1/3, and P itself
+/// is right to 2^-60 |s|. What T errs by, tanh errs by 1.05 times the slope of. In numerator and
+/// denominator two roundings each of (1 +- m) c follow, whose effect is at most 2.42 of 2/3 u
+/// |s|^3, for |1 +- m| and tanh go together; those of the quotient's correction are below 2^-78.
 const fn kernel_error(a: f64, reach: f64, slope: f64) -> f64 {
     const HALF_LN_2: f64 = std::f64::consts::LN_2 / 2.0;
     const UNIT: f64 = f64::EPSILON / 2.0;
@@ -199,10 +217,12 @@ mod tests {
         assert_eq!(quick.to_bits(), kernel.to_bits(), "{x:e}: {quick:e} and {kernel:e}");
     }
 
-    /// Where one entry, one table, one formula ends and the next begins, and around the kernel's own changes.
+    /// Where one entry, one table, one formula ends and the next begins, and around the kernel's
+    /// own changes.
     #[test]
     fn the_kernels_bits_at_every_seam() {
-        let seams = (0..2048).map(|i| f64::from(i) / 256.0).chain((0..640).map(|i| f64::from(i) / 32.0));
+        let seams =
+            (0..2048).map(|i| f64::from(i) / 256.0).chain((0..640).map(|i| f64::from(i) / 32.0));
         let reductions = (0..56).map(|k| (f64::from(k) + 0.5) * std::f64::consts::LN_2 / 2.0);
         for seam in seams.chain(reductions).chain([UNREDUCED, CLOSE, 1e-300, 1e-160, 1e-8]) {
             for shift in 0..32 {
@@ -235,15 +255,18 @@ mod tests {
         the_kernels_bits(30);
     }
 
-    /// The two sums apart, in units of what they are allowed to be apart: the worst of 2^`exponent` arguments.
+    /// The two sums apart, in units of what they are allowed to be apart: the worst of 2^`exponent`
+    /// arguments.
     fn furthest_apart(exponent: u32, low: f64, high: f64) -> f64 {
         (0..1_u64 << exponent)
             .map(|i| {
                 let a = between(low, high, i);
                 let exact = DoubleDouble::from_f64(a).tanh();
                 let (quotient, correction) = kernels::unrounded_tanh(a);
-                let error =
-                    (DoubleDouble::from_f64(quotient) + DoubleDouble::from_f64(correction) - exact).to_f64().abs();
+                let error = (DoubleDouble::from_f64(quotient) + DoubleDouble::from_f64(correction)
+                    - exact)
+                    .to_f64()
+                    .abs();
                 let allowed = if a < CLOSE {
                     CLOSE_BY.0[(a * 128.0).round() as usize].apart
                 } else {
@@ -257,9 +280,15 @@ mod tests {
     /// The bounds hold, and are no larger than they must be by so much that nothing is told.
     #[test]
     fn the_kernel_errs_by_no_more_than_its_bound() {
-        for (low, high) in
-            [(UNREDUCED, 0.25), (0.25, 0.5), (0.5, 1.0), (1.0, 4.0), (4.0, CLOSE), (CLOSE, 12.0), (12.0, 19.1)]
-        {
+        for (low, high) in [
+            (UNREDUCED, 0.25),
+            (0.25, 0.5),
+            (0.5, 1.0),
+            (1.0, 4.0),
+            (4.0, CLOSE),
+            (CLOSE, 12.0),
+            (12.0, 19.1),
+        ] {
             let worst = furthest_apart(14, low, high);
             println!("{low} to {high}: {worst:.3} of the bound");
             assert!(worst < 0.9, "{low} to {high}: {worst}");
@@ -267,10 +296,12 @@ mod tests {
         }
     }
 
-    /// If the table were wrong, or the bounds too large, every bit would still be right: the kernel would be asked for it.
+    /// If the table were wrong, or the bounds too large, every bit would still be right: the kernel
+    /// would be asked for it.
     #[test]
     fn the_kernel_is_hardly_ever_asked() {
-        for (low, high, share) in [(UNREDUCED, 0.25, 0.2), (0.25, 0.55, 0.05), (0.55, CLOSE, 0.02), (CLOSE, 19.1, 0.02)]
+        for (low, high, share) in
+            [(UNREDUCED, 0.25, 0.2), (0.25, 0.55, 0.05), (0.55, CLOSE, 0.02), (CLOSE, 19.1, 0.02)]
         {
             let arguments = 1 << 14;
             let asked = (0..arguments).filter(|i| told(between(low, high, *i)).is_none()).count();

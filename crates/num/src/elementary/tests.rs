@@ -14,8 +14,8 @@ pub(super) fn mixed(index: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// The `index`-th argument: by turns uniform over the range where the function is not constant, near the places where
-/// its reduction changes over, with a random exponent, and near the zero.
+/// The `index`-th argument: by turns uniform over the range where the function is not constant,
+/// near the places where its reduction changes over, with a random exponent, and near the zero.
 fn argument(index: u64, (low, high): (f64, f64), period: f64) -> f64 {
     let bits = mixed(index);
     let fraction = (bits >> 11) as f64 / (1_u64 << 53) as f64;
@@ -68,7 +68,8 @@ const EXP: Function = Function {
     worst: 0.75,
 };
 
-/// Distance of `y` from the exact value in units of its last place. The oracle's own error, some 2^-100, is far below.
+/// Distance of `y` from the exact value in units of its last place. The oracle's own error, some
+/// 2^-100, is far below.
 pub(super) fn error(y: f64, exact: DoubleDouble) -> f64 {
     let unit = f64::from_bits(exact.to_f64().abs().to_bits() + 1) - exact.to_f64().abs();
     ((DoubleDouble::from_f64(y) - exact).to_f64() / unit).abs()
@@ -96,7 +97,9 @@ fn worst(f: &Function, indices: std::ops::Range<u64>) -> (f64, f64) {
 fn digest(f: &Function, indices: std::ops::Range<u64>) -> u64 {
     indices.fold(0xcbf2_9ce4_8422_2325, |hash, i| {
         let bits = (f.ours)(argument(i, f.range, f.period)).to_bits();
-        bits.to_le_bytes().iter().fold(hash, |h, byte| (h ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3))
+        bits.to_le_bytes()
+            .iter()
+            .fold(hash, |h, byte| (h ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3))
     })
 }
 
@@ -105,7 +108,8 @@ fn below_the_stated_error(exponent: u32) {
         let (size, at) = worst(f, 0..1 << exponent);
         println!("{}: worst error {size:.4} ulp on 2^{exponent} points, at {at:e}", f.name);
         assert!(size < f.worst, "{}({at:e}): {size} ulp", f.name);
-        // The measurement itself must be able to see an error: rounding alone makes one of half a unit.
+        // The measurement itself must be able to see an error: rounding alone makes one of half a
+        // unit.
         assert!(size > 0.49, "{}: {size} ulp is too good to be true", f.name);
     }
 }
@@ -144,12 +148,20 @@ fn frozen_bits_2_24() {
 #[test]
 fn known_bits() {
     // Correctly rounded values (computed with 300 bits).
-    for (x, y) in
-        [(0.5, 0.46211715726000973), (1.0, 0.7615941559557649), (3.0, 0.9950547536867305), (1e-3, 9.999996666668e-4)]
-    {
+    for (x, y) in [
+        (0.5, 0.46211715726000973),
+        (1.0, 0.7615941559557649),
+        (3.0, 0.9950547536867305),
+        (1e-3, 9.999996666668e-4),
+    ] {
         assert_eq!(tanh(x).to_bits(), f64::to_bits(y), "tanh {x}");
     }
-    for (x, y) in [(1.0, std::f64::consts::E), (-1.0, 0.36787944117144233), (10.0, 22026.465794806718), (0.0, 1.0)] {
+    for (x, y) in [
+        (1.0, std::f64::consts::E),
+        (-1.0, 0.36787944117144233),
+        (10.0, 22026.465794806718),
+        (0.0, 1.0),
+    ] {
         assert_eq!(exp(x).to_bits(), f64::to_bits(y), "exp {x}");
     }
     assert_eq!(ln(2.0).to_bits(), std::f64::consts::LN_2.to_bits());
@@ -187,7 +199,9 @@ fn special_values() {
     );
     // The last finite and the first infinite result; the last subnormal and the first zero.
     let last = 709.782_712_893_384;
-    assert!(exp(last) > 1.797e308 && exp(last).is_finite() && exp(709.782_712_893_385).is_infinite());
+    assert!(
+        exp(last) > 1.797e308 && exp(last).is_finite() && exp(709.782_712_893_385).is_infinite()
+    );
     assert!(exp(-745.13) == 5e-324 && exp(-745.14) == 0.0);
     // Subnormal results: to one unit.
     for x in [-708.5, -715.25, -730.0, -744.0] {
@@ -210,8 +224,9 @@ fn tanh_is_odd_to_the_bit() {
 
 #[test]
 fn neighbours_are_in_order() {
-    // Where neighbouring results differ by less than their spacing only the last bit could break the order: all neighbours in
-    // stretches everywhere, and around the places where the reduction changes over.
+    // Where neighbouring results differ by less than their spacing only the last bit could break
+    // the order: all neighbours in stretches everywhere, and around the places where the reduction
+    // changes over.
     for f in [&TANH, &EXP] {
         for i in 0..1 << 13 {
             let mut x = argument(i, f.range, f.period);
@@ -229,22 +244,38 @@ fn neighbours_are_in_order() {
 #[test]
 fn lanes_have_the_bits_of_a_number_alone() {
     fn same<const W: usize>() {
-        let special = [0.0, -0.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 5e-324, -1e-310, 19.1, -19.06, 1e300];
+        let special = [
+            0.0,
+            -0.0,
+            f64::NAN,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+            5e-324,
+            -1e-310,
+            19.1,
+            -19.06,
+            1e300,
+        ];
         let point = |i: u64| {
             let s = special.get((mixed(i) % 64) as usize).copied();
             s.unwrap_or_else(|| argument(i, TANH.range, TANH.period))
         };
         for i in 0..1 << 12 {
             let x: [f64; W] = std::array::from_fn(|lane| point(i * W as u64 + lane as u64));
-            // The sign of a not-a-number is not defined; every place that makes bytes writes one and the same.
-            let bits = |y: [f64; W]| y.map(|v| if v.is_nan() { f64::NAN.to_bits() } else { v.to_bits() });
+            // The sign of a not-a-number is not defined; every place that makes bytes writes one
+            // and the same.
+            let bits =
+                |y: [f64; W]| y.map(|v| if v.is_nan() { f64::NAN.to_bits() } else { v.to_bits() });
             let lanes = Lanes(x);
             assert_eq!(bits(lanes.tanh().0), bits(x.map(tanh)), "tanh {x:?}");
             assert_eq!(bits(kernels::tanh(lanes).0), bits(x.map(tanh)), "tanh {x:?}");
             assert_eq!(bits(lanes.exp().0), bits(x.map(exp)), "exp {x:?}");
             assert_eq!(bits(Elementary::sqrt(lanes).0), bits(x.map(sqrt)));
             assert_eq!(bits(lanes.sign().0), bits(x.map(Elementary::sign)));
-            assert_eq!(bits(kernels::rough_log2(lanes.map(f64::abs)).0), bits(x.map(|v| rough_log2(v.abs()))));
+            assert_eq!(
+                bits(kernels::rough_log2(lanes.map(f64::abs)).0),
+                bits(x.map(|v| rough_log2(v.abs())))
+            );
             assert_eq!(bits(kernels::rough_exp2(lanes).0), bits(x.map(rough_exp2)));
             let y = Lanes(x.map(|v| v * 0.7 + 1.0));
             for (lanes, alone) in [
@@ -280,7 +311,10 @@ fn rough_functions_are_good_enough_for_step_control() {
     }
     assert!(worst < 2e-15, "{worst:e}");
     assert_eq!(rough_exp2(0.0), 1.0);
-    assert_eq!((rough_log2(1.0), rough_log2(8.0), rough_log2(0.25), rough_log2(5e-324)), (0.0, 3.0, -2.0, -1074.0));
+    assert_eq!(
+        (rough_log2(1.0), rough_log2(8.0), rough_log2(0.25), rough_log2(5e-324)),
+        (0.0, 3.0, -2.0, -1074.0)
+    );
     assert!(rough_pow(0.0, 0.5) < 1e-160 && rough_pow(0.0, 0.07) > 0.0);
     assert!(rough_pow(f64::INFINITY, 0.5) > 1e300 && rough_pow(f64::NAN, 0.5).is_nan());
 }
@@ -289,7 +323,8 @@ fn rough_functions_are_good_enough_for_step_control() {
 fn rough_functions_at_their_ends() {
     // Powers of two are exact, and what is beyond the normal numbers is kept at their ends.
     for k in [-1022, -1021, -54, -1, 1, 52, 1023] {
-        let power = if k == -1022 { f64::MIN_POSITIVE } else { f64::from_bits(((1023 + k) as u64) << 52) };
+        let power =
+            if k == -1022 { f64::MIN_POSITIVE } else { f64::from_bits(((1023 + k) as u64) << 52) };
         assert_eq!(rough_exp2(f64::from(k)), power, "2^{k}");
         assert_eq!(rough_log2(power), f64::from(k), "log2 of 2^{k}");
     }
@@ -299,14 +334,21 @@ fn rough_functions_at_their_ends() {
     for x in [1023.25, 1e4, f64::INFINITY] {
         assert_eq!(rough_exp2(x), 2.0 * f64::from_bits(2045 << 52), "{x}");
     }
-    // Below the normal numbers the logarithm goes on, one unit a halving, and nothing jumps where they begin.
+    // Below the normal numbers the logarithm goes on, one unit a halving, and nothing jumps where
+    // they begin.
     for k in 1..=52 {
         assert_eq!(rough_log2(f64::from_bits(1 << (52 - k))), -1022.0 - f64::from(k), "{k}");
     }
-    let (below, above) = (rough_log2(f64::MIN_POSITIVE.next_down()), rough_log2(f64::MIN_POSITIVE.next_up()));
-    assert!((below + 1022.0).abs() < 1e-12 && (above + 1022.0).abs() < 1e-12 && below <= above, "{below} {above}");
+    let (below, above) =
+        (rough_log2(f64::MIN_POSITIVE.next_down()), rough_log2(f64::MIN_POSITIVE.next_up()));
     assert!(
-        rough_exp2(f64::NAN).is_nan() && rough_log2(f64::NAN).is_nan() && rough_log2(f64::INFINITY) == f64::INFINITY
+        (below + 1022.0).abs() < 1e-12 && (above + 1022.0).abs() < 1e-12 && below <= above,
+        "{below} {above}"
+    );
+    assert!(
+        rough_exp2(f64::NAN).is_nan()
+            && rough_log2(f64::NAN).is_nan()
+            && rough_log2(f64::INFINITY) == f64::INFINITY
     );
     assert!((rough_log2(0.0) + 1077.0).abs() < 1.0, "{}", rough_log2(0.0));
 }

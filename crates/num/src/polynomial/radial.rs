@@ -1,18 +1,21 @@
 //! Series of equations whose only products are with the squared distance from the origin, by
 //! relaxed products.
 //!
-//! The series of a product is wanted one degree at a time, and its newest coefficient is made of the newest of its factors; computed when it is wanted,
-//! it waits for all of them. Here it is computed before: as soon as x_k is known, its products with x_1, ..., x_k are added to the
-//! coefficients k + 1, ..., 2k in which they belong (van der Hoeven 2002: relaxed products), all at once in the lanes of a register. What
-//! is left for degree k itself are its products with x_0. A pair (j, k - j) is thus added when its later member is known, so that of
-//! `D` degrees only the first `D`/2 are ever multiplied by a later one: eight lanes do for degree 17.
+//! The series of a product is wanted one degree at a time, and its newest coefficient is made of
+//! the newest of its factors; computed when it is wanted, it waits for all of them. Here it is
+//! computed before: as soon as x_k is known, its products with x_1, ..., x_k are added to the
+//! coefficients k + 1, ..., 2k in which they belong (van der Hoeven 2002: relaxed products), all at
+//! once in the lanes of a register. What is left for degree k itself are its products with x_0. A
+//! pair (j, k - j) is thus added when its later member is known, so that of `D` degrees only the
+//! first `D`/2 are ever multiplied by a later one: eight lanes do for degree 17.
 
 use pulp::{Simd, WithSimd};
 
 use super::{Affine, LONG, RECIPROCALS, Reduced, Series};
 use crate::Registers;
 
-/// x_0' = c_0 + l . x, x_i' = c_i + (a_i + b_i x_i) |x|^2 for i = 1, 2, where |x|^2 is the sum of the three squares.
+/// x_0' = c_0 + l . x, x_i' = c_i + (a_i + b_i x_i) |x|^2 for i = 1, 2, where |x|^2 is the sum of
+/// the three squares.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Radial {
     constants: [f64; 3],
@@ -34,7 +37,9 @@ impl Radial {
         // Which products are squares of states.
         let is_square = |quantity: usize, state: usize| {
             let square = |factor: &Affine| factor.single() == Some((state, 1.0));
-            quantity.checked_sub(STATES).is_some_and(|p| square(&of.products[p].0) && square(&of.products[p].1))
+            quantity
+                .checked_sub(STATES)
+                .is_some_and(|p| square(&of.products[p].0) && square(&of.products[p].1))
         };
         // factor |x|^2.
         let distance = |sum: &Affine| match sum.terms[..] {
@@ -44,7 +49,8 @@ impl Radial {
             }
             _ => None,
         };
-        let mut radial = Self { constants: [0.0; 3], slopes: [0.0; 3], gains: [0.0; 2], bends: [0.0; 2] };
+        let mut radial =
+            Self { constants: [0.0; 3], slopes: [0.0; 3], gains: [0.0; 2], bends: [0.0; 2] };
         for (i, sum) in of.derivatives.iter().enumerate() {
             radial.constants[i] = sum.constant;
             if i == 0 {
@@ -95,7 +101,11 @@ impl Radial {
                 Simd::vectorize(set, In::<_, 4>(task))
             };
         }
-        if degree <= 17 { In::<_, 8>(task).with_simd(pulp::Scalar) } else { In::<_, 16>(task).with_simd(pulp::Scalar) }
+        if degree <= 17 {
+            In::<_, 8>(task).with_simd(pulp::Scalar)
+        } else {
+            In::<_, 16>(task).with_simd(pulp::Scalar)
+        }
     }
 }
 
@@ -123,16 +133,19 @@ const UNITS: [[f64; 16]; 17] = {
 impl<const K: usize> WithSimd for In<Task<'_>, K> {
     type Output = ();
 
-    // Loops by number: iterators and closures may stay calls, compiled for the wrong instruction set.
+    // Loops by number: iterators and closures may stay calls, compiled for the wrong instruction
+    // set.
     #[allow(clippy::needless_range_loop)]
     #[inline(always)]
     fn with_simd<S: Simd>(self, set: S) {
-        let Task { of: Radial { constants, slopes, gains, bends }, x: start, degree, series } = self.0;
+        let Task { of: Radial { constants, slopes, gains, bends }, x: start, degree, series } =
+            self.0;
         let number = |value: f64| Registers::<S, K>::splat(set, value);
         let zero = number(0.0);
         // Lane m: coefficient m + 1 of x_0, x_1, x_2 and of r = |x|^2.
         let (mut known, mut known_r) = ([zero; 3], zero);
-        // Lane m: what is known of the coefficient of degree k + m of |x|^2, and of x_1 |x|^2 and x_2 |x|^2.
+        // Lane m: what is known of the coefficient of degree k + m of |x|^2, and of x_1 |x|^2 and
+        // x_2 |x|^2.
         let (mut sum_r, mut sums) = (zero, [zero; 2]);
         let mut x = start;
         let twice = [2.0 * start[0], 2.0 * start[1], 2.0 * start[2]];
@@ -183,7 +196,11 @@ impl<const K: usize> WithSimd for In<Task<'_>, K> {
                 }
             }
             let reciprocal = RECIPROCALS[k % LONG];
-            x = [next * reciprocal, (outer[0] + steep[0] * r) * reciprocal, (outer[1] + steep[1] * r) * reciprocal];
+            x = [
+                next * reciprocal,
+                (outer[0] + steep[0] * r) * reciprocal,
+                (outer[1] + steep[1] * r) * reciprocal,
+            ];
         }
         for i in 0..3 {
             series.forward[i][degree % LONG] = x[i];

@@ -18,7 +18,8 @@ use super::plan::{Action, Instruction, Saturated, begin, carry_out};
 use super::table::{ROW, Table};
 use super::{Recurrence, Series};
 
-/// The numbers of a list's entries, each at the place of the series that the entry is for; zero where there is none.
+/// The numbers of a list's entries, each at the place of the series that the entry is for; zero
+/// where there is none.
 type Numbers = [f64; ROW];
 
 fn numbers(given: impl Iterator<Item = (Series, f64)>) -> Numbers {
@@ -29,7 +30,8 @@ fn numbers(given: impl Iterator<Item = (Series, f64)>) -> Numbers {
     numbers
 }
 
-/// The first coefficients of an equation's series, compiled: those of degree 0, and those of degree 1 of the state.
+/// The first coefficients of an equation's series, compiled: those of degree 0, and those of degree
+/// 1 of the state.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Opening {
     numbers: Numbers,
@@ -46,7 +48,10 @@ impl Compiled {
     /// The compiled form of a plan, if it has one.
     pub fn of(instructions: &[Instruction<f64>], derivatives: &[Series]) -> Option<Self> {
         let shape = Shape::of(instructions, derivatives)?;
-        Some(Self { shape, numbers: numbers(instructions.iter().map(|given| (given.to, given.number()))) })
+        Some(Self {
+            shape,
+            numbers: numbers(instructions.iter().map(|given| (given.to, given.number()))),
+        })
     }
 
     /// See [`advance`](super::plan::advance).
@@ -67,15 +72,23 @@ macro_rules! entry {
 }
 
 macro_rules! opening {
-    (dimension $dimension:literal outputs $outputs:tt { $($name:ident $arguments:tt -> $to:literal,)* }) => {
+    (dimension $dimension:literal outputs $outputs:tt {
+        $($name:ident $arguments:tt -> $to:literal,)* }) => {
         impl Opening {
             /// The compiled form of an equation, if it has one.
-            pub fn of(dimension: usize, recurrences: &[Recurrence<f64>], outputs: &[Series]) -> Option<Self> {
+            pub fn of(
+                dimension: usize,
+                recurrences: &[Recurrence<f64>],
+                outputs: &[Series],
+            ) -> Option<Self> {
                 let mut given = recurrences.iter();
                 let same = dimension == $dimension && outputs == $outputs
-                    $(&& given.next().is_some_and(|given| *given == entry!(Recurrence::$name $arguments, given.number())))*
+                    $(&& given.next().is_some_and(|given| {
+                        *given == entry!(Recurrence::$name $arguments, given.number())
+                    }))*
                     && given.next().is_none();
-                same.then(|| Self { numbers: numbers((dimension..).zip(recurrences.iter().map(Recurrence::number))) })
+                let values = recurrences.iter().map(Recurrence::number);
+                same.then(|| Self { numbers: numbers((dimension..).zip(values)) })
             }
 
             /// See [`start`](super::plan::start).
@@ -96,7 +109,8 @@ macro_rules! opening {
 }
 
 macro_rules! shapes {
-    ($($(#[$doc:meta])* $shape:ident derivatives $derivatives:tt { $($name:ident $arguments:tt -> $to:literal,)* })*) => {
+    ($($(#[$doc:meta])* $shape:ident derivatives $derivatives:tt {
+        $($name:ident $arguments:tt -> $to:literal,)* })*) => {
         /// A plan but for the numbers in it.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         enum Shape {
@@ -109,7 +123,8 @@ macro_rules! shapes {
                     let mut given = instructions.iter();
                     let same = derivatives == $derivatives
                         $(&& given.next().is_some_and(|given| {
-                            *given == Instruction { action: entry!(Action::$name $arguments, given.number()), to: $to }
+                            *given == Instruction { action: entry!(Action::$name $arguments,
+                                given.number()), to: $to }
                         }))*
                         && given.next().is_none();
                     if same {
@@ -126,7 +141,8 @@ macro_rules! shapes {
                     $(Self::$shape => {
                         let this = 0.0;
                         $(
-                            let instruction = Instruction { action: entry!(Action::$name $arguments, numbers[$to]), to: $to };
+                            let instruction = Instruction { action: entry!(Action::$name $arguments,
+                                numbers[$to]), to: $to };
                             let this = carry_out(instruction, this, table);
                         )*
                         let _ = this;
@@ -140,7 +156,8 @@ macro_rules! shapes {
     };
 }
 
-// Series 0 to 2 are x, y, z; 5 is tanh(x/eps), 8 the transition function phi, 13 the square of the distance from the origin, 16 and 19 the pull, 20 to 22 f+, 2, 23 and 24 f-.
+// Series 0 to 2 are x, y, z; 5 is tanh(x/eps), 8 the transition function phi, 13 the square of the
+// distance from the origin, 16 and 19 the pull, 20 to 22 f+, 2, 23 and 24 f-.
 opening! {
     dimension 3 outputs [27, 30, 33] {
         Over(0; eps) -> 3,
@@ -232,15 +249,24 @@ mod tests {
     fn the_two_fold_is_compiled_at_every_degree_and_has_the_bits_of_its_recurrences() {
         for degree in 1..=21 {
             for eps in [0.125, 1e-3] {
-                let mut solution = Solution::<f64>::new(degree, &two_fold(1.0, eps), Constants::Binary);
-                for start in [[0.3, 0.5, -0.7], [1e-3, -0.4, 0.9], [-0.4, 0.0, 1.1], [-2e-4, 0.6, 0.2]] {
+                let mut solution =
+                    Solution::<f64>::new(degree, &two_fold(1.0, eps), Constants::Binary);
+                for start in
+                    [[0.3, 0.5, -0.7], [1e-3, -0.4, 0.9], [-0.4, 0.0, 1.1], [-2e-4, 0.6, 0.2]]
+                {
                     solution.expand(&start);
                     assert!(solution.is_compiled(), "{solution:?}");
                     let wanted = expanded(&solution, &start);
                     for i in 0..3 {
-                        assert_eq!(solution.component(i), wanted.component(i), "degree {degree}, eps {eps}, {start:?}");
+                        assert_eq!(
+                            solution.component(i),
+                            wanted.component(i),
+                            "degree {degree}, eps {eps}, {start:?}"
+                        );
                     }
-                    let arguments = |s: &Solution<f64>| format!("{:?}", s.layer_arguments().collect::<Vec<_>>());
+                    let arguments = |s: &Solution<f64>| {
+                        format!("{:?}", s.layer_arguments().collect::<Vec<_>>())
+                    };
                     assert_eq!(arguments(&solution), arguments(&wanted));
                 }
             }

@@ -6,7 +6,10 @@ use crate::Arithmetic;
 use crate::tape::Recorded;
 
 /// The solution through `x`, by the recurrences of `solution` alone.
-pub(super) fn expanded<S: Elementary + FromDecimal>(solution: &Solution<S>, x: &[S]) -> Solution<S> {
+pub(super) fn expanded<S: Elementary + FromDecimal>(
+    solution: &Solution<S>,
+    x: &[S],
+) -> Solution<S> {
     let mut plain = solution.clone();
     let width = plain.degree + 1;
     plain.coefficients.fill(S::zero());
@@ -26,7 +29,8 @@ pub(super) fn expanded<S: Elementary + FromDecimal>(solution: &Solution<S>, x: &
     plain
 }
 
-/// Coefficient `k` of a series, those below `k` of itself and up to `k` of its arguments being known, all others zero.
+/// Coefficient `k` of a series, those below `k` of itself and up to `k` of its arguments being
+/// known, all others zero.
 fn coefficient<S: Elementary + FromDecimal>(
     solution: &Solution<S>,
     recurrence: &Recurrence<S>,
@@ -61,7 +65,9 @@ fn coefficient<S: Elementary + FromDecimal>(
         // The coefficient asked for is still zero, so that the sum lacks exactly its term.
         Recurrence::Ln(a) => (at(a) - integral(this + 1, series(a))) / series(a)[0],
         Recurrence::Sqrt(a) => (at(a) - square(series(this), k)) / series(this)[0].scale(2.0),
-        Recurrence::Tanh(_, weights) | Recurrence::Sin(_, weights) => integral(weights, series(this + 1)),
+        Recurrence::Tanh(_, weights) | Recurrence::Sin(_, weights) => {
+            integral(weights, series(this + 1))
+        }
         Recurrence::TanhSlope(u, _) => -square(series(u), k),
         Recurrence::Cos(_, weights) => -integral(weights, series(this - 1)),
         Recurrence::OnePlusSquare(a) => square(series(a), k),
@@ -79,7 +85,8 @@ fn convolution<S: Arithmetic>(a: &[S], b: &[S], first: usize, k: usize) -> S {
     S::sum_of_products(&a[first..=k], &b[..=k - first])
 }
 
-/// sum over j from 1 to k of c_(k-j) b_j: what the known part of a quotient c = a/b contributes to a.
+/// sum over j from 1 to k of c_(k-j) b_j: what the known part of a quotient c = a/b contributes to
+/// a.
 #[inline]
 fn tail<S: Arithmetic>(c: &[S], b: &[S], k: usize) -> S {
     convolution(b, c, 1, k)
@@ -97,7 +104,8 @@ fn square<S: Arithmetic>(a: &[S], k: usize) -> S {
     sum
 }
 
-/// sum over j from 1 to k of j a_j b_(k-j), from the `weights` j a_j: k times the coefficient k of the integral of a' b.
+/// sum over j from 1 to k of j a_j b_(k-j), from the `weights` j a_j: k times the coefficient k of
+/// the integral of a' b.
 #[inline]
 fn weighted<S: Arithmetic>(weights: &[S], b: &[S], k: usize) -> S {
     S::sum_of_products(&weights[1..=k], &b[..k])

@@ -2,12 +2,13 @@
 //!
 //! A recurrence gives all coefficients of a series. From degree 1 on parts of it are trivial:
 //! constant summands vanish, sums and products of constants are zero, a product with a constant is
-//! a scaling. A [`SeriesPlan`] omits these, and passes numbers from one instruction to the next without
-//! storing them. The series of a saturated `tanh` is constant too; there is a plan for each set of
-//! saturated `tanh` that occurs.
+//! a scaling. A [`SeriesPlan`] omits these, and passes numbers from one instruction to the next
+//! without storing them. The series of a saturated `tanh` is constant too; there is a plan for each
+//! set of saturated `tanh` that occurs.
 //!
-//! Nothing is reassociated: every coefficient has the bits that its recurrence gives it (if all are finite; an overflow in a series that drops out of the equation,
-//! as in (1 + a) - (2 + a), drops out with it).
+//! Nothing is reassociated: every coefficient has the bits that its recurrence gives it (if all are
+//! finite; an overflow in a series that drops out of the equation, as in (1 + a) - (2 + a), drops
+//! out with it).
 
 use std::any::Any;
 
@@ -27,7 +28,8 @@ pub(super) enum Action<S> {
     Keep,
     Neg(Series),
     NegThis,
-    /// -(a c). As with all that follow which do two things, what lies between has no series of its own.
+    /// -(a c). As with all that follow which do two things, what lies between has no series of its
+    /// own.
     NegScale(Series, S),
     /// -a - b.
     NegLess(Series, Series),
@@ -134,7 +136,8 @@ fn integral<S: Elementary>(table: &impl Table<S>, weights: Weights, b: Series) -
     table.products(weights, b, 1, k + 1).over(k as f64)
 }
 
-/// The coefficients of degree 0, from those of the state, and those of degree 1 of the state. Returns which tanh are saturated, a bit each.
+/// The coefficients of degree 0, from those of the state, and those of degree 1 of the state.
+/// Returns which tanh are saturated, a bit each.
 #[inline(always)]
 pub(super) fn start<S: Elementary>(equation: &Equation<S>, table: &mut impl Table<S>) -> u64 {
     let mut saturated = Saturated::default();
@@ -193,7 +196,9 @@ pub(super) fn start_of<S: Elementary>(recurrence: &Recurrence<S>, at: impl Fn(Se
         Recurrence::Sign(a) => at(a).sign(),
         Recurrence::Tanh(a, _) => at(a).tanh(),
         // As (1 - u)(1 + u): exactly zero where tanh is saturated, and accurate near it.
-        Recurrence::TanhSlope(u, a) => at(a).sech_squared().unwrap_or_else(|| (S::one() - at(u)) * (S::one() + at(u))),
+        Recurrence::TanhSlope(u, a) => {
+            at(a).sech_squared().unwrap_or_else(|| (S::one() - at(u)) * (S::one() + at(u)))
+        }
         Recurrence::Sin(a, _) => at(a).sin(),
         Recurrence::Cos(a, _) => at(a).cos(),
         Recurrence::OnePlusSquare(a) => S::one() + at(a).squared(),
@@ -217,7 +222,11 @@ pub(super) fn advance<S: Elementary, T: Table<S>>(plan: &SeriesPlan<S>, table: &
 
 /// Carries one instruction out, `this` being the current number. Returns the next.
 #[inline(always)]
-pub(super) fn carry_out<S: Elementary, T: Table<S>>(instruction: Instruction<S>, this: S, table: &mut T) -> S {
+pub(super) fn carry_out<S: Elementary, T: Table<S>>(
+    instruction: Instruction<S>,
+    this: S,
+    table: &mut T,
+) -> S {
     let Instruction { action, to } = instruction;
     let k = table.degree();
     let degree = k as f64;
@@ -352,7 +361,8 @@ impl<S: Elementary> SeriesPlan<S> {
     /// The plan for an equation with these `tanh` saturated.
     pub fn new(equation: &Equation<S>, saturated: u64) -> Self {
         let tails = Tails::new(equation, saturated);
-        let mut planner = Planner { equation, tails: &tails, instructions: Vec::new(), at_hand: None };
+        let mut planner =
+            Planner { equation, tails: &tails, instructions: Vec::new(), at_hand: None };
         planner.clear();
         for (i, recurrence) in equation.recurrences.iter().enumerate() {
             let this = equation.dimension + i;
@@ -365,7 +375,8 @@ impl<S: Elementary> SeriesPlan<S> {
                 }
             }
         }
-        let derivatives: Vec<_> = equation.outputs.iter().map(|output| tails.place(*output)).collect();
+        let derivatives: Vec<_> =
+            equation.outputs.iter().map(|output| tails.place(*output)).collect();
         let instructions = planner.instructions;
         let compiled = (&instructions as &dyn Any)
             .downcast_ref::<Vec<Instruction<f64>>>()
@@ -377,7 +388,8 @@ impl<S: Elementary> SeriesPlan<S> {
 /// What is known of all series before anything is computed.
 struct Tails {
     of: Vec<Tail>,
-    /// Whether coefficients from degree 1 on are sums that began with zero, which are never negative zeros.
+    /// Whether coefficients from degree 1 on are sums that began with zero, which are never
+    /// negative zeros.
     sums: Vec<bool>,
     /// By how many the coefficients are read where they belong.
     uses: Vec<usize>,
@@ -387,7 +399,8 @@ impl Tails {
     fn new<S: Elementary>(equation: &Equation<S>, saturated: u64) -> Self {
         let states = equation.dimension;
         let count = states + equation.recurrences.len();
-        let mut tails = Self { of: vec![Tail::Own; states], sums: vec![false; states], uses: vec![0; count] };
+        let mut tails =
+            Self { of: vec![Tail::Own; states], sums: vec![false; states], uses: vec![0; count] };
         let mut tanh = 0;
         for recurrence in equation.recurrences {
             let flat = match recurrence {
@@ -436,13 +449,20 @@ impl Tails {
             return Tail::Own;
         }
         // Positive and finite.
-        let keeps_zero = |c: S| c != S::zero() && c * S::zero() == S::zero() && c.sign() == S::one();
+        let keeps_zero =
+            |c: S| c != S::zero() && c * S::zero() == S::zero() && c.sign() == S::one();
         match *recurrence {
-            Recurrence::Add(a, b) if self.is_zero(b) && (self.is_zero(a) || self.sums[a]) => self.same(a),
+            Recurrence::Add(a, b) if self.is_zero(b) && (self.is_zero(a) || self.sums[a]) => {
+                self.same(a)
+            }
             Recurrence::Add(a, b) if self.is_zero(a) && self.sums[b] => self.same(b),
             Recurrence::Sub(a, b) if self.is_zero(b) => self.same(a),
             Recurrence::Sub(a, b) if self.place(a) == self.place(b) => Tail::Zero,
-            Recurrence::Scale(a, c) | Recurrence::Over(a, c) if self.is_zero(a) && keeps_zero(c) => Tail::Zero,
+            Recurrence::Scale(a, c) | Recurrence::Over(a, c)
+                if self.is_zero(a) && keeps_zero(c) =>
+            {
+                Tail::Zero
+            }
             Recurrence::Mul(a, b) if self.is_zero(a) && self.is_zero(b) => Tail::Zero,
             Recurrence::Exp(a, _) | Recurrence::Tanh(a, _) if self.is_zero(a) => Tail::Zero,
             _ => Tail::Own,
@@ -518,7 +538,10 @@ impl Tails {
             }
             // Computed with the one before.
             Recurrence::TanhSlope(..) | Recurrence::Cos(..) => self.read(this - 1),
-            Recurrence::Constant(_) | Recurrence::Sign(_) | Recurrence::Shift(..) | Recurrence::Weighted(_) => {}
+            Recurrence::Constant(_)
+            | Recurrence::Sign(_)
+            | Recurrence::Shift(..)
+            | Recurrence::Weighted(_) => {}
         }
     }
 }
@@ -612,7 +635,9 @@ impl<S: Elementary> Planner<'_, S> {
             (Action::Mul(a, b), Action::ThisLess(c)) => Action::MulLess(a, b, c),
             (Action::Square(b), Action::PlusThis(a)) => Action::PlusSquare(a, b),
             (Action::Square(a), Action::PlusSquare(x, b)) if x == to => Action::Squares(a, b),
-            (Action::Squares(a, b), Action::PlusSquare(x, c)) if x == to => Action::ThreeSquares(a, b, c),
+            (Action::Squares(a, b), Action::PlusSquare(x, c)) if x == to => {
+                Action::ThreeSquares(a, b, c)
+            }
             (Action::Lift(c, b), Action::PlusThis(a)) => Action::PlusLift(a, c, b),
             (Action::LiftThis(c), Action::PlusThis(a)) => Action::PlusLiftThis(a, c),
             _ => return action,
@@ -635,13 +660,17 @@ mod tests {
     const DEGREE: usize = 13;
 
     /// The coefficients of a solution, zeros with their signs; NaN or infinity as `None`.
-    fn shown<S: Elementary + FromDecimal>(solution: &Solution<S>, dimension: usize) -> Option<String> {
+    fn shown<S: Elementary + FromDecimal>(
+        solution: &Solution<S>,
+        dimension: usize,
+    ) -> Option<String> {
         let components: Vec<_> = (0..dimension).map(|i| solution.component(i)).collect();
         let text = format!("{components:?} {:?}", solution.layer_arguments().collect::<Vec<_>>());
         (!text.contains("NaN") && !text.contains("inf")).then_some(text)
     }
 
-    /// Whether a plan gives the bits of the plain recurrences, at one start after the other; `None` if these are not finite.
+    /// Whether a plan gives the bits of the plain recurrences, at one start after the other; `None`
+    /// if these are not finite.
     fn agrees<S: Elementary + FromDecimal>(tape: &Tape, starts: &[[f64; 3]]) -> Option<()> {
         let mut solution = Solution::<S>::new(DEGREE, tape, Constants::Binary);
         for start in starts {
@@ -657,7 +686,8 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(400))]
         #[test]
         fn a_plan_gives_the_bits_of_the_recurrences(
-            operations in prop::collection::vec((0..20_u8, any::<usize>(), any::<usize>(), -2.0..2.0_f64), 3..24),
+            operations in prop::collection::vec((0..20_u8, any::<usize>(), any::<usize>(),
+                -2.0..2.0_f64), 3..24),
             starts in prop::collection::vec(prop::array::uniform3(-1.0..1.0_f64), 3),
         ) {
             let tape = equation(3, &operations);
@@ -673,7 +703,11 @@ mod tests {
     fn switched() -> Tape {
         Tape::record(3, |x| {
             let (one, r) = (Recorded::one(), x[0] * x[2]);
-            vec![(x[1] / Recorded::from_f64(0.01)).tanh() * x[2] + one, (one + r) - (x[2] + r), -x[0]]
+            vec![
+                (x[1] / Recorded::from_f64(0.01)).tanh() * x[2] + one,
+                (one + r) - (x[2] + r),
+                -x[0],
+            ]
         })
     }
 
@@ -684,7 +718,11 @@ mod tests {
         let mut solution = Solution::<f64>::new(DEGREE, &switched(), Constants::Binary);
         let mut lengths = |start: &[f64; 3]| {
             solution.expand(start);
-            solution.plans.iter().map(|plan| (plan.saturated, plan.instructions.len())).collect::<Vec<_>>()
+            solution
+                .plans
+                .iter()
+                .map(|plan| (plan.saturated, plan.instructions.len()))
+                .collect::<Vec<_>>()
         };
         let (outside, both) = (lengths(&starts[0]), lengths(&starts[1]));
         assert_eq!((outside.len(), both.len(), outside[0]), (1, 2, both[0]));

@@ -4,7 +4,8 @@ use super::Series;
 use super::plan::{SeriesPlan, advance};
 use crate::Elementary;
 
-/// The coefficients below degree k of all series, and those of degree k of the series that have been computed.
+/// The coefficients below degree k of all series, and those of degree k of the series that have
+/// been computed.
 pub(super) trait Table<S> {
     /// k.
     fn degree(&self) -> usize;
@@ -63,8 +64,10 @@ pub(super) const LONGEST: usize = 21;
 
 /// One degree after the other: row j has coefficient j of every series. `T` rows are known, k + 1.
 ///
-/// With its length known, a sum is computed without a loop: how often a loop goes round is what a processor guesses wrong. And as neighbours in a row belong to
-/// different series, no compiler reads two coefficients at once: that would have to wait until the younger one has arrived in memory.
+/// With its length known, a sum is computed without a loop: how often a loop goes round is what a
+/// processor guesses wrong. And as neighbours in a row belong to different series, no compiler
+/// reads two coefficients at once: that would have to wait until the younger one has arrived in
+/// memory.
 pub(super) struct Rows<'a, const T: usize> {
     known: &'a mut [[f64; ROW]; T],
     next: &'a mut [f64; ROW],

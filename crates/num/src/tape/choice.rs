@@ -8,7 +8,8 @@
 
 use super::{Node, Operation, Tape};
 
-/// What an instruction does. `f` and `g` are its numbers: terms without variables, computed beforehand.
+/// What an instruction does. `f` and `g` are its numbers: terms without variables, computed
+/// beforehand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Code {
     Add,
@@ -81,7 +82,8 @@ pub(super) enum Code {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Choice {
     pub code: Code,
-    /// a, b, c: the results that are used; as many as the code speaks of, in this order, those in front.
+    /// a, b, c: the results that are used; as many as the code speaks of, in this order, those in
+    /// front.
     pub operands: [Option<Node>; 3],
     /// f, g; 0 where there is none.
     pub numbers: [f64; 2],
@@ -127,7 +129,9 @@ impl Choice {
 pub(super) fn choices(tape: &Tape, needed: &[bool], fixed: &[Option<f64>]) -> Vec<Option<Choice>> {
     let operations = &tape.operations;
     let mut uses = vec![0_usize; operations.len()];
-    let used = (0..operations.len()).filter(|node| needed[*node]).flat_map(|node| operations[node].arguments());
+    let used = (0..operations.len())
+        .filter(|node| needed[*node])
+        .flat_map(|node| operations[node].arguments());
     used.chain(tape.outputs.iter().copied()).for_each(|node| uses[node] += 1);
     let terms = Terms { operations, fixed, uses: &uses };
     let mut done = vec![false; operations.len()];
@@ -153,7 +157,8 @@ struct Terms<'a> {
 }
 
 impl Terms<'_> {
-    /// The operation at `node`, if it depends on variables and nothing but one other operation uses it.
+    /// The operation at `node`, if it depends on variables and nothing but one other operation uses
+    /// it.
     fn own(&self, node: Node) -> Option<Operation> {
         self.used(node, 1)
     }
@@ -225,7 +230,10 @@ impl Terms<'_> {
             Operation::Atan(a) => Choice::one(Code::Atan, a),
             Operation::Erf(a) => Choice::one(Code::Erf, a),
             Operation::Sign(a) => Choice::one(Code::Sign, a),
-            Operation::Variable(_) | Operation::Constant(_) | Operation::Parameter(_) | Operation::Pi => return None,
+            Operation::Variable(_)
+            | Operation::Constant(_)
+            | Operation::Parameter(_)
+            | Operation::Pi => return None,
         })
     }
 
@@ -267,11 +275,17 @@ impl Terms<'_> {
         let inside = [product, difference];
         Some(match (self.fixed[x], self.fixed[base]) {
             // A difference of numbers is one itself.
-            (_, Some(f)) => Choice::first_and_third(Code::BlendFromFixed, x, c).with(f, 0.0).around(inside),
-            (Some(f), None) => Choice::new(Code::BlendToFixed, [None, Some(base), Some(c)]).with(f, 0.0).around(inside),
+            (_, Some(f)) => {
+                Choice::first_and_third(Code::BlendFromFixed, x, c).with(f, 0.0).around(inside)
+            }
+            (Some(f), None) => Choice::new(Code::BlendToFixed, [None, Some(base), Some(c)])
+                .with(f, 0.0)
+                .around(inside),
             (None, None) => match (self.plus_number(x, 1), self.plus_number(base, 2)) {
                 (Some((y, f)), Some((z, g))) if y == z => {
-                    Choice::first_and_third(Code::BlendOfSums, y, c).with(f, g).around([product, difference, x, base])
+                    Choice::first_and_third(Code::BlendOfSums, y, c)
+                        .with(f, g)
+                        .around([product, difference, x, base])
                 }
                 _ => Choice::three(Code::Blend, x, base, c).around(inside),
             },
@@ -310,18 +324,35 @@ impl Terms<'_> {
                 None => Choice::one(Code::MulFixed, x).with(g, 0.0),
             };
         }
-        let first = self.factor(a, b, [Code::LineTimes, Code::FixedSubTimes, Code::SumTimes, Code::DifferenceTimes]);
-        let second =
-            || self.factor(b, a, [Code::TimesLine, Code::TimesFixedSub, Code::TimesSum, Code::TimesDifference]);
+        let first = self.factor(
+            a,
+            b,
+            [Code::LineTimes, Code::FixedSubTimes, Code::SumTimes, Code::DifferenceTimes],
+        );
+        let second = || {
+            self.factor(
+                b,
+                a,
+                [Code::TimesLine, Code::TimesFixedSub, Code::TimesSum, Code::TimesDifference],
+            )
+        };
         first.or_else(second).unwrap_or_else(|| Choice::two(Code::Mul, a, b))
     }
 
-    /// A sum or difference `term` and its product with c. `codes` for: f - a g, f - a, a + b, a - b.
-    fn factor(&self, term: Node, c: Node, [line, from_number, sum, difference]: [Code; 4]) -> Option<Choice> {
+    /// A sum or difference `term` and its product with c. `codes` for: f - a g, f - a, a + b, a -
+    /// b.
+    fn factor(
+        &self,
+        term: Node,
+        c: Node,
+        [line, from_number, sum, difference]: [Code; 4],
+    ) -> Option<Choice> {
         Some(match self.own(term)? {
             Operation::Sub(x, y) => match (self.fixed[x], self.fixed[y]) {
                 (Some(f), None) => match self.scaled(y) {
-                    Some((z, g)) => Choice::first_and_third(line, z, c).with(f, g).around([term, y]),
+                    Some((z, g)) => {
+                        Choice::first_and_third(line, z, c).with(f, g).around([term, y])
+                    }
                     None => Choice::first_and_third(from_number, y, c).with(f, 0.0).around([term]),
                 },
                 (None, None) => Choice::three(difference, x, y, c).around([term]),

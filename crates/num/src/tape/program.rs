@@ -22,11 +22,11 @@ pub(super) enum Output {
     Fixed(f64),
 }
 
-/// A tape made ready for evaluation: dead operations dropped, terms without variables computed in `f64`, intermediate results in a few registers
-/// that are used again.
+/// A tape made ready for evaluation: dead operations dropped, terms without variables computed in
+/// `f64`, intermediate results in a few registers that are used again.
 ///
-/// Nothing is allocated in an evaluation if [`Program::registers`] are at most [`Program::ON_STACK`], which systems of ordinary size stay far
-/// below.
+/// Nothing is allocated in an evaluation if [`Program::registers`] are at most
+/// [`Program::ON_STACK`], which systems of ordinary size stay far below.
 #[derive(Clone, Debug)]
 pub struct Program {
     pub(super) variables: usize,
@@ -59,7 +59,8 @@ impl Program {
             last_use[*output] = usize::MAX;
         }
         let mut registers = tape.variables;
-        let mut free: Vec<u16> = (0..tape.variables).filter(|i| !needed[*i]).map(|i| i as u16).collect();
+        let mut free: Vec<u16> =
+            (0..tape.variables).filter(|i| !needed[*i]).map(|i| i as u16).collect();
         let mut register: Vec<u16> = vec![0; tape.operations.len()];
         for (node, operation) in tape.operations.iter().enumerate() {
             if let Operation::Variable(i) = operation {
@@ -70,7 +71,8 @@ impl Program {
         for (node, choice) in chosen.iter().enumerate() {
             let Some(choice) = choice else { continue };
             let [a, b, c] = choice.operands.map(|operand| operand.map_or(0, |node| register[node]));
-            let mut done: Vec<Node> = operands(choice).filter(|operand| last_use[*operand] == node).collect();
+            let mut done: Vec<Node> =
+                operands(choice).filter(|operand| last_use[*operand] == node).collect();
             done.sort_unstable();
             done.dedup();
             free.extend(done.iter().map(|operand| register[*operand]));
@@ -128,16 +130,28 @@ impl Program {
     /// If `x` or `out` do not have the function's numbers of variables and values.
     #[inline]
     pub fn evaluate<S: Elementary>(&self, x: &[S], out: &mut [S]) {
-        assert!(x.len() == self.variables && out.len() == self.outputs.len(), "one number a variable and a value");
-        // Wider numbers than `f64` take so long that how a register is found does not matter: one loop is compiled for them, not three.
+        assert!(
+            x.len() == self.variables && out.len() == self.outputs.len(),
+            "one number a variable and a value"
+        );
+        // Wider numbers than `f64` take so long that how a register is found does not matter: one
+        // loop is compiled for them, not three.
         if self.registers <= Self::FEW {
             let mut registers = [S::zero(); Self::FEW];
             registers[..x.len()].copy_from_slice(x);
-            if const { wide::<S>() } { self.run(registers.as_mut_slice(), out) } else { self.run(&mut registers, out) }
+            if const { wide::<S>() } {
+                self.run(registers.as_mut_slice(), out)
+            } else {
+                self.run(&mut registers, out)
+            }
         } else if self.registers <= Self::ON_STACK {
             let mut registers = [S::zero(); Self::ON_STACK];
             registers[..x.len()].copy_from_slice(x);
-            if const { wide::<S>() } { self.run(registers.as_mut_slice(), out) } else { self.run(&mut registers, out) }
+            if const { wide::<S>() } {
+                self.run(registers.as_mut_slice(), out)
+            } else {
+                self.run(&mut registers, out)
+            }
         } else {
             let mut registers = vec![S::zero(); self.registers];
             registers[..x.len()].copy_from_slice(x);
@@ -237,7 +251,8 @@ trait Results<S> {
 }
 
 impl<S: Copy, const M: usize> Results<S> for [S; M] {
-    // The remainder changes nothing, since the program's registers are at most M, a power of two, and spares the way to a panic.
+    // The remainder changes nothing, since the program's registers are at most M, a power of two,
+    // and spares the way to a panic.
     #[inline(always)]
     fn get(&self, i: u16) -> S {
         self[usize::from(i) % M]
@@ -298,7 +313,8 @@ mod tests {
         ]
     }
 
-    /// What looks like one and is not: a result used twice, by itself, wanted as a value, with another in between, or with a number in the wrong place.
+    /// What looks like one and is not: a result used twice, by itself, wanted as a value, with
+    /// another in between, or with a number in the wrong place.
     fn several<S: Elementary>(a: S, b: S, c: S) -> Vec<S> {
         let (k, m) = (S::from_f64(0.3), S::from_f64(1.7));
         let (p, d, e, s) = (a * b, a - b, (a - c) * b, c * c);
@@ -340,7 +356,8 @@ mod tests {
     fn what_is_one_instruction_rounds_as_its_operations() {
         let x = [0.7, -1.3, 2.9];
         for (i, want) in one_instruction(x[0], x[1], x[2]).into_iter().enumerate() {
-            let program = Program::new(&Tape::record(3, |v| vec![one_instruction(v[0], v[1], v[2])[i]]));
+            let program =
+                Program::new(&Tape::record(3, |v| vec![one_instruction(v[0], v[1], v[2])[i]]));
             assert_eq!(program.instructions(), 1, "{i}");
             assert_eq!(bits(&values(&program, &x)), bits(&[want]), "{i}");
         }
@@ -348,16 +365,22 @@ mod tests {
             let program = Program::new(&Tape::record(3, |v| vec![several(v[0], v[1], v[2])[i]]));
             assert_eq!(bits(&values(&program, &x)), bits(&[want]), "{i}");
         }
-        let all = |v: &[Recorded]| [one_instruction(v[0], v[1], v[2]), several(v[0], v[1], v[2])].concat();
+        let all = |v: &[Recorded]| {
+            [one_instruction(v[0], v[1], v[2]), several(v[0], v[1], v[2])].concat()
+        };
         let program = Program::new(&Tape::record(3, all));
         let want = [one_instruction(x[0], x[1], x[2]), several(x[0], x[1], x[2])].concat();
         assert_eq!(bits(&values(&program, &x)), bits(&want));
         // Numbers with two halves keep the order of operands too.
         let x = x.map(|x| DoubleDouble::new(x, 1e-18));
-        assert_eq!(values(&program, &x), [one_instruction(x[0], x[1], x[2]), several(x[0], x[1], x[2])].concat());
+        assert_eq!(
+            values(&program, &x),
+            [one_instruction(x[0], x[1], x[2]), several(x[0], x[1], x[2])].concat()
+        );
     }
 
-    /// An equation by chance: each operation on some of the last results, so that they come in chains.
+    /// An equation by chance: each operation on some of the last results, so that they come in
+    /// chains.
     fn by_chance(v: &[Recorded], steps: &[(u8, usize, usize, usize)]) -> Vec<Recorded> {
         let mut made: Vec<Recorded> = [0.3, -1.7, 0.0].map(Recorded::from_f64).to_vec();
         made.extend(v);
@@ -388,7 +411,8 @@ mod tests {
             let tape = Tape::record(3, |v| by_chance(v, &steps));
             let found = values(&Program::new(&tape), &x);
             for (found, want) in found.iter().zip(tape.evaluate_decimal(&x)) {
-                prop_assert!(found.to_bits() == want.to_bits() || found.is_nan() && want.is_nan(), "{} {}", found, want);
+                prop_assert!(found.to_bits() == want.to_bits() || found.is_nan() && want.is_nan(),
+                    "{} {}", found, want);
             }
         }
     }

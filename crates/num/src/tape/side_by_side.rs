@@ -3,7 +3,8 @@
 //! Dispatching an instruction takes longer than executing it; here one dispatch serves as many
 //! points as there are lanes.
 
-// Loops by number over registers: iterators and closures may stay calls, compiled for the wrong instruction set.
+// Loops by number over registers: iterators and closures may stay calls, compiled for the wrong
+// instruction set.
 #![allow(clippy::needless_range_loop)]
 
 use pulp::Simd;
@@ -50,8 +51,9 @@ impl Program {
         self.registers.max(self.variables).next_power_of_two()
     }
 
-    /// The function's values at `x`: in every lane the bits of [`Program::evaluate`]. `N` is the number of variables and of values;
-    /// `scratch` is as long as [`Program::scratch_len`] says, and what is in it, before and after, means nothing.
+    /// The function's values at `x`: in every lane the bits of [`Program::evaluate`]. `N` is the
+    /// number of variables and of values; `scratch` is as long as [`Program::scratch_len`] says,
+    /// and what is in it, before and after, means nothing.
     ///
     /// Always inlined, so that it is compiled with the caller's instruction set.
     #[inline(always)]
@@ -74,7 +76,10 @@ impl Program {
         numbers: &[Aligned<Bundle<S, K>>],
         scratch: &mut [Aligned<Bundle<S, K>>],
     ) -> [Bundle<S, K>; N] {
-        assert!(numbers.len() == 2 * self.code.len() + N, "two numbers an instruction, one a value");
+        assert!(
+            numbers.len() == 2 * self.code.len() + N,
+            "two numbers an instruction, one a value"
+        );
         self.evaluate_with(set, x, OfLanes::<S, K>(numbers), scratch)
     }
 
@@ -86,7 +91,10 @@ impl Program {
         numbers: impl Numbers<S, K>,
         results: &mut [Aligned<Bundle<S, K>>],
     ) -> [Bundle<S, K>; N] {
-        assert!(N == self.variables && N == self.outputs.len(), "one number a variable and a value");
+        assert!(
+            N == self.variables && N == self.outputs.len(),
+            "one number a variable and a value"
+        );
         assert!(results.len() == self.scratch_len(), "as much scratch as the program says");
         // The mask changes nothing and spares the way to a panic.
         let last = results.len() - 1;
@@ -107,18 +115,22 @@ impl Program {
                 };
                 // With the other operand, which is read only here.
                 (b, $k:ident, $b:ident => $result:expr) => {{
-                    let $b = if i.b == written { value } else { results[usize::from(i.b) & last].0 };
+                    let $b = if i.b == written { value } else {
+                        results[usize::from(i.b) & last].0 };
                     each!($k => $result);
                 }};
                 // With three.
                 (b c, $k:ident, $b:ident, $c:ident => $result:expr) => {{
-                    let $b = if i.b == written { value } else { results[usize::from(i.b) & last].0 };
-                    let $c = if i.c == written { value } else { results[usize::from(i.c) & last].0 };
+                    let $b = if i.b == written { value } else {
+                        results[usize::from(i.b) & last].0 };
+                    let $c = if i.c == written { value } else {
+                        results[usize::from(i.c) & last].0 };
                     each!($k => $result);
                 }};
                 // With the third.
                 (c, $k:ident, $c:ident => $result:expr) => {{
-                    let $c = if i.c == written { value } else { results[usize::from(i.c) & last].0 };
+                    let $c = if i.c == written { value } else {
+                        results[usize::from(i.c) & last].0 };
                     each!($k => $result);
                 }};
             }
@@ -172,14 +184,30 @@ impl Program {
                 Code::Atan => value = number.atan().parts(),
                 Code::Erf => value = number.erf().parts(),
                 Code::Sign => value = number.sign().parts(),
-                Code::ProductPlus => each!(b c, k, b, c => set.add_f64s(set.mul_f64s(a[k], b[k]), c[k])),
-                Code::PlusProduct => each!(b c, k, b, c => set.add_f64s(c[k], set.mul_f64s(a[k], b[k]))),
-                Code::ProductMinus => each!(b c, k, b, c => set.sub_f64s(set.mul_f64s(a[k], b[k]), c[k])),
-                Code::MinusProduct => each!(b c, k, b, c => set.sub_f64s(c[k], set.mul_f64s(a[k], b[k]))),
-                Code::SumTimes => each!(b c, k, b, c => set.mul_f64s(set.add_f64s(a[k], b[k]), c[k])),
-                Code::TimesSum => each!(b c, k, b, c => set.mul_f64s(c[k], set.add_f64s(a[k], b[k]))),
-                Code::DifferenceTimes => each!(b c, k, b, c => set.mul_f64s(set.sub_f64s(a[k], b[k]), c[k])),
-                Code::TimesDifference => each!(b c, k, b, c => set.mul_f64s(c[k], set.sub_f64s(a[k], b[k]))),
+                Code::ProductPlus => {
+                    each!(b c, k, b, c => set.add_f64s(set.mul_f64s(a[k], b[k]), c[k]))
+                }
+                Code::PlusProduct => {
+                    each!(b c, k, b, c => set.add_f64s(c[k], set.mul_f64s(a[k], b[k])))
+                }
+                Code::ProductMinus => {
+                    each!(b c, k, b, c => set.sub_f64s(set.mul_f64s(a[k], b[k]), c[k]))
+                }
+                Code::MinusProduct => {
+                    each!(b c, k, b, c => set.sub_f64s(c[k], set.mul_f64s(a[k], b[k])))
+                }
+                Code::SumTimes => {
+                    each!(b c, k, b, c => set.mul_f64s(set.add_f64s(a[k], b[k]), c[k]))
+                }
+                Code::TimesSum => {
+                    each!(b c, k, b, c => set.mul_f64s(c[k], set.add_f64s(a[k], b[k])))
+                }
+                Code::DifferenceTimes => {
+                    each!(b c, k, b, c => set.mul_f64s(set.sub_f64s(a[k], b[k]), c[k]))
+                }
+                Code::TimesDifference => {
+                    each!(b c, k, b, c => set.mul_f64s(c[k], set.sub_f64s(a[k], b[k])))
+                }
                 Code::FixedSubTimes => {
                     let f = f!();
                     each!(c, k, c => set.mul_f64s(set.sub_f64s(f[k], a[k]), c[k]))
@@ -202,13 +230,18 @@ impl Program {
                 }
                 Code::LineTimes => {
                     let (f, g) = (f!(), g!());
-                    each!(c, k, c => set.mul_f64s(set.sub_f64s(f[k], set.mul_f64s(a[k], g[k])), c[k]))
+                    each!(c, k, c => set.mul_f64s(set.sub_f64s(f[k], set.mul_f64s(a[k], g[k])),
+                        c[k]))
                 }
                 Code::TimesLine => {
                     let (f, g) = (f!(), g!());
-                    each!(c, k, c => set.mul_f64s(c[k], set.sub_f64s(f[k], set.mul_f64s(a[k], g[k]))))
+                    each!(c, k, c => set.mul_f64s(c[k], set.sub_f64s(f[k], set.mul_f64s(a[k],
+                        g[k]))))
                 }
-                Code::Squares => each!(b, k, b => set.add_f64s(set.mul_f64s(a[k], a[k]), set.mul_f64s(b[k], b[k]))),
+                Code::Squares => {
+                    each!(b, k, b => set.add_f64s(set.mul_f64s(a[k], a[k]), set.mul_f64s(b[k],
+                        b[k])))
+                }
                 Code::ThreeSquares => each!(b c, k, b, c => {
                     let two = set.add_f64s(set.mul_f64s(a[k], a[k]), set.mul_f64s(b[k], b[k]));
                     set.add_f64s(two, set.mul_f64s(c[k], c[k]))
@@ -218,14 +251,19 @@ impl Program {
                     each!(k => set.div_f64s(a[k], f[k]));
                     value = Registers::<S, K>::new(set, value).tanh().parts();
                 }
-                Code::Blend => each!(b c, k, b, c => set.add_f64s(b[k], set.mul_f64s(set.sub_f64s(a[k], b[k]), c[k]))),
+                Code::Blend => {
+                    each!(b c, k, b, c => set.add_f64s(b[k], set.mul_f64s(set.sub_f64s(a[k], b[k]),
+                        c[k])))
+                }
                 Code::BlendFromFixed => {
                     let f = f!();
-                    each!(c, k, c => set.add_f64s(f[k], set.mul_f64s(set.sub_f64s(a[k], f[k]), c[k])))
+                    each!(c, k, c => set.add_f64s(f[k], set.mul_f64s(set.sub_f64s(a[k], f[k]),
+                        c[k])))
                 }
                 Code::BlendToFixed => {
                     let f = f!();
-                    each!(b c, k, b, c => set.add_f64s(b[k], set.mul_f64s(set.sub_f64s(f[k], b[k]), c[k])))
+                    each!(b c, k, b, c => set.add_f64s(b[k], set.mul_f64s(set.sub_f64s(f[k], b[k]),
+                        c[k])))
                 }
                 Code::BlendOfSums => {
                     let (f, g) = (f!(), g!());
@@ -266,15 +304,24 @@ mod tests {
         Program::new(&Tape::record(2, |v| {
             let (x, y) = (v[0], v[1]);
             let c = crate::tape::Recorded::from_f64(number);
-            let a = ((x + y) * (x - y) / (x * x + c) - c) * (c - x) + (c / (y * y + c) + x / c).tanh();
+            let a =
+                ((x + y) * (x - y) / (x * x + c) - c) * (c - x) + (c / (y * y + c) + x / c).tanh();
             let b = (-x).exp() + (x * x + c).ln() - y.sin() * y.cos() + (y * y + c).sqrt();
             // Pairs of operations that are one instruction, in every order.
-            let a = (a * y + x) - (y + a * x) * (x + a) + (a * x - b) * (b - a * y) + b * (x - a) + (x - b) * y;
+            let a = (a * y + x) - (y + a * x) * (x + a)
+                + (a * x - b) * (b - a * y)
+                + b * (x - a)
+                + (x - b) * y;
             let b = b + (a - b) * y + (c - a) * x + y * (c - b) + x * (a + b);
             // With numbers, two of them too, and three operations and more.
             let d = crate::tape::Recorded::from_f64(1.7);
-            let a = a + (c - b) * y + x * (c - a) + (a * c + d) * (d - b * c) + ((b + c) * d) * ((d - x * c) * y);
-            let b = b + a * (d - y * c) + (x * x + y * y) * (a * a + b * b + y * y) + (x / d).tanh();
+            let a = a
+                + (c - b) * y
+                + x * (c - a)
+                + (a * c + d) * (d - b * c)
+                + ((b + c) * d) * ((d - x * c) * y);
+            let b =
+                b + a * (d - y * c) + (x * x + y * y) * (a * a + b * b + y * y) + (x / d).tanh();
             let (e, g) = (c + (a - c) * x, y + (c - y) * x);
             let b = b + e * ((a + d) + ((a + c) - (a + d)) * g);
             vec![a + (x - c).atan(), b + y.erf() * (x * y).sign() + c * (x + c)]
@@ -289,7 +336,8 @@ mod tests {
         #[inline(always)]
         fn with_simd<S: Simd>(self, set: S) {
             let width = K * S::F64_LANES;
-            let value = |lane: usize, i: usize| (lane as f64 - 0.4 * width as f64) * 0.37 + i as f64 * 0.21;
+            let value =
+                |lane: usize, i: usize| (lane as f64 - 0.4 * width as f64) * 0.37 + i as f64 * 0.21;
             let lanes = [0, 1].map(|i| (0..width).map(|lane| value(lane, i)).collect::<Vec<_>>());
             let x = lanes.each_ref().map(|lanes| Registers::<S, K>::load(set, lanes).parts());
             // What an earlier evaluation left there must not matter.
@@ -299,7 +347,11 @@ mod tests {
                 let mut alone = [0.0; 2];
                 self.0.evaluate(&[value(lane, 0), value(lane, 1)], &mut alone);
                 for i in 0..2 {
-                    assert_eq!(cast_slice::<_, f64>(&found[i])[lane].to_bits(), alone[i].to_bits(), "{lane} {i}");
+                    assert_eq!(
+                        cast_slice::<_, f64>(&found[i])[lane].to_bits(),
+                        alone[i].to_bits(),
+                        "{lane} {i}"
+                    );
                 }
             }
         }
@@ -323,7 +375,8 @@ mod tests {
         #[inline(always)]
         fn with_simd<S: Simd>(self, set: S) {
             let width = K * S::F64_LANES;
-            let programs: Vec<Program> = (0..width).map(|lane| everything_with(0.3 + 0.01 * lane as f64)).collect();
+            let programs: Vec<Program> =
+                (0..width).map(|lane| everything_with(0.3 + 0.01 * lane as f64)).collect();
             assert!(programs.iter().all(|program| program.is_like(&programs[0])));
             let of_lanes: Vec<Vec<f64>> = programs.iter().map(Program::numbers).collect();
             let numbers: Vec<Aligned<Bundle<S, K>>> = (0..of_lanes[0].len())
@@ -333,13 +386,18 @@ mod tests {
                 })
                 .collect();
             let x = [0.7, -0.2].map(|x| Registers::<S, K>::splat(set, x).parts());
-            let mut scratch = vec![Aligned([set.splat_f64s(f64::NAN); K]); programs[0].scratch_len()];
+            let mut scratch =
+                vec![Aligned([set.splat_f64s(f64::NAN); K]); programs[0].scratch_len()];
             let found = programs[0].evaluate_with_numbers(set, x, &numbers, &mut scratch);
             for lane in 0..width {
                 let mut alone = [0.0; 2];
                 programs[lane].evaluate(&[0.7, -0.2], &mut alone);
                 for i in 0..2 {
-                    assert_eq!(cast_slice::<_, f64>(&found[i])[lane].to_bits(), alone[i].to_bits(), "{lane} {i}");
+                    assert_eq!(
+                        cast_slice::<_, f64>(&found[i])[lane].to_bits(),
+                        alone[i].to_bits(),
+                        "{lane} {i}"
+                    );
                 }
             }
         }
@@ -356,24 +414,32 @@ mod tests {
 
     #[test]
     fn a_value_may_be_a_number() {
-        let program = Program::new(&Tape::record(2, |v| vec![v[1], crate::tape::Recorded::from_f64(2.5)]));
+        let program =
+            Program::new(&Tape::record(2, |v| vec![v[1], crate::tape::Recorded::from_f64(2.5)]));
         let mut scratch = [Aligned([f64::NAN]); 2];
         let found = program.evaluate_in_registers(Scalar, [[1.0], [3.0]], &mut scratch);
         assert_eq!(found, [[3.0], [2.5]]);
         assert_eq!(program.numbers(), [0.0, 2.5], "one number a value; no instruction is needed");
-        let found = program.evaluate_with_numbers(Scalar, [[1.0], [3.0]], &[[0.0], [4.5]].map(Aligned), &mut scratch);
+        let found = program.evaluate_with_numbers(
+            Scalar,
+            [[1.0], [3.0]],
+            &[[0.0], [4.5]].map(Aligned),
+            &mut scratch,
+        );
         assert_eq!(found, [[3.0], [4.5]]);
     }
 
-    /// A power of two that holds the variables and the registers: three variables want four, even if nothing is computed.
+    /// A power of two that holds the variables and the registers: three variables want four, even
+    /// if nothing is computed.
     #[test]
     fn scratch_holds_variables_and_registers() {
         let copies = |n: usize| Program::new(&Tape::record(n, |v| v.to_vec()));
         assert_eq!([1, 2, 3, 4, 5].map(|n| copies(n).scratch_len()), [1, 2, 4, 4, 8]);
         // Of the twenty products each is wanted until the end: at least 21 registers at once.
         let many = Program::new(&Tape::record(1, |v| {
-            let products: Vec<_> =
-                (1..=20).map(|k| (v[0] * crate::tape::Recorded::from_f64(k as f64)).tanh()).collect();
+            let products: Vec<_> = (1..=20)
+                .map(|k| (v[0] * crate::tape::Recorded::from_f64(k as f64)).tanh())
+                .collect();
             let (mut up, mut down) = (v[0], v[0]);
             for k in 0..20 {
                 (up, down) = (up * products[k], down * products[19 - k]);

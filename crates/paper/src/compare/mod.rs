@@ -1,9 +1,9 @@
 //! Comparison of two pictures: the number of pixels that differ, by how much, and the structural
 //! similarity.
 //!
-//! Hashes say *whether* two pictures differ; this says *how*. A picture of ours is mostly white, and what matters may be two dots:
-//! means over the whole picture would call a picture with both dots in the wrong place nearly perfect. So every mean is
-//! accompanied by the worst place.
+//! Hashes say *whether* two pictures differ; this says *how*. A picture of ours is mostly white,
+//! and what matters may be two dots: means over the whole picture would call a picture with both
+//! dots in the wrong place nearly perfect. So every mean is accompanied by the worst place.
 //!
 //! ```
 //! use twofold_paper::compare::compare;
@@ -38,7 +38,8 @@ pub struct Comparison {
     pub rms: f64,
     /// The root mean square difference of the worst block of [`BLOCK`] by [`BLOCK`] pixels.
     pub worst_block_rms: f64,
-    /// Mean structural similarity of the luminance (Wang, Bovik, Sheikh & Simoncelli 2004), 1 for equal pictures.
+    /// Mean structural similarity of the luminance (Wang, Bovik, Sheikh & Simoncelli 2004), 1 for
+    /// equal pictures.
     pub ssim: f64,
     /// The structural similarity of the worst window.
     pub worst_ssim: f64,
@@ -46,7 +47,8 @@ pub struct Comparison {
 
 /// Two pictures that cannot be held against each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("one picture has {} by {} pixels, the other {} by {}", .expected.0, .expected.1, .actual.0, .actual.1)]
+#[error("one picture has {} by {} pixels, the other {} by \
+    {}", .expected.0, .expected.1, .actual.0, .actual.1)]
 pub struct SizesDiffer {
     /// Width and height of the first.
     pub expected: (u32, u32),
@@ -57,7 +59,8 @@ pub struct SizesDiffer {
 /// Side of the blocks of [`Comparison::worst_block_rms`]: about two dots of a section wide.
 pub const BLOCK: usize = 16;
 
-/// Side of the SSIM window and the standard deviation of its Gaussian weights (Wang et al. 2004, sec. III.C).
+/// Side of the SSIM window and the standard deviation of its Gaussian weights (Wang et al. 2004,
+/// sec. III.C).
 const WINDOW: usize = 11;
 const SIGMA: f64 = 1.5;
 /// (K1 L)^2 and (K2 L)^2 with K1 = 0.01, K2 = 0.03, L = 255 (Wang et al. 2004, eq. (7) and (12)).
@@ -95,7 +98,8 @@ pub fn compare(expected: &Pixels, actual: &Pixels) -> Result<Comparison, SizesDi
     }
     let pixels = (width * height).max(1) as f64;
     let rms = |(sum, count): (u64, u64)| sqrt(sum as f64 / (count as f64).max(1.0));
-    let (ssim, worst_ssim) = if changed == 0 { (1.0, 1.0) } else { similarity(&a, &b, width, height) };
+    let (ssim, worst_ssim) =
+        if changed == 0 { (1.0, 1.0) } else { similarity(&a, &b, width, height) };
     Ok(Comparison {
         width: expected.width,
         height: expected.height,
@@ -110,7 +114,10 @@ pub fn compare(expected: &Pixels, actual: &Pixels) -> Result<Comparison, SizesDi
 }
 
 fn same_size(expected: &Pixels, actual: &Pixels) -> Result<(), SizesDiffer> {
-    let sizes = SizesDiffer { expected: (expected.width, expected.height), actual: (actual.width, actual.height) };
+    let sizes = SizesDiffer {
+        expected: (expected.width, expected.height),
+        actual: (actual.width, actual.height),
+    };
     if sizes.expected == sizes.actual { Ok(()) } else { Err(sizes) }
 }
 
@@ -119,7 +126,9 @@ fn on_white(pixels: &Pixels) -> Vec<[u8; 3]> {
         .rgba
         .chunks_exact(4)
         .map(|p| {
-            let over = |c: u8| ((u32::from(c) * u32::from(p[3]) + 255 * (255 - u32::from(p[3])) + 127) / 255) as u8;
+            let over = |c: u8| {
+                ((u32::from(c) * u32::from(p[3]) + 255 * (255 - u32::from(p[3])) + 127) / 255) as u8
+            };
             [over(p[0]), over(p[1]), over(p[2])]
         })
         .collect()
@@ -130,13 +139,14 @@ fn luminance(p: &[u8; 3]) -> f64 {
     0.299 * f64::from(p[0]) + 0.587 * f64::from(p[1]) + 0.114 * f64::from(p[2])
 }
 
-/// Mean and lowest SSIM over all windows inside the picture, at full resolution. A picture smaller than a window is one window
-/// with equal weights.
+/// Mean and lowest SSIM over all windows inside the picture, at full resolution. A picture smaller
+/// than a window is one window with equal weights.
 fn similarity(a: &[[u8; 3]], b: &[[u8; 3]], width: usize, height: usize) -> (f64, f64) {
     let a: Vec<f64> = a.iter().map(luminance).collect();
     let b: Vec<f64> = b.iter().map(luminance).collect();
     if width < WINDOW || height < WINDOW {
-        let mean = |f: &dyn Fn(usize) -> f64| (0..a.len()).map(f).sum::<f64>() / a.len().max(1) as f64;
+        let mean =
+            |f: &dyn Fn(usize) -> f64| (0..a.len()).map(f).sum::<f64>() / a.len().max(1) as f64;
         let s = ssim([
             mean(&|i| a[i]),
             mean(&|i| b[i]),
@@ -184,7 +194,8 @@ fn similarity(a: &[[u8; 3]], b: &[[u8; 3]], width: usize, height: usize) -> (f64
 
 /// Eq. (13) of Wang et al. (2004) from the means of a, b, a^2, b^2 and ab.
 fn ssim([mean_a, mean_b, aa, bb, ab]: [f64; 5]) -> f64 {
-    let (variance_a, variance_b) = ((aa - mean_a * mean_a).max(0.0), (bb - mean_b * mean_b).max(0.0));
+    let (variance_a, variance_b) =
+        ((aa - mean_a * mean_a).max(0.0), (bb - mean_b * mean_b).max(0.0));
     let covariance = ab - mean_a * mean_b;
     (2.0 * mean_a * mean_b + C1) * (2.0 * covariance + C2)
         / ((mean_a * mean_a + mean_b * mean_b + C1) * (variance_a + variance_b + C2))
@@ -199,7 +210,8 @@ fn gaussian() -> [f64; WINDOW] {
     weights.map(|w| w / total)
 }
 
-/// Colour of what only the expected picture shows, and of what only the actual one shows: told apart with any colour vision.
+/// Colour of what only the expected picture shows, and of what only the actual one shows: told
+/// apart with any colour vision.
 const ONLY_EXPECTED: [u8; 3] = [213, 94, 0];
 const ONLY_ACTUAL: [u8; 3] = [0, 114, 178];
 /// Changed pixels are few when they are fewer than one in so many.
@@ -207,9 +219,10 @@ const FEW: usize = 1000;
 /// Width at which a picture is shown small.
 const SMALL: usize = 350;
 
-/// The difference as a picture: what both share faintly in grey, ink that only `expected` has in orange, ink that only `actual` has in
-/// blue. Changed pixels are drawn wider on each side, by one pixel or, where they are few, by so many that a single one is
-/// seen when the picture is shown small.
+/// The difference as a picture: what both share faintly in grey, ink that only `expected` has in
+/// orange, ink that only `actual` has in blue. Changed pixels are drawn wider on each side, by one
+/// pixel or, where they are few, by so many that a single one is seen when the picture is shown
+/// small.
 ///
 /// # Errors
 ///
@@ -258,10 +271,12 @@ pub enum Criterion {
 
 /// The limits of the inexact criteria. Each bounds the whole picture and its worst place.
 ///
-/// Measured on two pictures of dense sections: a palette of 64 colours, jitter of up to 6 levels on all edges and JPEG of quality 95 hold by changed
-/// pixels or RMS; JPEG of quality 85 and scaling to nine tenths and back by SSIM at the least; JPEG of quality 75, half size and back, a shift
-/// by one pixel, and a black dot of three by three pixels on white (RMS 0.5, SSIM 0.99995 over the whole picture) hold nowhere. What they
-/// cannot see is a dot of that size in the middle of a grey cloud of dots: only the hashes do.
+/// Measured on two pictures of dense sections: a palette of 64 colours, jitter of up to 6 levels on
+/// all edges and JPEG of quality 95 hold by changed pixels or RMS; JPEG of quality 85 and scaling
+/// to nine tenths and back by SSIM at the least; JPEG of quality 75, half size and back, a shift by
+/// one pixel, and a black dot of three by three pixels on white (RMS 0.5, SSIM 0.99995 over the
+/// whole picture) hold nowhere. What they cannot see is a dot of that size in the middle of a grey
+/// cloud of dots: only the hashes do.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Limits {
     /// Largest share of changed pixels.
@@ -303,16 +318,20 @@ impl Limits {
                 self.largest_difference
             ),
             Criterion::Rms => format!(
-                "RMS: at most {} levels of 255, at most {} in any block of {BLOCK} by {BLOCK} pixels",
+                "RMS: at most {} levels of 255, at most {} in any block of {BLOCK} by {BLOCK} \
+                    pixels",
                 self.rms, self.worst_block_rms
             ),
-            Criterion::Ssim => format!("SSIM: at least {}, at least {} in any window", self.ssim, self.worst_ssim),
+            Criterion::Ssim => {
+                format!("SSIM: at least {}, at least {} in any window", self.ssim, self.worst_ssim)
+            }
         }
     }
 
     /// The strictest inexact criterion that is met, if any is. Exact ones are decided by hashes.
     pub fn strictest(&self, c: &Comparison) -> Option<Criterion> {
-        if c.changed_share <= self.changed_share && c.largest_difference <= self.largest_difference {
+        if c.changed_share <= self.changed_share && c.largest_difference <= self.largest_difference
+        {
             Some(Criterion::ChangedPixels)
         } else if c.rms <= self.rms && c.worst_block_rms <= self.worst_block_rms {
             Some(Criterion::Rms)
@@ -329,7 +348,9 @@ mod tests {
     use super::*;
 
     fn grey(width: u32, height: u32, value: impl Fn(usize) -> u8) -> Pixels {
-        let rgba = (0..(width * height) as usize).flat_map(|i| [value(i), value(i), value(i), 255]).collect();
+        let rgba = (0..(width * height) as usize)
+            .flat_map(|i| [value(i), value(i), value(i), 255])
+            .collect();
         Pixels { width, height, rgba }
     }
 
@@ -381,7 +402,8 @@ mod tests {
 
     #[test]
     fn similarity_is_that_of_another_program() {
-        // scikit-image 0.26: structural_similarity(gaussian_weights=True, sigma=1.5, use_sample_covariance=False, data_range=255).
+        // scikit-image 0.26: structural_similarity(gaussian_weights=True, sigma=1.5,
+        // use_sample_covariance=False, data_range=255).
         let a = noise(40, 30, 1);
         let pixel = |i: usize| a.rgba[4 * i];
         let paler = grey(40, 30, |i| (f64::from(pixel(i)) * 0.75 + 16.0) as u8);
@@ -400,16 +422,19 @@ mod tests {
     #[test]
     fn one_wrong_dot_is_found_where_the_means_are_blind() {
         let white = grey(400, 300, |_| 255);
-        let dotted =
-            grey(
-                400,
-                300,
-                |i| if (100..105).contains(&(i % 400)) && (100..105).contains(&(i / 400)) { 20 } else { 255 },
-            );
+        let dotted = grey(400, 300, |i| {
+            if (100..105).contains(&(i % 400)) && (100..105).contains(&(i / 400)) {
+                20
+            } else {
+                255
+            }
+        });
         let c = compare(&white, &dotted).unwrap();
         assert_eq!(c.changed_pixels, 25);
         let limits = Limits::default();
-        assert!(c.rms > limits.rms && c.ssim > limits.ssim && c.changed_share < limits.changed_share);
+        assert!(
+            c.rms > limits.rms && c.ssim > limits.ssim && c.changed_share < limits.changed_share
+        );
         assert!(c.worst_ssim < 0.1 && c.worst_block_rms > 50.0);
         assert_eq!(limits.strictest(&c), None);
     }
@@ -419,7 +444,13 @@ mod tests {
         let limits = Limits::default();
         let same = compare(&noise(40, 30, 1), &noise(40, 30, 1)).unwrap();
         assert_eq!(limits.strictest(&same), Some(Criterion::ChangedPixels));
-        let many = Comparison { changed_share: 0.5, rms: 1.0, worst_block_rms: 3.0, largest_difference: 9, ..same };
+        let many = Comparison {
+            changed_share: 0.5,
+            rms: 1.0,
+            worst_block_rms: 3.0,
+            largest_difference: 9,
+            ..same
+        };
         assert_eq!(limits.strictest(&many), Some(Criterion::Rms));
         let lossy = Comparison { rms: 3.0, ssim: 0.99, worst_ssim: 0.8, ..many };
         assert_eq!(limits.strictest(&lossy), Some(Criterion::Ssim));
@@ -460,13 +491,15 @@ mod tests {
         let shared = difference_image(&dot(42), &dot(42)).unwrap();
         assert!(shared.rgba[4 * 42] < 255 && shared.rgba[4 * 42] > 150);
         // One pixel among very many is drawn large enough to be seen.
-        let (white, speck) = (grey(1050, 100, |_| 255), grey(1050, 100, |i| if i == 50_500 { 0 } else { 255 }));
+        let (white, speck) =
+            (grey(1050, 100, |_| 255), grey(1050, 100, |i| if i == 50_500 { 0 } else { 255 }));
         let d = difference_image(&white, &speck).unwrap();
         let blue = d.rgba.chunks_exact(4).filter(|p| p[..3] == ONLY_ACTUAL).count();
         assert_eq!(blue, 49);
     }
 
-    /// One pixel of colour among many: every mean counts three channels, and the worst block is the small one in the corner.
+    /// One pixel of colour among many: every mean counts three channels, and the worst block is the
+    /// small one in the corner.
     #[test]
     fn means_are_over_channels_and_blocks() {
         let white = grey(20, 20, |_| 255);
@@ -502,8 +535,13 @@ mod tests {
     /// Colours have the luminance of ITU-R BT.601.
     #[test]
     fn colours_are_as_light_as_they_look() {
-        let flat = |c: [u8; 3]| Pixels { width: 12, height: 12, rgba: [c[0], c[1], c[2], 255].repeat(144) };
-        for (colour, luminance) in [([200, 0, 0], 59.8), ([0, 200, 0], 117.4), ([0, 0, 200], 22.8)] {
+        let flat = |c: [u8; 3]| Pixels {
+            width: 12,
+            height: 12,
+            rgba: [c[0], c[1], c[2], 255].repeat(144),
+        };
+        for (colour, luminance) in [([200, 0, 0], 59.8), ([0, 200, 0], 117.4), ([0, 0, 200], 22.8)]
+        {
             let c = compare(&flat(colour), &flat([90; 3])).unwrap();
             close(c.ssim, (2.0 * 90.0 * luminance + C1) / (8100.0 + luminance * luminance + C1));
         }
@@ -520,9 +558,11 @@ mod tests {
 
     #[test]
     fn the_difference_is_drawn_inside_the_picture_and_the_rest_faintly() {
-        let (black, lighter) = (grey(6, 4, |_| 0), grey(6, 4, |i| if i == 0 || i == 23 { 9 } else { 0 }));
+        let (black, lighter) =
+            (grey(6, 4, |_| 0), grey(6, 4, |i| if i == 0 || i == 23 { 9 } else { 0 }));
         let d = difference_image(&black, &lighter).unwrap();
-        let orange: Vec<usize> = (0..24).filter(|i| d.rgba[4 * i..][..3] == ONLY_EXPECTED).collect();
+        let orange: Vec<usize> =
+            (0..24).filter(|i| d.rgba[4 * i..][..3] == ONLY_EXPECTED).collect();
         // Two corners and what touches them.
         assert_eq!(orange, [0, 1, 6, 7, 16, 17, 22, 23]);
         // Shared black: a tenth and a fifth of ink are seen and do not shout.
@@ -538,16 +578,25 @@ mod tests {
             limits.describe(Criterion::ChangedPixels),
             "changed pixels: at most 1 % changed, none by more than 32 levels of 255"
         );
-        assert_eq!(limits.describe(Criterion::Ssim), "SSIM: at least 0.98, at least 0.5 in any window");
+        assert_eq!(
+            limits.describe(Criterion::Ssim),
+            "SSIM: at least 0.98, at least 0.5 in any window"
+        );
         // At the limit is inside it.
         let c = compare(&grey(2, 2, |_| 0), &grey(2, 2, |_| 0)).unwrap();
         let just = Comparison { changed_share: 0.01, largest_difference: 32, ..c };
         assert_eq!(limits.strictest(&just), Some(Criterion::ChangedPixels));
         assert_eq!(
-            limits.strictest(&Comparison { largest_difference: 33, rms: 2.0, worst_block_rms: 8.0, ..just }),
+            limits.strictest(&Comparison {
+                largest_difference: 33,
+                rms: 2.0,
+                worst_block_rms: 8.0,
+                ..just
+            }),
             Some(Criterion::Rms)
         );
-        let blurred = Comparison { largest_difference: 33, rms: 2.1, ssim: 0.98, worst_ssim: 0.5, ..just };
+        let blurred =
+            Comparison { largest_difference: 33, rms: 2.1, ssim: 0.98, worst_ssim: 0.5, ..just };
         assert_eq!(limits.strictest(&blurred), Some(Criterion::Ssim));
         assert_eq!(limits.strictest(&Comparison { ssim: 0.97, ..blurred }), None);
     }
@@ -557,7 +606,8 @@ mod tests {
     fn as_wide_as_they_are_few() {
         let white = grey(1050, 100, |_| 255);
         let blue = |changed: usize| {
-            let specked = grey(1050, 100, |i| if i % 1000 == 500 && i / 1000 < changed { 0 } else { 255 });
+            let specked =
+                grey(1050, 100, |i| if i % 1000 == 500 && i / 1000 < changed { 0 } else { 255 });
             let d = difference_image(&white, &specked).unwrap();
             d.rgba.chunks_exact(4).filter(|p| p[..3] == ONLY_ACTUAL).count() as f64 / changed as f64
         };

@@ -1,7 +1,8 @@
-//! The switching surface h = 0 of any system, as far as a picture shows it: points on a line, curves in a plane, patches in a box.
+//! The switching surface h = 0 of any system, as far as a picture shows it: points on a line,
+//! curves in a plane, patches in a box.
 //!
-//! A picture shows some of the states. Where h depends on these alone its zero set can be drawn; where they are all the states there are,
-//! it is coloured by what happens there ([`Region`]).
+//! A picture shows some of the states. Where h depends on these alone its zero set can be drawn;
+//! where they are all the states there are, it is coloured by what happens there ([`Region`]).
 
 use std::collections::BTreeMap;
 
@@ -57,7 +58,8 @@ fn region_of([p, q]: [f64; 2]) -> Region {
 }
 
 impl<'a> Level<'a> {
-    /// h over the states `shown`, with others fixed at the values given; none if h depends on a state that is neither.
+    /// h over the states `shown`, with others fixed at the values given; none if h depends on a
+    /// state that is neither.
     pub fn new(system: &System, shown: &[usize], fixed: &[(usize, f64)]) -> Option<Self> {
         let known = |i: &usize| shown.contains(i) || fixed.iter().any(|(k, _)| k == i);
         if !system.definition().switching_states().iter().all(known) {
@@ -70,10 +72,13 @@ impl<'a> Level<'a> {
         Some(Self { h: Program::new(&system.tape().select([0])), shown: shown.to_vec(), base, lie })
     }
 
-    /// The surfaces of a system, each as [`Level::new`] has it: one, or two of a system with two. A point of one of two is coloured by what happens
-    /// there with the sign that the other's function has.
+    /// The surfaces of a system, each as [`Level::new`] has it: one, or two of a system with two. A
+    /// point of one of two is coloured by what happens there with the sign that the other's
+    /// function has.
     pub fn all(system: &System, shown: &[usize], fixed: &[(usize, f64)]) -> Vec<Self> {
-        let Some(faces) = system.faces() else { return Self::new(system, shown, fixed).into_iter().collect() };
+        let Some(faces) = system.faces() else {
+            return Self::new(system, shown, fixed).into_iter().collect();
+        };
         [0, 1]
             .into_iter()
             .filter_map(|i| {
@@ -123,13 +128,18 @@ impl<'a> Level<'a> {
     pub fn points(&self, range: (f64, f64)) -> Vec<f64> {
         let knots = lines(range, LINE_CELLS);
         let side = |x: f64| self.h(&[x]) >= 0.0;
-        knots.windows(2).filter(|w| side(w[0]) != side(w[1])).map(|w| self.zero([w[0]], [w[1]])[0]).collect()
+        knots
+            .windows(2)
+            .filter(|w| side(w[0]) != side(w[1]))
+            .map(|w| self.zero([w[0]], [w[1]])[0])
+            .collect()
     }
 
     /// The curve h = 0 over the two states shown, in pieces of one region each.
     pub fn curves(&self, ranges: [(f64, f64); 2]) -> Vec<(Option<Region>, Vec<[f64; 2]>)> {
         let (us, vs) = (lines(ranges[0], PLANE_CELLS), lines(ranges[1], PLANE_CELLS));
-        let signs: Vec<Vec<bool>> = us.iter().map(|u| vs.iter().map(|v| self.h(&[*u, *v]) >= 0.0).collect()).collect();
+        let signs: Vec<Vec<bool>> =
+            us.iter().map(|u| vs.iter().map(|v| self.h(&[*u, *v]) >= 0.0).collect()).collect();
         let mut segments: Vec<[[f64; 2]; 2]> = Vec::new();
         for i in 0..us.len() - 1 {
             for j in 0..vs.len() - 1 {
@@ -156,7 +166,9 @@ impl<'a> Level<'a> {
                 let middle = [0.5 * (pair[0][0] + pair[1][0]), 0.5 * (pair[0][1] + pair[1][1])];
                 let here = self.region(&middle);
                 match pieces.last_mut() {
-                    Some((region, points)) if *region == here && points.last() == Some(&pair[0]) => {
+                    Some((region, points))
+                        if *region == here && points.last() == Some(&pair[0]) =>
+                    {
                         points.push(pair[1])
                     }
                     _ => pieces.push((here, pair.to_vec())),
@@ -185,15 +197,21 @@ impl<'a> Level<'a> {
             for j in 0..n[1] - 1 {
                 for k in 0..n[2] - 1 {
                     for tetrahedron in TETRAHEDRA {
-                        let corners = tetrahedron.map(|c| [i + (c & 1), j + (c >> 1 & 1), k + (c >> 2 & 1)]);
-                        let (up, down): (Vec<_>, Vec<_>) = corners.into_iter().partition(|c| sides[index(*c)]);
+                        let corners =
+                            tetrahedron.map(|c| [i + (c & 1), j + (c >> 1 & 1), k + (c >> 2 & 1)]);
+                        let (up, down): (Vec<_>, Vec<_>) =
+                            corners.into_iter().partition(|c| sides[index(*c)]);
                         let zero = |a: [usize; 3], b: [usize; 3]| self.zero(at(a), at(b));
                         match (&up[..], &down[..]) {
                             ([one], [a, b, c]) | ([a, b, c], [one]) => {
-                                self.cut([zero(*one, *a), zero(*one, *b), zero(*one, *c)], &mut patches);
+                                self.cut(
+                                    [zero(*one, *a), zero(*one, *b), zero(*one, *c)],
+                                    &mut patches,
+                                );
                             }
                             ([a, b], [c, d]) => {
-                                let [p, q, r, s] = [zero(*a, *c), zero(*a, *d), zero(*b, *d), zero(*b, *c)];
+                                let [p, q, r, s] =
+                                    [zero(*a, *c), zero(*a, *d), zero(*b, *d), zero(*b, *c)];
                                 self.cut([p, q, r], &mut patches);
                                 self.cut([p, r, s], &mut patches);
                             }
@@ -221,11 +239,13 @@ impl<'a> Level<'a> {
             let positive = |p: &[f64; 3]| lie(&self.full(p))[derivative] > 0.0;
             parts = parts.iter().flat_map(|part| divided(part, positive)).collect();
         }
-        // Where f+ and f- agree on the surface their Lie derivatives change sign together but for rounding, and leave slivers.
+        // Where f+ and f- agree on the surface their Lie derivatives change sign together but for
+        // rounding, and leave slivers.
         let whole = area(&corners);
         for part in parts.into_iter().filter(|part| area(part) > SLIVER * whole) {
             let n = part.len() as f64;
-            let centre: [f64; 3] = std::array::from_fn(|i| part.iter().map(|p| p[i]).sum::<f64>() / n);
+            let centre: [f64; 3] =
+                std::array::from_fn(|i| part.iter().map(|p| p[i]).sum::<f64>() / n);
             patches.push(Patch { colour: colour(self.region(&centre)), corners: part });
         }
     }
@@ -244,8 +264,13 @@ fn area(corners: &[[f64; 3]]) -> f64 {
 /// Parts of a triangle below this share of its area, squared, are not drawn.
 const SLIVER: f64 = 1e-12;
 
-/// Where a condition changes between two places, by bisection: nothing need be smooth. The same place from either end.
-fn change<const K: usize>(a: [f64; K], b: [f64; K], condition: impl Fn(&[f64; K]) -> bool) -> [f64; K] {
+/// Where a condition changes between two places, by bisection: nothing need be smooth. The same
+/// place from either end.
+fn change<const K: usize>(
+    a: [f64; K],
+    b: [f64; K],
+    condition: impl Fn(&[f64; K]) -> bool,
+) -> [f64; K] {
     let before = a.iter().zip(&b).map(|(x, y)| x.total_cmp(y)).find(|o| o.is_ne());
     let (a, b) = if before == Some(std::cmp::Ordering::Greater) { (b, a) } else { (a, b) };
     let (mut low, mut high, first) = (0.0, 1.0, condition(&a));
@@ -284,7 +309,8 @@ pub fn colour(region: Option<Region>) -> Colour {
     region.map_or(style::CROSSING, surface::colour)
 }
 
-/// Cells along a line, a plane's side, a box's side. Odd, so that zeros at the middle of a range fall on no knot.
+/// Cells along a line, a plane's side, a box's side. Odd, so that zeros at the middle of a range
+/// fall on no knot.
 const LINE_CELLS: usize = 401;
 const PLANE_CELLS: usize = 151;
 const SPACE_CELLS: usize = 25;
@@ -307,8 +333,12 @@ fn chained(segments: &[[[f64; 2]; 2]]) -> Vec<Vec<[f64; 2]>> {
         segment.iter().for_each(|p| at.entry(key(p)).or_default().push(i));
     }
     let loose = |p: &[f64; 2]| at.get(&key(p)).is_some_and(|all| all.len() == 1);
-    let ends = segments.iter().enumerate().flat_map(|(i, s)| s.iter().filter(|p| loose(p)).map(move |p| (i, *p)));
-    let starts: Vec<(usize, [f64; 2])> = ends.chain(segments.iter().enumerate().map(|(i, s)| (i, s[0]))).collect();
+    let ends = segments
+        .iter()
+        .enumerate()
+        .flat_map(|(i, s)| s.iter().filter(|p| loose(p)).map(move |p| (i, *p)));
+    let starts: Vec<(usize, [f64; 2])> =
+        ends.chain(segments.iter().enumerate().map(|(i, s)| (i, s[0]))).collect();
     let mut used = vec![false; segments.len()];
     let mut found = Vec::new();
     for (first, start) in starts {
@@ -345,14 +375,21 @@ mod tests {
         let pieces = level.curves([(-1.7, 1.6), (-1.5, 1.5)]);
         let length: f64 = pieces
             .iter()
-            .flat_map(|(_, p)| p.windows(2).map(|w| ((w[1][0] - w[0][0]).powi(2) + (w[1][1] - w[0][1]).powi(2)).sqrt()))
+            .flat_map(|(_, p)| {
+                p.windows(2)
+                    .map(|w| ((w[1][0] - w[0][0]).powi(2) + (w[1][1] - w[0][1]).powi(2)).sqrt())
+            })
             .sum();
         assert!((length - std::f64::consts::TAU).abs() < 1e-2, "{length}");
-        // f = (1, 0): up where x > 0, down where x < 0. Two pieces, one of them cut where the curve was begun.
+        // f = (1, 0): up where x > 0, down where x < 0. Two pieces, one of them cut where the curve
+        // was begun.
         assert!(pieces.len() <= 3, "{}", pieces.len());
         for (region, points) in &pieces {
             let x = points[points.len() / 2][0];
-            assert_eq!(*region, Some(if x > 0.0 { Region::CrossingUp } else { Region::CrossingDown }));
+            assert_eq!(
+                *region,
+                Some(if x > 0.0 { Region::CrossingUp } else { Region::CrossingDown })
+            );
         }
     }
 
@@ -375,7 +412,8 @@ mod tests {
 
     #[test]
     fn fields_that_agree_leave_no_slivers() {
-        let text = "states = ['x', 'y', 'z']\nh = 'x^2 - 1'\nplus = ['3*(y - 0.1*x) - 0.3*z', '1', '1']\nminus = ['3*y - 0.3*(x + z)', '1', '1']";
+        let text = "states = ['x', 'y', 'z']\nh = 'x^2 - 1'\nplus = ['3*(y - 0.1*x) - 0.3*z', '1', \
+            '1']\nminus = ['3*y - 0.3*(x + z)', '1', '1']";
         let system = System::new(Definition::from_toml(text, "f").unwrap());
         let level = Level::new(&system, &[0, 1, 2], &[]).unwrap();
         let patches = level.patches(&[(-1.7, 1.6), (-1.0, 1.1), (-1.2, 1.3)]);

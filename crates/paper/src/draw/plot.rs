@@ -1,5 +1,5 @@
-//! A picture of any run: its states against time, a phase plane, a path in space, or a Poincaré section. Labels, axes and the switching
-//! surface come from the system.
+//! A picture of any run: its states against time, a phase plane, a path in space, or a Poincaré
+//! section. Labels, axes and the switching surface come from the system.
 
 use twofold_job::answer::Answer;
 use twofold_job::spec::{Observation, RunSpec};
@@ -7,8 +7,8 @@ use twofold_job::table::Table;
 use twofold_render::markup;
 use twofold_render::number::number;
 use twofold_render::sheet::{
-    Axis, ColumnWidth, DotStyle, LegendEntry, LegendKey, LineStyle, MarkerShape, MarkerStyle, PlanePanel, Sheet,
-    SpacePanel,
+    Axis, ColumnWidth, DotStyle, LegendEntry, LegendKey, LineStyle, MarkerShape, MarkerStyle,
+    PlanePanel, Sheet, SpacePanel,
 };
 use twofold_render::style;
 use twofold_system::System;
@@ -64,7 +64,9 @@ impl<'a> From<&'a RunSpec> for Frame<'a> {
             axes: definition.axes(),
             system: Some(&run.system),
             section: match run.observe {
-                Observation::Section { coordinate, value } => Some(Crossed::Plane(coordinate, value)),
+                Observation::Section { coordinate, value } => {
+                    Some(Crossed::Plane(coordinate, value))
+                }
                 _ => None,
             },
             times: (0.0, run.t_end),
@@ -107,7 +109,8 @@ impl PictureKind {
         }
     }
 
-    /// What suits a run: a section if passages were recorded, else by the number of axes that the system suggests, or of its states.
+    /// What suits a run: a section if passages were recorded, else by the number of axes that the
+    /// system suggests, or of its states.
     pub fn suiting(run: &Frame) -> Self {
         if run.section.is_some() {
             return PictureKind::Section;
@@ -147,7 +150,10 @@ pub enum PlotError {
         given: usize,
     },
     /// Too few states.
-    #[error("a picture of kind {kind} shows {wanted} states, and the system has {states}; choose another kind")]
+    #[error(
+        "a picture of kind {kind} shows {wanted} states, and the system has {states}; choose \
+            another kind"
+    )]
     States {
         /// The kind.
         kind: &'static str,
@@ -173,9 +179,11 @@ pub fn axes(run: &Frame, kind: PictureKind, given: &[usize]) -> Result<Vec<usize
     let wrong = |wanted| Err(PlotError::Axes { kind: kind.word(), wanted, given: given.len() });
     let few = |wanted| PlotError::States { kind: kind.word(), wanted, states: n };
     let suggested = run.axes;
-    let others: Vec<usize> = suggested.iter().copied().chain((0..n).filter(|i| !suggested.contains(i))).collect();
+    let others: Vec<usize> =
+        suggested.iter().copied().chain((0..n).filter(|i| !suggested.contains(i))).collect();
     match (kind, given.len()) {
-        // A system's axes are horizontal, depth, vertical; of two panels in the plane the first and the last of them.
+        // A system's axes are horizontal, depth, vertical; of two panels in the plane the first and
+        // the last of them.
         (PictureKind::Series, 0) => Ok((0..n.min(MOST_PANELS)).collect()),
         (PictureKind::Series, count) if count > MOST_PANELS => wrong("at most eight panels"),
         (PictureKind::Plane, 0) if n < 2 => Err(few(2)),
@@ -192,9 +200,9 @@ pub fn axes(run: &Frame, kind: PictureKind, given: &[usize]) -> Result<Vec<usize
             // The only state of a system, against time.
             Ok(others.into_iter().filter(|i| n == 1 || Some(*i) != flat).take(2).collect())
         }
-        (PictureKind::Plane | PictureKind::Section, 2) | (PictureKind::Space, 3) | (PictureKind::Series, _) => {
-            Ok(given.to_vec())
-        }
+        (PictureKind::Plane | PictureKind::Section, 2)
+        | (PictureKind::Space, 3)
+        | (PictureKind::Series, _) => Ok(given.to_vec()),
         (PictureKind::Plane, _) => wrong("two axes"),
         (PictureKind::Space, _) => wrong("three axes"),
         (PictureKind::Section, 1) => Ok(given.to_vec()),
@@ -202,16 +210,23 @@ pub fn axes(run: &Frame, kind: PictureKind, given: &[usize]) -> Result<Vec<usize
     }
 }
 
-const SECTION_NEEDED: PlotError =
-    PlotError::Recording("a section shows crossings of a plane: record them, such as by --section y=0");
-const PATH_NEEDED: PlotError =
-    PlotError::Recording("crossings of a plane were recorded, and this picture needs the path: leave out --section");
+const SECTION_NEEDED: PlotError = PlotError::Recording(
+    "a section shows crossings of a plane: record them, such as by --section y=0",
+);
+const PATH_NEEDED: PlotError = PlotError::Recording(
+    "crossings of a plane were recorded, and this picture needs the path: leave out --section",
+);
 
 /// The drawing of a run; `small_print` stands at its foot.
 ///
 /// # Errors
 /// [`PlotError`] if the run cannot be drawn in this way.
-pub fn sheet(run: &Frame, answer: &Answer, look: &Look, small_print: Vec<String>) -> Result<Sheet, PlotError> {
+pub fn sheet(
+    run: &Frame,
+    answer: &Answer,
+    look: &Look,
+    small_print: Vec<String>,
+) -> Result<Sheet, PlotError> {
     let shown = axes(run, look.kind, &look.axes)?;
     let title = look.title.clone().unwrap_or_else(|| run.title.to_owned());
     let said = if title.is_empty() { "a system of its own".to_owned() } else { title.clone() };
@@ -281,7 +296,8 @@ fn lines(answer: &Answer, run: &Frame) -> Result<Vec<Line>, PlotError> {
     let columns = |table: &Table, rows: std::ops::Range<usize>| -> Vec<Vec<f64>> {
         names.iter().map(|n| table.numbers(n).get(rows.clone()).unwrap_or(&[]).to_vec()).collect()
     };
-    let sound = |table: &&Table| names.iter().all(|n| table.numbers(n).len() == table.numbers("t").len());
+    let sound =
+        |table: &&Table| names.iter().all(|n| table.numbers(n).len() == table.numbers("t").len());
     if let Some(path) = answer.table("path").filter(sound) {
         let t = path.numbers("t");
         // A reset is no line: two rows of one time.
@@ -297,7 +313,8 @@ fn lines(answer: &Answer, run: &Frame) -> Result<Vec<Line>, PlotError> {
     }
     let motion = answer.table("motion").filter(sound).ok_or(PlotError::NoPoints)?;
     let funnel = motion.integers("future").iter().any(|f| *f > 0);
-    let (modes, pieces, futures) = (motion.words("mode"), motion.integers("piece"), motion.integers("future"));
+    let (modes, pieces, futures) =
+        (motion.words("mode"), motion.integers("piece"), motion.integers("future"));
     let looks: Vec<(Stroke, i64, i64)> = modes
         .zip(pieces.iter().zip(futures))
         .zip(motion.words("exit_side"))
@@ -329,7 +346,9 @@ fn lines(answer: &Answer, run: &Frame) -> Result<Vec<Line>, PlotError> {
 fn line_style(look: Stroke, points: usize) -> LineStyle {
     match look {
         // A long path is drawn thinner than a curve, so that windings stay apart.
-        Stroke::Smooth => LineStyle::new(style::INK, if points > 4000 { 0.5 } else { style::CURVE_PT }),
+        Stroke::Smooth => {
+            LineStyle::new(style::INK, if points > 4000 { 0.5 } else { style::CURVE_PT })
+        }
         Stroke::Flight => LineStyle::new(style::INK, 0.7),
         Stroke::Sliding => LineStyle::new(style::GREEN, 1.6),
         Stroke::ToPlus => LineStyle::new(style::BLUE, 0.5),
@@ -361,7 +380,11 @@ fn line_legend(mut sheet: Sheet, lines: &[Line]) -> Sheet {
 fn title(run: &Frame, state: usize) -> String {
     let state = &run.states[state];
     let name = markup::name(&state.name);
-    if state.about.unit.is_empty() { name } else { format!("{name} ({})", markup::literal(&state.about.unit)) }
+    if state.about.unit.is_empty() {
+        name
+    } else {
+        format!("{name} ({})", markup::literal(&state.about.unit))
+    }
 }
 
 fn range(lines: &[Line], state: usize) -> (f64, f64) {
@@ -382,7 +405,10 @@ fn series(mut sheet: Sheet, run: &Frame, lines: &[Line], shown: &[usize]) -> She
     for (i, state) in shown.iter().enumerate() {
         let (low, high) = range(lines, *state);
         let time = if i + 1 == shown.len() { "*t*" } else { "" };
-        let mut panel = PlanePanel::new(Axis::linear(time, begin, end), Axis::linear(title(run, *state), low, high));
+        let mut panel = PlanePanel::new(
+            Axis::linear(time, begin, end),
+            Axis::linear(title(run, *state), low, high),
+        );
         for zero in run.levels(&[*state], &[]).iter().flat_map(|l| l.points((low, high))) {
             surface_shown = true;
             panel = panel.line(vec![[begin, zero], [end, zero]], SURFACE_LEVEL);
@@ -447,11 +473,16 @@ fn plane(sheet: Sheet, run: &Frame, lines: &[Line], shown: &[usize]) -> Sheet {
     for line in lines {
         panel = panel.line(line.points([u, v]), line_style(line.look, line.t.len()));
     }
-    let start =
-        lines.iter().filter(|l| l.t.first() == Some(&run.times.0)).map(|l| [l.x[u][0], l.x[v][0]]).take(1).collect();
+    let start = lines
+        .iter()
+        .filter(|l| l.t.first() == Some(&run.times.0))
+        .map(|l| [l.x[u][0], l.x[v][0]])
+        .take(1)
+        .collect();
     panel = panel.markers(start, START);
     let sheet = sheet.panel_aspect(0.8).panel("", "", panel);
-    curve_legend(line_legend(sheet, lines), looks).legend(LegendEntry::new(LegendKey::Marker(START), "start"))
+    curve_legend(line_legend(sheet, lines), looks)
+        .legend(LegendEntry::new(LegendKey::Marker(START), "start"))
 }
 
 fn space(
@@ -486,7 +517,8 @@ fn space(
     for line in lines {
         panel = panel.line(line.points(order), line_style(line.look, line.t.len()));
     }
-    let exits: Vec<[f64; 3]> = exits(answer, run).into_iter().map(|x| order.map(|i| x[i])).collect();
+    let exits: Vec<[f64; 3]> =
+        exits(answer, run).into_iter().map(|x| order.map(|i| x[i])).collect();
     let any_exits = !exits.is_empty();
     if any_exits {
         panel = panel.markers(exits, EXIT);
@@ -507,7 +539,8 @@ fn space(
             style::REPELLING => "repelling",
             _ => "crossing",
         };
-        sheet = sheet.legend(LegendEntry::new(LegendKey::Area(colour, style::SURFACE_OPACITY), text));
+        sheet =
+            sheet.legend(LegendEntry::new(LegendKey::Area(colour, style::SURFACE_OPACITY), text));
     }
     if any_exits {
         sheet = sheet.legend(LegendEntry::new(LegendKey::Marker(EXIT), "exit"));
@@ -518,7 +551,12 @@ fn space(
     sheet
 }
 
-fn section(sheet: Sheet, run: &Frame, answer: &Answer, shown: &[usize]) -> Result<Sheet, PlotError> {
+fn section(
+    sheet: Sheet,
+    run: &Frame,
+    answer: &Answer,
+    shown: &[usize],
+) -> Result<Sheet, PlotError> {
     let table = answer.table("section").ok_or(SECTION_NEEDED)?;
     let crossed = run.section.ok_or(SECTION_NEEDED)?;
     let names = run.names();
@@ -552,14 +590,18 @@ fn section(sheet: Sheet, run: &Frame, answer: &Answer, shown: &[usize]) -> Resul
             panel = surface_curve(panel, &level, ranges, &mut looks);
         }
     }
-    let points =
-        |late: bool| (0..t.len()).filter(|i| (t[*i] > half) == late).map(|i| [xs[i], ys[i]]).collect::<Vec<_>>();
+    let points = |late: bool| {
+        (0..t.len()).filter(|i| (t[*i] > half) == late).map(|i| [xs[i], ys[i]]).collect::<Vec<_>>()
+    };
     panel = panel.dots(points(false), DotStyle::early()).dots(points(true), DotStyle::late());
     let plane = match crossed {
-        Crossed::Plane(coordinate, value) => format!("{} = {}", markup::name(names[coordinate]), number(value)),
+        Crossed::Plane(coordinate, value) => {
+            format!("{} = {}", markup::name(names[coordinate]), number(value))
+        }
         Crossed::Surface(equation) => markup::literal(equation),
     };
-    let sheet = sheet.subtitle(format!("crossings of {plane}")).panel_aspect(0.9).panel("", "", panel);
+    let sheet =
+        sheet.subtitle(format!("crossings of {plane}")).panel_aspect(0.9).panel("", "", panel);
     let half = number(half);
     let sheet = sheet
         .legend(LegendEntry::new(LegendKey::Dots(DotStyle::early()), format!("*t* ≤ {half}")))
@@ -585,8 +627,10 @@ const MOST_PANELS: usize = 8;
 /// h = 0 as a level in a series.
 const SURFACE_LEVEL: LineStyle = LineStyle::new(style::SOFT_INK, 0.6).dashed();
 /// The start of a path.
-const START: MarkerStyle = MarkerStyle { shape: MarkerShape::OpenDot, colour: style::INK, size: 3.6 };
+const START: MarkerStyle =
+    MarkerStyle { shape: MarkerShape::OpenDot, colour: style::INK, size: 3.6 };
 /// The end of repelling sliding.
-const EXIT: MarkerStyle = MarkerStyle { shape: MarkerShape::OpenDot, colour: style::GREEN, size: 3.6 };
+const EXIT: MarkerStyle =
+    MarkerStyle { shape: MarkerShape::OpenDot, colour: style::GREEN, size: 3.6 };
 /// A two-fold.
 const SINGULARITY: MarkerStyle = MarkerStyle::new(MarkerShape::Dot, style::MAGENTA);

@@ -3,7 +3,9 @@
 use twofold_job::scan::Basin;
 use twofold_num::elementary::{pow, sqrt};
 use twofold_render::markup;
-use twofold_render::sheet::{Axis, Colour, ColumnWidth, DotStyle, LegendEntry, LegendKey, PlanePanel, Sheet, range_of};
+use twofold_render::sheet::{
+    Axis, Colour, ColumnWidth, DotStyle, LegendEntry, LegendKey, PlanePanel, Sheet, range_of,
+};
 use twofold_render::style;
 
 /// A setting that a scan varied.
@@ -18,10 +20,15 @@ pub struct Scanned {
 
 impl Scanned {
     fn axis(&self, (lower, upper): (f64, f64)) -> Axis {
-        if self.logarithmic { Axis::log(&self.title, lower, upper) } else { Axis::linear(&self.title, lower, upper) }
+        if self.logarithmic {
+            Axis::log(&self.title, lower, upper)
+        } else {
+            Axis::linear(&self.title, lower, upper)
+        }
     }
 
-    /// All values, with a margin of four per cent. Where no run has a passage the diagram is empty; it does not end there.
+    /// All values, with a margin of four per cent. Where no run has a passage the diagram is empty;
+    /// it does not end there.
     fn covered(&self) -> Axis {
         if !self.logarithmic {
             return Axis::covering(&self.title, self.values.iter().copied());
@@ -34,7 +41,8 @@ impl Scanned {
     /// The edges of cells around the values.
     fn edges(&self) -> Vec<f64> {
         let (c, n) = (&self.values, self.values.len());
-        let between = |w: &[f64]| if self.logarithmic { sqrt(w[0] * w[1]) } else { 0.5 * (w[0] + w[1]) };
+        let between =
+            |w: &[f64]| if self.logarithmic { sqrt(w[0] * w[1]) } else { 0.5 * (w[0] + w[1]) };
         // As far beyond the value on the other side.
         let beyond = |value: f64, edge: f64| {
             if self.logarithmic { value * (value / edge) } else { value + (value - edge) }
@@ -51,12 +59,20 @@ impl Scanned {
     }
 }
 
-/// An orbit diagram: the late passages of each run above its parameter's value. Of two series with names the first lies behind the second.
-pub fn diagram(title: &str, over: &Scanned, ordinate: &str, series: Vec<(&str, Vec<[f64; 2]>)>) -> Sheet {
+/// An orbit diagram: the late passages of each run above its parameter's value. Of two series with
+/// names the first lies behind the second.
+pub fn diagram(
+    title: &str,
+    over: &Scanned,
+    ordinate: &str,
+    series: Vec<(&str, Vec<[f64; 2]>)>,
+) -> Sheet {
     let x = over.covered();
     let y = Axis::covering(ordinate, series.iter().flat_map(|(_, points)| points).map(|p| p[1]));
     let mut panel = PlanePanel::new(x, y);
-    let mut sheet = Sheet::new(ColumnWidth::Wide, 1, "orbit diagram").title(markup::literal(title)).panel_aspect(0.55);
+    let mut sheet = Sheet::new(ColumnWidth::Wide, 1, "orbit diagram")
+        .title(markup::literal(title))
+        .panel_aspect(0.55);
     // Where both lie on each other the first is seen around the second.
     let looks = if series.len() == 1 {
         [(style::INK, None); 2]
@@ -78,8 +94,9 @@ pub fn map(title: &str, over: [&Scanned; 2], basins: &[Basin]) -> Sheet {
     let [x_edges, y_edges] = over.map(Scanned::edges);
     let ends = |e: &[f64]| (e[0], e[e.len() - 1]);
     let mut panel = PlanePanel::new(over[0].axis(ends(&x_edges)), over[1].axis(ends(&y_edges)));
-    let mut sheet =
-        Sheet::new(ColumnWidth::Single, 1, "map of endings").title(markup::literal(title)).panel_aspect(0.9);
+    let mut sheet = Sheet::new(ColumnWidth::Single, 1, "map of endings")
+        .title(markup::literal(title))
+        .panel_aspect(0.9);
     let mut next = 0;
     for basin in basins {
         let colour = if basin.attracts {
@@ -126,7 +143,10 @@ mod tests {
 
     #[test]
     fn cells_become_rectangles() {
-        assert_eq!(rows_of(&[(0, 0), (2, 0), (1, 0), (4, 0), (0, 1)]), [(0, 0, 3), (4, 0, 1), (0, 1, 1)]);
+        assert_eq!(
+            rows_of(&[(0, 0), (2, 0), (1, 0), (4, 0), (0, 1)]),
+            [(0, 0, 3), (4, 0, 1), (0, 1, 1)]
+        );
     }
 
     fn scanned(values: &[f64], logarithmic: bool) -> Scanned {
@@ -151,6 +171,10 @@ mod tests {
         let linear = x(&scanned(&[0.0, 10.0, 100.0], false));
         assert_eq!((linear.lower, linear.upper, linear.logarithmic), (-4.0, 104.0, false));
         let log = x(&scanned(&[1.0, 10.0, 1e25], true));
-        assert!((log.lower - 0.1).abs() < 1e-12 && (log.upper / 1e26 - 1.0).abs() < 1e-12 && log.logarithmic);
+        assert!(
+            (log.lower - 0.1).abs() < 1e-12
+                && (log.upper / 1e26 - 1.0).abs() < 1e-12
+                && log.logarithmic
+        );
     }
 }

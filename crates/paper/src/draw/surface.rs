@@ -5,7 +5,9 @@ use nalgebra::{SVector, vector};
 use super::level::Level;
 use twofold_render::sheet::{Colour, Patch};
 use twofold_render::style;
-use twofold_system::filippov::{Region, TwoFold, Visibility, lie_derivatives, normal_form_constants, region, two_fold};
+use twofold_system::filippov::{
+    Region, TwoFold, Visibility, lie_derivatives, normal_form_constants, region, two_fold,
+};
 use twofold_system::{Caricature, Compiled, PiecewiseSmooth, System, Wheel};
 
 /// The colour of a region.
@@ -17,34 +19,46 @@ pub fn colour(region: Region) -> Colour {
     }
 }
 
-/// The patches of h = 0 inside the box `ranges` (one (low, high) per coordinate), in the state's order of coordinates.
+/// The patches of h = 0 inside the box `ranges` (one (low, high) per coordinate), in the state's
+/// order of coordinates.
 ///
-/// The surfaces of the systems that are compiled are graphs over two coordinates; any other one is found as [`Level`] finds it.
+/// The surfaces of the systems that are compiled are graphs over two coordinates; any other one is
+/// found as [`Level`] finds it.
 pub fn patches(system: &System, ranges: &[(f64, f64); 3], cells: usize) -> Vec<Patch> {
     match system.compiled() {
         Some(Compiled::Caricature(c)) => caricature(&c, ranges, cells),
         Some(Compiled::Wheel(w)) => wheel(&w, ranges, cells),
-        None => Level::new(system, &[0, 1, 2], &[]).map_or(Vec::new(), |level| level.patches(ranges)),
+        None => {
+            Level::new(system, &[0, 1, 2], &[]).map_or(Vec::new(), |level| level.patches(ranges))
+        }
     }
 }
 
-/// The two-fold inside the box `ranges` where determinism breaks, if there is one; of a system whose surface is not known as a graph, the
-/// two-fold that Newton's method finds from its suggested start.
+/// The two-fold inside the box `ranges` where determinism breaks, if there is one; of a system
+/// whose surface is not known as a graph, the two-fold that Newton's method finds from its
+/// suggested start.
 pub fn singularity(system: &System, ranges: &[(f64, f64); 3]) -> Option<[f64; 3]> {
     let point = match system.compiled() {
-        Some(Compiled::Caricature(c)) => two_fold(&c, &vector![0.0, 0.0, 0.0]).ok().map(|t| t.point),
-        Some(Compiled::Wheel(w)) => search(&w, ranges, |r, omega| vector![r, w.sticking_speed(r, omega), omega]),
+        Some(Compiled::Caricature(c)) => {
+            two_fold(&c, &vector![0.0, 0.0, 0.0]).ok().map(|t| t.point)
+        }
+        Some(Compiled::Wheel(w)) => {
+            search(&w, ranges, |r, omega| vector![r, w.sticking_speed(r, omega), omega])
+        }
         None => {
             let start: [f64; 3] = system.definition().start()?.try_into().ok()?;
             two_fold(&system.bind::<3>().ok()?, &start.into()).ok().map(|t| t.point)
         }
     };
-    let inside = |p: &SVector<f64, 3>| p.iter().zip(ranges).all(|(x, (low, high))| (low..=high).contains(&x));
+    let inside = |p: &SVector<f64, 3>| {
+        p.iter().zip(ranges).all(|(x, (low, high))| (low..=high).contains(&x))
+    };
     point.filter(inside).map(Into::into)
 }
 
-/// Whether sliding runs into the two-fold and out into the repelling region: both folds invisible, v, w < 0, vw > 1 in the normal form
-/// (Jeffrey & Colombo 2009). A system may have other two-folds, through which nothing passes.
+/// Whether sliding runs into the two-fold and out into the repelling region: both folds invisible,
+/// v, w < 0, vw > 1 in the normal form (Jeffrey & Colombo 2009). A system may have other two-folds,
+/// through which nothing passes.
 fn breaks_determinism<P: PiecewiseSmooth<3>>(system: &P, fold: &TwoFold<3>) -> bool {
     let (v, w) = normal_form_constants(system, fold);
     fold.visibility() == (Visibility::Invisible, Visibility::Invisible) && v < 0.0 && v * w > 1.0
@@ -53,8 +67,8 @@ fn breaks_determinism<P: PiecewiseSmooth<3>>(system: &P, fold: &TwoFold<3>) -> b
 /// Cells a side in which a two-fold is looked for.
 const SEARCH_CELLS: usize = 48;
 
-/// The two-fold where determinism breaks that Newton's method finds from a cell of the surface, over the first and the last coordinate, in
-/// which both Lie derivatives change sign.
+/// The two-fold where determinism breaks that Newton's method finds from a cell of the surface,
+/// over the first and the last coordinate, in which both Lie derivatives change sign.
 fn search<P: PiecewiseSmooth<3>>(
     system: &P,
     ranges: &[(f64, f64); 3],
@@ -84,13 +98,16 @@ fn caricature(system: &Caricature, ranges: &[(f64, f64); 3], cells: usize) -> Ve
     grid(system, ranges[1], ranges[2], cells, |y, z| vector![0.0, y, z])
 }
 
-/// h = 0 over (r, omega): v = O (d - r cot gamma). What of it leaves the box is cut off where it is drawn.
+/// h = 0 over (r, omega): v = O (d - r cot gamma). What of it leaves the box is cut off where it is
+/// drawn.
 fn wheel(system: &Wheel, ranges: &[(f64, f64); 3], cells: usize) -> Vec<Patch> {
-    grid(system, ranges[0], ranges[2], cells, |r, omega| vector![r, system.sticking_speed(r, omega), omega])
+    grid(system, ranges[0], ranges[2], cells, |r, omega| {
+        vector![r, system.sticking_speed(r, omega), omega]
+    })
 }
 
-/// Cells over two coordinates, coloured by region. A cell that an edge between regions runs through is divided until its
-/// parts are too small to be seen, so that edges look as smooth as they are.
+/// Cells over two coordinates, coloured by region. A cell that an edge between regions runs through
+/// is divided until its parts are too small to be seen, so that edges look as smooth as they are.
 fn grid<P: PiecewiseSmooth<3>>(
     system: &P,
     u: (f64, f64),
@@ -121,13 +138,16 @@ fn divide<P: PiecewiseSmooth<3>>(
 ) {
     let middle = (0.5 * (u.0 + u.1), 0.5 * (v.0 + v.1));
     let here = colour(region(system, &point(middle.0, middle.1)));
-    // Looked at just inside the corners: an edge along a side (the caricature's axes) divides nothing.
+    // Looked at just inside the corners: an edge along a side (the caricature's axes) divides
+    // nothing.
     let inside = |s: f64, r: (f64, f64)| r.0 + s * (r.1 - r.0);
     let uniform = [(0.02, 0.02), (0.98, 0.02), (0.98, 0.98), (0.02, 0.98)]
         .iter()
         .all(|(s, t)| colour(region(system, &point(inside(*s, u), inside(*t, v)))) == here);
     if uniform || halvings == 0 {
-        let corners = [(u.0, v.0), (u.1, v.0), (u.1, v.1), (u.0, v.1)].map(|(s, t)| point(s, t).into()).to_vec();
+        let corners = [(u.0, v.0), (u.1, v.0), (u.1, v.1), (u.0, v.1)]
+            .map(|(s, t)| point(s, t).into())
+            .to_vec();
         patches.push(Patch { corners, colour: here });
         return;
     }
@@ -140,7 +160,8 @@ fn divide<P: PiecewiseSmooth<3>>(
 
 /// Equidistant grid lines, and one through zero.
 fn lines((low, high): (f64, f64), cells: usize) -> Vec<f64> {
-    let mut lines: Vec<f64> = (0..=cells).map(|i| low + (high - low) * i as f64 / cells as f64).collect();
+    let mut lines: Vec<f64> =
+        (0..=cells).map(|i| low + (high - low) * i as f64 / cells as f64).collect();
     if low < 0.0 && high > 0.0 && !lines.contains(&0.0) {
         lines.push(0.0);
         lines.sort_by(f64::total_cmp);
@@ -155,11 +176,16 @@ mod tests {
     #[test]
     fn the_wheels_two_fold_is_found_whatever_its_parameters() {
         let ranges = [(0.0, 1.5), (-3.0, 1.5), (-3.0, 1.5)];
-        for (gamma, k_w) in [(std::f64::consts::FRAC_PI_4, 2.0), (0.75, 2.0), (std::f64::consts::FRAC_PI_4, 2.2)] {
+        for (gamma, k_w) in
+            [(std::f64::consts::FRAC_PI_4, 2.0), (0.75, 2.0), (std::f64::consts::FRAC_PI_4, 2.2)]
+        {
             let wheel = Wheel { gamma, k_w, ..Wheel::default() };
             let at = SVector::from(singularity(&wheel.into(), &ranges).unwrap());
             let (p, q) = lie_derivatives(&wheel, &at);
-            assert!(wheel.switching(&at).abs() < 1e-12 && p.abs() < 1e-9 && q.abs() < 1e-9, "{at} {p} {q}");
+            assert!(
+                wheel.switching(&at).abs() < 1e-12 && p.abs() < 1e-9 && q.abs() < 1e-9,
+                "{at} {p} {q}"
+            );
         }
         let default = singularity(&Wheel::default().into(), &ranges).unwrap();
         assert!((default[0] - 0.692_669_889_7).abs() < 1e-9, "{default:?}");

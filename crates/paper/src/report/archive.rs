@@ -9,8 +9,8 @@ use super::model::{Report, indented};
 use super::names;
 use twofold_render::read_provenance;
 
-/// Date of the release, as CITATION.cff has it. RO-Crate asks for a date of publication; a clock would make the bytes of this file
-/// differ from run to run.
+/// Date of the release, as CITATION.cff has it. RO-Crate asks for a date of publication; a clock
+/// would make the bytes of this file differ from run to run.
 pub const RELEASE_DATE: &str = "2026-11-21";
 
 /// Where the program is documented, as Cargo.toml has it.
@@ -26,7 +26,8 @@ const LICENCES: [(&str, &str, &str); 2] = [
     (
         "https://spdx.org/licenses/Apache-2.0",
         "Apache License 2.0",
-        "Use, change and pass on freely, with the licence and notices of changes; grants patents; without warranty.",
+        "Use, change and pass on freely, with the licence and notices of changes; grants patents; \
+            without warranty.",
     ),
 ];
 /// The article, as its author's university lists it.
@@ -34,14 +35,17 @@ const ARTICLE: &str = "https://research-information.bris.ac.uk/en/publications/s
 /// That university: address, name.
 const AFFILIATION: (&str, &str) = ("https://www.bristol.ac.uk/", "University of Bristol");
 /// Where the article appeared, in that list's words.
-pub(super) const PROCEEDINGS: &str = "Proc. 5th International Conference on Structural Dynamics SEMS, Cape Town";
+pub(super) const PROCEEDINGS: &str =
+    "Proc. 5th International Conference on Structural Dynamics SEMS, Cape Town";
 
-/// The metadata of a folder that holds `made` and what the report adds to it (`added`: name and bytes).
+/// The metadata of a folder that holds `made` and what the report adds to it (`added`: name and
+/// bytes).
 pub fn archive(report: &Report, made: &[MadeFile], added: &[(&str, &[u8])]) -> Vec<u8> {
     let own = [names::PAGE, names::REPORT, names::VERDICTS, names::ARCHIVE];
     let added = added.iter().map(|(name, bytes)| MadeFile::of((*name).to_owned(), bytes.to_vec()));
     let added: Vec<MadeFile> = added.collect();
-    let mut files: Vec<&MadeFile> = made.iter().filter(|f| !own.contains(&f.path.as_str())).chain(&added).collect();
+    let mut files: Vec<&MadeFile> =
+        made.iter().filter(|f| !own.contains(&f.path.as_str())).chain(&added).collect();
     files.sort_by_key(|file| &file.path);
 
     let mut graph = vec![
@@ -54,10 +58,13 @@ pub fn archive(report: &Report, made: &[MadeFile], added: &[(&str, &[u8])]) -> V
         json!({
             "@id": "./",
             "@type": "Dataset",
-            "name": format!("Figures of {} ({}), recomputed", report.article.author, report.article.year),
+            "name": format!("Figures of {} ({}), \
+                recomputed", report.article.author, report.article.year),
             "description": format!(
-                "Pictures, numbers, hashes and verdicts for \"{}\", computed by {}. The same version is made to compute the same \
-                 bytes on every machine; on which this was tried, its README says. The hash of every file is given here.",
+                "Pictures, numbers, hashes and verdicts for \"{}\", computed by {}. The same \
+                    version is made to compute the same \
+                 bytes on every machine; on which this was tried, its README says. The hash of \
+                 every file is given here.",
                 report.article.title, report.made_by
             ),
             "datePublished": RELEASE_DATE,
@@ -65,10 +72,13 @@ pub fn archive(report: &Report, made: &[MadeFile], added: &[(&str, &[u8])]) -> V
             "author": { "@id": "#authors" },
             "publisher": { "@id": "#authors" },
             "citation": { "@id": ARTICLE },
-            "keywords": "non-smooth dynamics, two-fold singularity, Filippov systems, reproducibility, chaos",
+            "keywords": "non-smooth dynamics, two-fold singularity, Filippov systems, \
+                reproducibility, chaos",
             "mainEntity": { "@id": names::PAGE },
-            "mentions": report.figures.iter().map(|f| json!({ "@id": action(&f.id) })).collect::<Vec<_>>(),
-            "hasPart": files.iter().map(|file| json!({ "@id": address(&file.path) })).collect::<Vec<_>>(),
+            "mentions": report.figures.iter().map(|f| json!({ "@id": action(&f.id) }))
+                .collect::<Vec<_>>(),
+            "hasPart": files.iter().map(|file| json!({ "@id": address(&file.path) }))
+                .collect::<Vec<_>>(),
         }),
         json!({
             "@id": "#authors",
@@ -104,13 +114,13 @@ pub fn archive(report: &Report, made: &[MadeFile], added: &[(&str, &[u8])]) -> V
             "name": report.article.author,
             "affiliation": { "@id": AFFILIATION.0 },
         }),
-        json!({ "@id": AFFILIATION.0, "@type": "Organization", "name": AFFILIATION.1, "url": AFFILIATION.0 }),
+        json!({ "@id": AFFILIATION.0, "@type": "Organization", "name": AFFILIATION.1,
+            "url": AFFILIATION.0 }),
     ];
-    graph.extend(
-        LICENCES.map(|(id, name, description)| {
-            json!({ "@id": id, "@type": "CreativeWork", "name": name, "description": description, "identifier": id })
-        }),
-    );
+    graph.extend(LICENCES.map(|(id, name, description)| {
+        json!({ "@id": id, "@type": "CreativeWork", "name": name, "description": description,
+                "identifier": id })
+    }));
     for figure in &report.figures {
         let within = format!("{}/", figure.id);
         let made: Vec<Value> = files
@@ -146,7 +156,8 @@ fn file(report: &Report, found: &MadeFile) -> Value {
     });
     // A picture's own provenance names the question and the numbers behind it.
     if let Ok(provenance) = read_provenance(&found.bytes) {
-        let text: Vec<String> = provenance.entries.iter().map(|(key, value)| format!("{key}: {value}")).collect();
+        let text: Vec<String> =
+            provenance.entries.iter().map(|(key, value)| format!("{key}: {value}")).collect();
         entity["description"] = json!(text.join("; "));
     }
     entity
@@ -172,7 +183,9 @@ fn name(report: &Report, path: &str) -> String {
         None => path.to_owned(),
         Some((p, f)) => match &f.panel {
             Some(panel) => format!("{}: numbers of panel ({panel})", p.name),
-            None if f.role == super::Role::Record => format!("{}: hashes, runs, statistics and verdicts", p.name),
+            None if f.role == super::Role::Record => {
+                format!("{}: hashes, runs, statistics and verdicts", p.name)
+            }
             None => format!("{}: {}", p.name, p.title),
         },
     }

@@ -19,7 +19,8 @@ use twofold_job::record::{FileBytes, FileError, Hash, Layer, Manifest, PictureEn
 use twofold_job::spec::Method;
 use twofold_render::{Pixels, Shrink, decode_png, encode_preview, shrunk};
 
-/// The record beside a picture. Verdicts are read loosely: their evidence may hold numbers that JSON writes as null.
+/// The record beside a picture. Verdicts are read loosely: their evidence may hold numbers that
+/// JSON writes as null.
 #[derive(Deserialize)]
 struct Record {
     hashes: PictureEntry,
@@ -51,7 +52,8 @@ pub struct MadeFile {
 }
 
 impl MadeFile {
-    /// The file at `place`, whose path inside the figures' folder is `path`, among the files of these figures.
+    /// The file at `place`, whose path inside the figures' folder is `path`, among the files of
+    /// these figures.
     ///
     /// # Errors
     /// If it cannot be read.
@@ -89,16 +91,20 @@ pub struct Program<'a> {
     pub odds: &'a str,
 }
 
-/// Puts the report together: `made` are the files of the figures' folder, `committed` those of the references' folder
-/// (figN/expected.json and figN/NAME.png).
+/// Puts the report together: `made` are the files of the figures' folder, `committed` those of the
+/// references' folder (figN/expected.json and figN/NAME.png).
 pub fn assemble(made: &[MadeFile], committed: &[FileBytes], program: &Program<'_>) -> Report {
     let mut problems = Vec::new();
     let mut folders: BTreeMap<(bool, Vec<Piece>, &str), Vec<&MadeFile>> = BTreeMap::new();
     for file in made.iter().filter(|f| !f.folder().is_empty() && !f.folder().contains('/')) {
-        folders.entry((!of_the_paper(file.folder()), natural(file.folder()), file.folder())).or_default().push(file);
+        folders
+            .entry((!of_the_paper(file.folder()), natural(file.folder()), file.folder()))
+            .or_default()
+            .push(file);
     }
     let committed = Committed { files: committed, figures: program.figures };
-    let folders: Vec<(&str, Vec<&MadeFile>)> = folders.into_iter().map(|((_, _, id), files)| (id, files)).collect();
+    let folders: Vec<(&str, Vec<&MadeFile>)> =
+        folders.into_iter().map(|((_, _, id), files)| (id, files)).collect();
     let each: Vec<(FigureReport, Vec<String>)> =
         folders.par_iter().map(|(id, files)| figure(id, files, &committed)).collect();
     let mut figures = Vec::new();
@@ -125,11 +131,16 @@ pub fn assemble(made: &[MadeFile], committed: &[FileBytes], program: &Program<'_
 
 /// How the figures were made, as the folder says.
 fn making(made: &[MadeFile], problems: &mut Vec<String>) -> Vec<Making> {
-    let Some(file) = made.iter().find(|f| f.path == super::names::MAKING) else { return Vec::new() };
+    let Some(file) = made.iter().find(|f| f.path == super::names::MAKING) else {
+        return Vec::new();
+    };
     match serde_json::from_slice::<Makings>(&file.bytes) {
         Ok(makings) => makings.runs,
         Err(error) => {
-            problems.push(format!("{}: cannot be read ({error}); make the figures again to have it anew", file.path));
+            problems.push(format!(
+                "{}: cannot be read ({error}); make the figures again to have it anew",
+                file.path
+            ));
             Vec::new()
         }
     }
@@ -145,7 +156,8 @@ fn preview(pixels: &Pixels, how: Shrink) -> Option<Preview> {
 
 /// Whether a figure is one of the paper's; ours have names, not numbers, and come after them.
 pub(super) fn of_the_paper(id: &str) -> bool {
-    id.strip_prefix("fig").is_some_and(|number| !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit()))
+    id.strip_prefix("fig")
+        .is_some_and(|number| !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit()))
 }
 
 /// A name cut into words and numbers, so that fig10 comes after fig9.
@@ -153,7 +165,9 @@ fn natural(name: &str) -> Vec<Piece> {
     let mut pieces: Vec<Piece> = Vec::new();
     for c in name.chars() {
         match (pieces.last_mut(), c.to_digit(10)) {
-            (Some(Piece::Number(n)), Some(d)) => *n = n.saturating_mul(10).saturating_add(u64::from(d)),
+            (Some(Piece::Number(n)), Some(d)) => {
+                *n = n.saturating_mul(10).saturating_add(u64::from(d))
+            }
             (_, Some(d)) => pieces.push(Piece::Number(u64::from(d))),
             (Some(Piece::Word(w)), None) => w.push(c),
             (_, None) => pieces.push(Piece::Word(c.to_string())),
@@ -181,7 +195,8 @@ impl Committed<'_> {
 
     fn manifest(&self, id: &str) -> Result<Manifest, String> {
         let path = format!("{id}/expected.json");
-        let bytes = self.file(&path).ok_or_else(|| format!("no reference has been committed for {id}"))?;
+        let bytes =
+            self.file(&path).ok_or_else(|| format!("no reference has been committed for {id}"))?;
         let text = std::str::from_utf8(bytes).map_err(|_| format!("{path} is not text"))?;
         Manifest::parse(text, &path).map_err(|e| e.to_string())
     }
@@ -194,11 +209,14 @@ fn figure(id: &str, files: &[&MadeFile], committed: &Committed<'_>) -> (FigureRe
     let mut records = Vec::new();
     for file in files.iter().filter(|f| f.name().ends_with(".json")) {
         match serde_json::from_slice::<Value>(&file.bytes) {
-            // Other JSON files may stand beside the pictures: a record is what has hashes and panels.
+            // Other JSON files may stand beside the pictures: a record is what has hashes and
+            // panels.
             Ok(value) if value.get("hashes").is_none() => {}
             Ok(value) => match serde_json::from_value::<Record>(value) {
                 Ok(record) => records.push((file, record)),
-                Err(error) => problems.push(format!("{}: not a record of this version ({error})", file.path)),
+                Err(error) => {
+                    problems.push(format!("{}: not a record of this version ({error})", file.path))
+                }
             },
             Err(error) => problems.push(format!("{}: not JSON ({error})", file.path)),
         }
@@ -207,8 +225,11 @@ fn figure(id: &str, files: &[&MadeFile], committed: &Committed<'_>) -> (FigureRe
     let each: Vec<(PictureReport, Vec<String>)> = records
         .into_par_iter()
         .map(|(file, record)| {
-            let own: Vec<&MadeFile> =
-                files.iter().filter(|f| owner(f.name(), &names) == Some(&record.hashes.name)).copied().collect();
+            let own: Vec<&MadeFile> = files
+                .iter()
+                .filter(|f| owner(f.name(), &names) == Some(&record.hashes.name))
+                .copied()
+                .collect();
             let mut problems = Vec::new();
             (picture(id, file, record, &own, committed, &manifest, &mut problems), problems)
         })
@@ -221,14 +242,18 @@ fn figure(id: &str, files: &[&MadeFile], committed: &Committed<'_>) -> (FigureRe
     pictures.sort_by_key(|p| (natural(&p.name), p.name.clone()));
     for picture in &pictures {
         for missing in picture.files.iter().filter(|f| f.integrity == Integrity::Missing) {
-            problems.push(format!("{}: not there, but the record of {} lists it", missing.path, picture.name));
+            problems.push(format!(
+                "{}: not there, but the record of {} lists it",
+                missing.path, picture.name
+            ));
         }
         for changed in picture.files.iter().filter(|f| f.integrity == Integrity::Changed) {
             problems.push(format!("{}: changed since it was made; make it again", changed.path));
         }
     }
     if let Ok(manifest) = &manifest {
-        for entry in manifest.pictures.iter().filter(|e| !pictures.iter().any(|p| p.name == e.name)) {
+        for entry in manifest.pictures.iter().filter(|e| !pictures.iter().any(|p| p.name == e.name))
+        {
             problems.push(format!("{id}/{}.png: not made, but the reference lists it", entry.name));
         }
     }
@@ -242,7 +267,8 @@ fn figure(id: &str, files: &[&MadeFile], committed: &Committed<'_>) -> (FigureRe
             Err(error) => problems.push(unreadable(file, &error)),
         }
     }
-    let title = pictures.iter().map(|p| p.title.clone()).find(|t| !t.is_empty()).unwrap_or_default();
+    let title =
+        pictures.iter().map(|p| p.title.clone()).find(|t| !t.is_empty()).unwrap_or_default();
     let report = FigureReport {
         id: id.to_owned(),
         title,
@@ -253,7 +279,8 @@ fn figure(id: &str, files: &[&MadeFile], committed: &Committed<'_>) -> (FigureRe
     (report, problems)
 }
 
-/// The picture that a file belongs to: the longest name that the file's name goes on from with a hyphen or a dot.
+/// The picture that a file belongs to: the longest name that the file's name goes on from with a
+/// hyphen or a dot.
 fn owner<'a>(file: &str, names: &'a [String]) -> Option<&'a String> {
     names
         .iter()
@@ -277,11 +304,13 @@ fn picture(
         files.iter().find(|f| f.name() == wanted).copied()
     };
     let png = find(".png");
-    let pixels = png.and_then(|f| decode_png(&f.bytes).map_err(|e| problems.push(unreadable(f, &e))).ok());
+    let pixels =
+        png.and_then(|f| decode_png(&f.bytes).map_err(|e| problems.push(unreadable(f, &e))).ok());
 
     let mut listed = Vec::new();
     let mut hashes = record.hashes.clone();
-    let kinds = [(Role::Png, &mut hashes.png), (Role::Svg, &mut hashes.svg), (Role::Pdf, &mut hashes.pdf)];
+    let kinds =
+        [(Role::Png, &mut hashes.png), (Role::Svg, &mut hashes.svg), (Role::Pdf, &mut hashes.pdf)];
     for (role, hash) in kinds {
         let suffix = match role {
             Role::Png => ".png",
@@ -313,8 +342,12 @@ fn picture(
     }
     listed.push(file_report(own, Role::Record, None, None));
 
-    let mut images = Images { actual: pixels.as_ref().and_then(|p| preview(p, Shrink::Mean)), ..Images::default() };
-    let reference = reference(id, &hashes, &record, pixels.as_ref(), committed, manifest, &mut images);
+    let mut images = Images {
+        actual: pixels.as_ref().and_then(|p| preview(p, Shrink::Mean)),
+        ..Images::default()
+    };
+    let reference =
+        reference(id, &hashes, &record, pixels.as_ref(), committed, manifest, &mut images);
     let verdicts = record
         .verdicts
         .into_iter()
@@ -337,7 +370,8 @@ fn picture(
         .collect();
     let panels: Vec<PanelReport> = record.panels.into_iter().map(panel).collect();
     let camera = space::camera(committed.figures, id);
-    let spaces = camera.map_or_else(Vec::new, |camera| spaces(camera, &panels, &record.tables, files));
+    let spaces =
+        camera.map_or_else(Vec::new, |camera| spaces(camera, &panels, &record.tables, files));
     PictureReport {
         spaces,
         description: description(&name, &record.title, record.reading, &record.caption, &panels),
@@ -356,7 +390,8 @@ fn picture(
     }
 }
 
-/// The panels in space, from their tables; none of a picture that is no view in space, or whose tables are not there.
+/// The panels in space, from their tables; none of a picture that is no view in space, or whose
+/// tables are not there.
 fn spaces(
     camera: Camera,
     panels: &[PanelReport],
@@ -366,13 +401,21 @@ fn spaces(
     let table = |panel: &PanelReport| -> Option<Table> {
         let own = tables.iter().filter(|t| t.panel.as_deref() == Some(panel.label.as_str()));
         let found = own.filter_map(|t| files.iter().find(|f| f.name() == t.file));
-        found.filter_map(|f| from_csv(&f.bytes).ok()).map(|(_, table)| table).find(|t| t.name != "events")
+        found
+            .filter_map(|f| from_csv(&f.bytes).ok())
+            .map(|(_, table)| table)
+            .find(|t| t.name != "events")
     };
     let sources: Vec<space::Source<'_>> = panels
         .iter()
         .filter(|p| p.run.system.dimension() == 3)
         .filter_map(|p| {
-            Some(space::Source { label: &p.label, title: &p.title, system: &p.run.system, table: table(p)? })
+            Some(space::Source {
+                label: &p.label,
+                title: &p.title,
+                system: &p.run.system,
+                table: table(p)?,
+            })
         })
         .collect();
     space::views(&sources, &camera)
@@ -397,14 +440,21 @@ fn panel(p: PanelRecord) -> PanelReport {
     }
 }
 
-fn description(name: &str, title: &str, reading: Option<Reading>, caption: &str, panels: &[PanelReport]) -> String {
+fn description(
+    name: &str,
+    title: &str,
+    reading: Option<Reading>,
+    caption: &str,
+    panels: &[PanelReport],
+) -> String {
     let mut text = if title.is_empty() { name.to_owned() } else { wording::plain(title) };
     if let Some(reading) = reading {
         text += &format!(", {} reading", reading.word());
     }
     text += &format!(". {}", wording::plain(caption));
     if panels.len() > 1 {
-        let list: Vec<String> = panels.iter().map(|p| format!("({}) {}", p.label, wording::plain(&p.title))).collect();
+        let list: Vec<String> =
+            panels.iter().map(|p| format!("({}) {}", p.label, wording::plain(&p.title))).collect();
         text += &format!(" Panels: {}.", list.join("; "));
     }
     text
@@ -441,14 +491,18 @@ fn reference(
     };
     let Some(expected) = expected else {
         return if record.alterations.is_empty() {
-            Reference::Missing { why: "the committed manifest does not list this picture".to_owned() }
+            Reference::Missing {
+                why: "the committed manifest does not list this picture".to_owned(),
+            }
         } else {
             Reference::Altered
         };
     };
     let Some(difference) = expected.first_difference(actual) else { return Reference::Same };
     let (comparison, note) = match (committed.file(&format!("{id}/{}.png", actual.name)), pixels) {
-        (None, _) => (None, Some("the expected picture itself is not committed, only its hashes".to_owned())),
+        (None, _) => {
+            (None, Some("the expected picture itself is not committed, only its hashes".to_owned()))
+        }
         (Some(_), None) => (None, Some("the actual picture cannot be read".to_owned())),
         (Some(bytes), Some(pixels)) => held_against(bytes, expected, pixels, images),
     };
@@ -469,7 +523,9 @@ fn held_against(
 ) -> (Option<compare::Comparison>, Option<String>) {
     let before = match decode_png(bytes) {
         Ok(before) => before,
-        Err(error) => return (None, Some(format!("the expected picture cannot be read ({error})"))),
+        Err(error) => {
+            return (None, Some(format!("the expected picture cannot be read ({error})")));
+        }
     };
     images.expected = preview(&before, Shrink::Mean);
     let note = (pixel_hash(&before) != expected.pixels)
@@ -483,7 +539,12 @@ fn held_against(
     }
 }
 
-fn file_report(file: &MadeFile, role: Role, panel: Option<String>, recorded: Option<&Hash>) -> FileReport {
+fn file_report(
+    file: &MadeFile,
+    role: Role,
+    panel: Option<String>,
+    recorded: Option<&Hash>,
+) -> FileReport {
     let hash = file.sha256.clone();
     FileReport {
         path: file.path.clone(),
@@ -530,8 +591,11 @@ fn summary(figures: &[FigureReport]) -> Summary {
     let mut s = Summary::default();
     let mut readings: Vec<ReadingSummary> = Vec::new();
     for (figure, picture) in figures.iter().flat_map(|f| f.pictures.iter().map(move |p| (f, p))) {
-        s.damaged_files +=
-            picture.files.iter().filter(|f| matches!(f.integrity, Integrity::Changed | Integrity::Missing)).count();
+        s.damaged_files += picture
+            .files
+            .iter()
+            .filter(|f| matches!(f.integrity, Integrity::Changed | Integrity::Missing))
+            .count();
         if !picture.alterations.is_empty() {
             s.altered += 1;
             continue;
@@ -546,16 +610,23 @@ fn summary(figures: &[FigureReport]) -> Summary {
         let within = picture.panels.iter().filter_map(|p| p.within_ndsolve_limit);
         s.panels_by_ndsolves_method += within.clone().count();
         s.panels_beyond_ndsolve_limit += within.filter(|within| !within).count();
-        // The paper's claims are about the paper's figures; our own pictures repeat some of them under other methods.
+        // The paper's claims are about the paper's figures; our own pictures repeat some of them
+        // under other methods.
         if picture.verdicts.is_empty() || !of_the_paper(&figure.id) {
             continue;
         }
-        let index = readings.iter().position(|r| r.reading == picture.reading).unwrap_or_else(|| {
-            let new =
-                ReadingSummary { reading: picture.reading, claims: 0, agree: 0, found: Vec::new(), all_alike: None };
-            readings.push(new);
-            readings.len() - 1
-        });
+        let index =
+            readings.iter().position(|r| r.reading == picture.reading).unwrap_or_else(|| {
+                let new = ReadingSummary {
+                    reading: picture.reading,
+                    claims: 0,
+                    agree: 0,
+                    found: Vec::new(),
+                    all_alike: None,
+                };
+                readings.push(new);
+                readings.len() - 1
+            });
         let reading = &mut readings[index];
         for verdict in &picture.verdicts {
             reading.claims += 1;
@@ -567,14 +638,17 @@ fn summary(figures: &[FigureReport]) -> Summary {
         }
     }
     for reading in &mut readings {
-        let mut ways = reading.found.iter().filter(|f| f.kind != PATHS && !f.kind.starts_with(NOISY));
+        let mut ways =
+            reading.found.iter().filter(|f| f.kind != PATHS && !f.kind.starts_with(NOISY));
         reading.all_alike = match (ways.next(), ways.next()) {
             (Some(only), None) if only.panels > 1 => Some(only.clone()),
             _ => None,
         };
     }
     // In the order in which readings are always shown; figures without readings last.
-    readings.sort_by_key(|r| Reading::ALL.iter().position(|known| Some(*known) == r.reading).unwrap_or(usize::MAX));
+    readings.sort_by_key(|r| {
+        Reading::ALL.iter().position(|known| Some(*known) == r.reading).unwrap_or(usize::MAX)
+    });
     s.readings = readings;
     s
 }

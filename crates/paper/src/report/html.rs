@@ -5,8 +5,8 @@ use base64::engine::general_purpose::STANDARD;
 use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 use twofold_render::markup::{self, Token};
 
-/// Text that is safe in HTML and XML, inside elements and inside quoted attributes. Control characters that XML does not allow
-/// become a replacement character.
+/// Text that is safe in HTML and XML, inside elements and inside quoted attributes. Control
+/// characters that XML does not allow become a replacement character.
 pub fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
@@ -24,7 +24,8 @@ pub fn escape(text: &str) -> String {
     out
 }
 
-/// The renderer's rich text (`*x*`, `_{+}`, `10^{-5}`) as HTML; text whose markup is not balanced is shown as it stands.
+/// The renderer's rich text (`*x*`, `_{+}`, `10^{-5}`) as HTML; text whose markup is not balanced
+/// is shown as it stands.
 pub fn rich(text: &str) -> String {
     try_rich(text).unwrap_or_else(|| escape(text))
 }
@@ -74,7 +75,8 @@ pub fn base64(bytes: &[u8]) -> String {
 }
 
 /// What a link's target keeps as it is: RFC 3986's unreserved characters, and slashes.
-const KEPT: &AsciiSet = &NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b'_').remove(b'~').remove(b'/');
+const KEPT: &AsciiSet =
+    &NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b'_').remove(b'~').remove(b'/');
 
 /// A link's target from a path inside the folder.
 pub fn address(path: &str) -> String {
@@ -85,7 +87,11 @@ pub fn address(path: &str) -> String {
 pub fn identifier(text: &str) -> String {
     text.bytes()
         .map(|b| {
-            if b.is_ascii_alphanumeric() { char::from(b).to_string() } else { format!("-{b:x}-").replace("-2d-", "-") }
+            if b.is_ascii_alphanumeric() {
+                char::from(b).to_string()
+            } else {
+                format!("-{b:x}-").replace("-2d-", "-")
+            }
         })
         .collect()
 }
@@ -96,7 +102,10 @@ mod tests {
 
     #[test]
     fn rich_text() {
-        assert_eq!(rich("*α* = 10^{-5}, *v*_{+} < 1"), "<i>α</i> = 10<sup>−5</sup>, <i>v</i><sub>+</sub> &lt; 1");
+        assert_eq!(
+            rich("*α* = 10^{-5}, *v*_{+} < 1"),
+            "<i>α</i> = 10<sup>−5</sup>, <i>v</i><sub>+</sub> &lt; 1"
+        );
         assert_eq!(rich("x^2"), "x<sup>2</sup>");
         assert_eq!(rich("from -1.2 to 2-10, {a}"), "from −1.2 to 2-10, <span>a</span>");
         for broken in ["*a", "a}", "^{b", "{", "^", "*a_{b*}"] {

@@ -1,8 +1,10 @@
-//! The report: everything that was made, held against the paper and against the committed reference.
+//! The report: everything that was made, held against the paper and against the committed
+//! reference.
 //!
-//! [`assemble`] reads records, files and manifests (as bytes: nothing here touches a file) into a [`Report`]; [`page()`] writes it for
-//! people, [`Report::to_json`] for programs, [`archive`] as RO-Crate metadata. Which figures there are is read from the
-//! records, not known here. Same input, same bytes: no clock, no path of the machine.
+//! [`assemble`] reads records, files and manifests (as bytes: nothing here touches a file) into a
+//! [`Report`]; [`page()`] writes it for people, [`Report::to_json`] for programs, [`archive`] as
+//! RO-Crate metadata. Which figures there are is read from the records, not known here. Same input,
+//! same bytes: no clock, no path of the machine.
 //!
 //! ```
 //! use twofold_paper::report::{Links, MadeFile, Program, assemble, page};

@@ -12,7 +12,8 @@ use twofold_job::spec::RunSpec;
 
 /// Version of the report's JSON.
 pub const VERSION: u32 = 1;
-/// NDSolve's default MaxSteps: the most steps that one call makes, and the reason why the paper divides its runs.
+/// NDSolve's default MaxSteps: the most steps that one call makes, and the reason why the paper
+/// divides its runs.
 pub const NDSOLVE_MAX_STEPS: u64 = 10_000;
 
 /// Everything the page shows.
@@ -30,7 +31,8 @@ pub struct Report {
     pub summary: Summary,
     /// The figures, in natural order of their folders' names.
     pub figures: Vec<FigureReport>,
-    /// By which programs, on which machines and in what time the figures were made, as far as the folder says.
+    /// By which programs, on which machines and in what time the figures were made, as far as the
+    /// folder says.
     pub making: Vec<Making>,
     /// Files that could not be read, a line each.
     pub problems: Vec<String>,
@@ -42,14 +44,16 @@ pub struct Report {
     pub odds: Vec<String>,
 }
 
-/// The file in the folder of the figures that says how they were made. It is the one file there that holds times, and no figure depends on it.
+/// The file in the folder of the figures that says how they were made. It is the one file there
+/// that holds times, and no figure depends on it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Makings {
     /// "twofold-making".
     pub format: String,
     /// Version of this file's form.
     pub version: u32,
-    /// One entry for each call of the program that figures in the folder come from, the last one last.
+    /// One entry for each call of the program that figures in the folder come from, the last one
+    /// last.
     pub runs: Vec<Making>,
 }
 
@@ -136,9 +140,11 @@ pub struct Summary {
     pub readings: Vec<ReadingSummary>,
     /// Panels of pictures as published.
     pub panels: usize,
-    /// Of these, panels computed by the method that NDSolve took by default: to the others its limit says nothing.
+    /// Of these, panels computed by the method that NDSolve took by default: to the others its
+    /// limit says nothing.
     pub panels_by_ndsolves_method: usize,
-    /// Of those, panels in which some stretch between restarts takes more than [`NDSOLVE_MAX_STEPS`] steps.
+    /// Of those, panels in which some stretch between restarts takes more than
+    /// [`NDSOLVE_MAX_STEPS`] steps.
     pub panels_beyond_ndsolve_limit: usize,
 }
 
@@ -153,8 +159,8 @@ pub struct ReadingSummary {
     pub agree: usize,
     /// What was found, each with its number of panels, in order of appearance.
     pub found: Vec<Found>,
-    /// Set if all noise-free sections of the reading end in the same way: then agreement with a claim of that way is no
-    /// evidence for the reading.
+    /// Set if all noise-free sections of the reading end in the same way: then agreement with a
+    /// claim of that way is no evidence for the reading.
     pub all_alike: Option<Found>,
 }
 
@@ -218,14 +224,16 @@ pub struct PictureReport {
     pub spaces: Vec<SpaceView>,
 }
 
-/// Previews of a picture as PNG files, as far as it is there: smaller, and in fewer colours ([`PREVIEW_WIDTH`]).
+/// Previews of a picture as PNG files, as far as it is there: smaller, and in fewer colours
+/// ([`PREVIEW_WIDTH`]).
 #[derive(Clone, Debug, Default)]
 pub struct Images {
     /// The picture as it is.
     pub actual: Option<Preview>,
     /// The committed one, where it is wanted for comparison.
     pub expected: Option<Preview>,
-    /// The difference; of the pixels that one of its own stands for it shows the most different one.
+    /// The difference; of the pixels that one of its own stands for it shows the most different
+    /// one.
     pub difference: Option<Preview>,
 }
 
@@ -403,8 +411,13 @@ impl Report {
 
     /// All verdicts of all pictures with their evidence, as indented JSON with a final newline.
     pub fn verdicts_json(&self) -> Vec<u8> {
-        let verdicts: Vec<&Value> =
-            self.figures.iter().flat_map(|f| &f.pictures).flat_map(|p| &p.verdicts).map(|v| &v.recorded).collect();
+        let verdicts: Vec<&Value> = self
+            .figures
+            .iter()
+            .flat_map(|f| &f.pictures)
+            .flat_map(|p| &p.verdicts)
+            .map(|v| &v.recorded)
+            .collect();
         indented(&serde_json::json!({
             "format": "twofold-verdicts",
             "version": VERSION,

@@ -1,5 +1,6 @@
-//! Findings in sentences: those of the folder as it is, from its verdicts, and those of the published
-//! figures, from the pages of findings and theorems that this program was built with, whose numbers are tested.
+//! Findings in sentences: those of the folder as it is, from its verdicts, and those of the
+//! published figures, from the pages of findings and theorems that this program was built with,
+//! whose numbers are tested.
 
 use std::fmt::Write as _;
 
@@ -31,10 +32,17 @@ pub fn of_this_folder(report: &Report) -> Vec<String> {
                     format!("{panel} (said: {}; found: {})", v.claim, v.found)
                 }
             };
-            verdicts.iter().filter(|(_, v)| v.agrees == agrees).map(said).collect::<Vec<_>>().join("; ")
+            verdicts
+                .iter()
+                .filter(|(_, v)| v.agrees == agrees)
+                .map(said)
+                .collect::<Vec<_>>()
+                .join("; ")
         };
-        let mut text =
-            format!("{of}, {} of {} claims of the paper that were judged here hold", reading.agree, reading.claims);
+        let mut text = format!(
+            "{of}, {} of {} claims of the paper that were judged here hold",
+            reading.agree, reading.claims
+        );
         let (hold, fail) = (list(true), list(false));
         if !hold.is_empty() {
             let _ = write!(text, ": {hold}");
@@ -46,7 +54,8 @@ pub fn of_this_folder(report: &Report) -> Vec<String> {
         if let Some(alike) = &reading.all_alike {
             let _ = write!(
                 text,
-                " All {} noise-free sections end alike ({}), so that agreement with a claim of that kind says nothing for this reading.",
+                " All {} noise-free sections end alike ({}), so that agreement with a claim of \
+                    that kind says nothing for this reading.",
                 alike.panels, alike.kind
             );
         }
@@ -57,14 +66,16 @@ pub fn of_this_folder(report: &Report) -> Vec<String> {
 
 /// "fig. 7(ii)".
 fn panel_name(picture: &str, reading: Option<Reading>, panel: &str) -> String {
-    let base = reading.map_or(picture.to_owned(), |r| picture.replace(&format!("-{}", r.word()), ""));
+    let base =
+        reading.map_or(picture.to_owned(), |r| picture.replace(&format!("-{}", r.word()), ""));
     match base.strip_prefix("fig") {
         Some(number) => format!("fig. {number}({panel})"),
         None => format!("{base} ({panel})"),
     }
 }
 
-/// What docs/findings.md and docs/theorems.md say: paragraphs that begin with a finding in bold, and the theorems, as HTML blocks.
+/// What docs/findings.md and docs/theorems.md say: paragraphs that begin with a finding in bold,
+/// and the theorems, as HTML blocks.
 pub fn of_the_project(findings: &str) -> Vec<String> {
     let mut blocks = Vec::new();
     let mut heading = "";
@@ -75,14 +86,19 @@ pub fn of_the_project(findings: &str) -> Vec<String> {
             blocks.push(format!("<p>{}</p>", inline(block)));
         } else if heading == "Theorems" && block.starts_with("- ") {
             let items = format!("\n{block}");
-            let items: Vec<String> = items.split("\n- ").skip(1).map(|i| format!("<li>{}</li>", inline(i))).collect();
-            blocks.push(format!("<p>Proved, for smoothing at ε = 10⁻³:</p>\n<ul>\n{}\n</ul>", items.join("\n")));
+            let items: Vec<String> =
+                items.split("\n- ").skip(1).map(|i| format!("<li>{}</li>", inline(i))).collect();
+            blocks.push(format!(
+                "<p>Proved, for smoothing at ε = 10⁻³:</p>\n<ul>\n{}\n</ul>",
+                items.join("\n")
+            ));
         }
     }
     blocks
 }
 
-/// What docs/census.md and docs/parameters.md say: their sections with paragraphs and tables, as HTML blocks.
+/// What docs/census.md and docs/parameters.md say: their sections with paragraphs and tables, as
+/// HTML blocks.
 pub fn of_the_odds(page: &str) -> Vec<String> {
     let mut heading = String::new();
     let mut tables = 0;
@@ -94,7 +110,11 @@ pub fn of_the_odds(page: &str) -> Vec<String> {
         } else if block.starts_with("| ") {
             tables += 1;
             blocks.push(table(block, &heading, tables));
-        } else if !heading.is_empty() && !block.is_empty() && !block.starts_with("<!--") && !block.starts_with("![") {
+        } else if !heading.is_empty()
+            && !block.is_empty()
+            && !block.starts_with("<!--")
+            && !block.starts_with("![")
+        {
             blocks.push(format!("<p>{}</p>", inline(block)));
         }
     }
@@ -107,19 +127,25 @@ fn table(markdown: &str, caption: &str, number: usize) -> String {
         let line = line.trim();
         let line = line.strip_prefix('|').unwrap_or(line);
         let cells = line.strip_suffix('|').unwrap_or(line).split('|');
-        format!("<tr>{}</tr>", cells.map(|cell| format!("{open}{}{close}", inline(cell.trim()))).collect::<String>())
+        format!(
+            "<tr>{}</tr>",
+            cells.map(|cell| format!("{open}{}{close}", inline(cell.trim()))).collect::<String>()
+        )
     };
     let mut lines = markdown.lines();
     let head = row(lines.next().unwrap_or_default(), ["<th scope=\"col\">", "</th>"]);
     let body: Vec<String> = lines.skip(1).map(|line| row(line, ["<td>", "</td>"])).collect();
     format!(
-        "<section class=\"scroll\" tabindex=\"0\" aria-labelledby=\"odds-{number}-caption\">\n<table id=\"odds-{number}\">\n\
-         <caption id=\"odds-{number}-caption\">{caption}</caption>\n<thead>{head}</thead>\n<tbody>\n{}\n</tbody>\n</table>\n</section>",
+        "<section class=\"scroll\" tabindex=\"0\" \
+            aria-labelledby=\"odds-{number}-caption\">\n<table id=\"odds-{number}\">\n\
+         <caption id=\"odds-{number}-caption\">{caption}</caption>\n<thead>{head}</thead>\n\
+         <tbody>\n{}\n</tbody>\n</table>\n</section>",
         body.join("\n")
     )
 }
 
-/// Markdown's emphasis, code and links inside a paragraph. A link's target is a place in the repository: only its text is kept.
+/// Markdown's emphasis, code and links inside a paragraph. A link's target is a place in the
+/// repository: only its text is kept.
 fn inline(markdown: &str) -> String {
     let mut out = String::new();
     let mut rest = markdown;
@@ -183,15 +209,21 @@ mod tests {
             include_str!("../../../../docs/theorems.md")
         ));
         assert!(blocks.len() >= 6, "{blocks:#?}");
-        assert!(blocks.iter().any(|b| b.contains("<strong>Each visit to the singularity costs digits.</strong>")));
+        assert!(blocks.iter().any(|b| b.contains(
+            "<strong>Each visit to the singularity costs \
+            digits.</strong>"
+        )));
         assert!(blocks.last().unwrap().contains("<li>"));
         assert!(blocks.iter().all(|b| !b.contains("](") && !b.contains("**")), "{blocks:#?}");
     }
 
     #[test]
     fn the_page_has_the_tables_of_odds_and_of_the_misprint() {
-        let page =
-            concat!(include_str!("../../../../docs/census.md"), "\n\n", include_str!("../../../../docs/parameters.md"));
+        let page = concat!(
+            include_str!("../../../../docs/census.md"),
+            "\n\n",
+            include_str!("../../../../docs/parameters.md")
+        );
         let blocks = of_the_odds(page);
         let tables: Vec<&String> = blocks.iter().filter(|b| b.contains("<table")).collect();
         assert!(tables.len() >= 2, "{blocks:#?}");
@@ -199,6 +231,9 @@ mod tests {
         let rows = page.lines().filter(|l| l.starts_with('|') && !l.starts_with("|---")).count();
         assert_eq!(tables.iter().map(|t| t.matches("<tr>").count()).sum::<usize>(), rows);
         assert!(tables[0].contains("<td>7(ii)</td><td>period three</td>"), "{}", tables[0]);
-        assert!(blocks.iter().all(|b| !b.contains("](") && !b.contains("**") && !b.contains("|---")), "{blocks:#?}");
+        assert!(
+            blocks.iter().all(|b| !b.contains("](") && !b.contains("**") && !b.contains("|---")),
+            "{blocks:#?}"
+        );
     }
 }

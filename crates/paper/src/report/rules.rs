@@ -5,52 +5,76 @@ use serde_json::{Value, json};
 use super::model::Report;
 use twofold_analyse::attractor::Thresholds;
 
-/// How a claim is held against what was found: [`Claim::score`](crate::claim::Claim::score), and the two kinds of claim about paths
-/// in space.
+/// How a claim is held against what was found: [`Claim::score`](crate::claim::Claim::score), and
+/// the two kinds of claim about paths in space.
 pub const CLAIMS: [(&str, &str); 6] = [
     (
         "periodic, period k",
-        "The section ends on a closed orbit (of that period, where the paper names one), reached or still being approached, and the whole of the \
-         shown part follows it: the orbit has captured the run before the shown part begins. A run that turns around the orbit and moves away \
+        "The section ends on a closed orbit (of that period, where the paper names one), reached \
+            or still being approached, and the whole of the \
+         shown part follows it: the orbit has captured the run before the shown part begins. A run \
+         that turns around the orbit and moves away \
          from it does not count.",
     ),
     (
         "chaos",
-        "The run neither ends on a closed orbit nor on a ring, and what is left of it is irregular by the majority of the 0-1 test, the \
-         divergence of neighbours and, where it is known, the largest exponent. Chaos that ends in the shown part does not count.",
+        "The run neither ends on a closed orbit nor on a ring, and what is left of it is irregular \
+            by the majority of the 0-1 test, the \
+         divergence of neighbours and, where it is known, the largest exponent. Chaos that ends in \
+         the shown part does not count.",
     ),
     (
         "partly washed out by noise",
-        "Islands that noise-free runs leave empty are emptier than the sea, but not as empty as in any noise-free run, by intervals; and \
+        "Islands that noise-free runs leave empty are emptier than the sea, but not as empty as in \
+            any noise-free run, by intervals; and \
          the run is not merely held around one closed orbit.",
     ),
     (
         "less organised than (ii)",
-        "The share of a path’s way that leads to places where it has not been, over twelve neighbouring starts, is larger by more than two \
+        "The share of a path’s way that leads to places where it has not been, over twelve \
+            neighbouring starts, is larger by more than two \
          standard errors of the difference.",
     ),
-    ("(iii) and (iv) differ", "A quarter or more of the strides of one path end where the other never comes."),
+    (
+        "(iii) and (iv) differ",
+        "A quarter or more of the strides of one path end where the other never comes.",
+    ),
     (
         "captured, settled",
-        "Captured: from then on the run only turns around the closed orbit. Settled: from then on it is at the orbit, by the size of a dot.",
+        "Captured: from then on the run only turns around the closed orbit. Settled: from then on \
+            it is at the orbit, by the size of a dot.",
     ),
 ];
 
-/// What each threshold of a section's verdict is, in the order of [`Thresholds`]. Lengths are shares of the section's extent.
+/// What each threshold of a section's verdict is, in the order of [`Thresholds`]. Lengths are
+/// shares of the section's extent.
 const THRESHOLDS: [(&str, &str); 27] = [
     ("fewest_points", "fewest points of one direction that are judged at all"),
-    ("silence", "mean return times without a crossing, at the end, after which a run no longer crosses the section"),
+    (
+        "silence",
+        "mean return times without a crossing, at the end, after which a run no longer crosses the \
+            section",
+    ),
     ("longest_period", "longest period looked for"),
     ("points_per_phase", "points of each phase used to look for a period"),
-    ("fewest_turns", "turns that are enough in a section too short for that, if every phase is a dot"),
+    (
+        "fewest_turns",
+        "turns that are enough in a section too short for that, if every phase is a dot",
+    ),
     ("separation", "phases are distinct if their centres are so many radii apart"),
-    ("drift", "distance between a phase’s earlier and later mean, in spreads, above which it drifts"),
+    (
+        "drift",
+        "distance between a phase’s earlier and later mean, in spreads, above which it drifts",
+    ),
     ("dot", "spread below which a phase is one dot"),
     ("linear_range", "distance from the orbit within which a fast approach is fitted"),
     ("block", "turns of the orbit that are judged together when a run is followed backwards"),
     ("thickness", "largest thickness of an invariant curve"),
     ("continuity", "largest jump of ln(distance) where one block follows another"),
-    ("fewest_blocks", "fewest blocks that must join the last one before a spread-out end is called regular"),
+    (
+        "fewest_blocks",
+        "fewest blocks that must join the last one before a spread-out end is called regular",
+    ),
     ("ring_gap", "largest gap in angle, in circles, of a ring that counts as one"),
     ("significance", "standard errors by which a rate of approach differs from none"),
     ("visible_change", "least change of ln(distance) of an approach that is called one"),
@@ -67,8 +91,9 @@ const THRESHOLDS: [(&str, &str); 27] = [
     ("end", "time at which a section ends"),
 ];
 
-/// Name, value and meaning of every threshold, and whether all verdicts of the report were reached with the same: the values are those of the
-/// first verdict on a section, or the program's own if there is none.
+/// Name, value and meaning of every threshold, and whether all verdicts of the report were reached
+/// with the same: the values are those of the first verdict on a section, or the program's own if
+/// there is none.
 pub fn thresholds(report: &Report) -> (Vec<(String, String, &'static str)>, bool) {
     let used: Vec<&Value> = report
         .figures

@@ -1,7 +1,9 @@
-//! Views in space that can be turned: the lines and surfaces of a picture's panels, thinned and packed for the page's script.
+//! Views in space that can be turned: the lines and surfaces of a picture's panels, thinned and
+//! packed for the page's script.
 //!
-//! Places are whole numbers from 0 to 65535 along each side of the box, so that a view of a long orbit takes some tens of kilobytes. What the
-//! script draws from them is a way to look, and no result: the pictures and tables beside it are.
+//! Places are whole numbers from 0 to 65535 along each side of the box, so that a view of a long
+//! orbit takes some tens of kilobytes. What the script draws from them is a way to look, and no
+//! result: the pictures and tables beside it are.
 
 use serde_json::{Value, json};
 
@@ -73,7 +75,12 @@ pub fn views(sources: &[Source<'_>], camera: &Camera) -> Vec<SpaceView> {
     sources.iter().zip(&lines).map(|(source, lines)| view(source, lines, &ranges, camera)).collect()
 }
 
-fn view(source: &Source<'_>, lines: &[Line], ranges: &[(f64, f64); 3], camera: &Camera) -> SpaceView {
+fn view(
+    source: &Source<'_>,
+    lines: &[Line],
+    ranges: &[(f64, f64); 3],
+    camera: &Camera,
+) -> SpaceView {
     let names = source.system.coordinates();
     let axes: Vec<Value> = camera
         .axes
@@ -82,25 +89,32 @@ fn view(source: &Source<'_>, lines: &[Line], ranges: &[(f64, f64); 3], camera: &
             let (low, high) = ranges[*i];
             let place = |v: f64| ((v - low) / (high - low) * SIDE).round();
             let ticks = ticks::linear(low, high, 4.0).major;
-            let ticks: Vec<Value> = ticks.iter().map(|t| json!([place(t.value), markup::plain(&t.label)])).collect();
+            let ticks: Vec<Value> =
+                ticks.iter().map(|t| json!([place(t.value), markup::plain(&t.label)])).collect();
             json!({ "name": markup::plain(&markup::name(names[*i])), "ticks": ticks })
         })
         .collect();
     let place = |x: &[f64; 3]| -> [u16; 3] {
-        camera.axes.map(|i| ((x[i] - ranges[i].0) / (ranges[i].1 - ranges[i].0) * SIDE).round() as u16)
+        camera
+            .axes
+            .map(|i| ((x[i] - ranges[i].0) / (ranges[i].1 - ranges[i].0) * SIDE).round() as u16)
     };
     let mut tolerance = SIDE / 1500.0;
     let thinned = loop {
-        let thinned: Vec<(&str, Vec<[u16; 3]>)> =
-            lines.iter().map(|l| (l.kind, thin(&l.points.iter().map(place).collect::<Vec<_>>(), tolerance))).collect();
+        let thinned: Vec<(&str, Vec<[u16; 3]>)> = lines
+            .iter()
+            .map(|l| (l.kind, thin(&l.points.iter().map(place).collect::<Vec<_>>(), tolerance)))
+            .collect();
         if thinned.iter().map(|(_, p)| p.len()).sum::<usize>() <= MOST_POINTS || tolerance > SIDE {
             break thinned;
         }
         tolerance *= 1.5;
     };
-    let lines: Vec<Value> = thinned.iter().map(|(kind, points)| json!([kind, packed(points)])).collect();
+    let lines: Vec<Value> =
+        thinned.iter().map(|(kind, points)| json!([kind, packed(points)])).collect();
     let (low, high) = (ranges.map(|r| r.0), ranges.map(|r| r.1));
-    let mut areas: [(&str, Vec<u16>); 3] = ["attracting", "repelling", "crossing"].map(|kind| (kind, Vec::new()));
+    let mut areas: [(&str, Vec<u16>); 3] =
+        ["attracting", "repelling", "crossing"].map(|kind| (kind, Vec::new()));
     for patch in surface::patches(source.system, ranges, CELLS) {
         let inside = clip_polygon(&patch.corners, low, high);
         if inside.len() < 3 {
@@ -114,13 +128,24 @@ fn view(source: &Source<'_>, lines: &[Line], ranges: &[(f64, f64); 3], camera: &
         areas[kind].1.push(inside.len() as u16);
         areas[kind].1.extend(inside.iter().flat_map(place));
     }
-    let areas: Vec<Value> =
-        areas.iter().filter(|(_, a)| !a.is_empty()).map(|(kind, a)| json!([kind, bytes(a)])).collect();
-    let marks: Vec<Value> = surface::singularity(source.system, ranges).iter().map(|p| json!(place(p))).collect();
+    let areas: Vec<Value> = areas
+        .iter()
+        .filter(|(_, a)| !a.is_empty())
+        .map(|(kind, a)| json!([kind, bytes(a)]))
+        .collect();
+    let marks: Vec<Value> =
+        surface::singularity(source.system, ranges).iter().map(|p| json!(place(p))).collect();
     let about: Vec<String> = camera
         .axes
         .iter()
-        .map(|i| format!("{} from {} to {}", markup::plain(&markup::name(names[*i])), plain(low[*i]), plain(high[*i])))
+        .map(|i| {
+            format!(
+                "{} from {} to {}",
+                markup::plain(&markup::name(names[*i])),
+                plain(low[*i]),
+                plain(high[*i])
+            )
+        })
         .collect();
     SpaceView {
         label: source.label.to_owned(),
@@ -146,7 +171,8 @@ fn plain(value: f64) -> String {
     markup::plain(&number(format!("{value:.2e}").parse().unwrap_or(value)))
 }
 
-/// The lines of a table of points, in the table's order: a path is one; a motion has one for each piece, a funnel for each piece of each future.
+/// The lines of a table of points, in the table's order: a path is one; a motion has one for each
+/// piece, a funnel for each piece of each future.
 fn lines(source: &Source<'_>) -> Vec<Line> {
     let names = source.system.coordinates();
     if names.len() != 3 {
@@ -184,8 +210,8 @@ fn lines(source: &Source<'_>) -> Vec<Line> {
     lines
 }
 
-/// Leaves out points that lie within `tolerance` of the line drawn without them (Douglas & Peucker 1973); long lines are cut into pieces
-/// first, which bounds the work.
+/// Leaves out points that lie within `tolerance` of the line drawn without them (Douglas & Peucker
+/// 1973); long lines are cut into pieces first, which bounds the work.
 fn thin(points: &[[u16; 3]], tolerance: f64) -> Vec<[u16; 3]> {
     const PIECE: usize = 512;
     let mut kept = Vec::new();
@@ -237,8 +263,10 @@ mod tests {
     use twofold_job::table::Column;
 
     fn table(rows: &[([f64; 3], &str, i64)]) -> Table {
-        let columns =
-            ["x", "y", "z"].map(Column::numbers).into_iter().chain([Column::words("mode"), Column::integers("piece")]);
+        let columns = ["x", "y", "z"]
+            .map(Column::numbers)
+            .into_iter()
+            .chain([Column::words("mode"), Column::integers("piece")]);
         let mut table = Table::new("motion", columns);
         for (x, mode, piece) in rows {
             table.push(x.iter().map(|v| (*v).into()).chain([(*mode).into(), (*piece).into()]));
@@ -251,10 +279,13 @@ mod tests {
         let system = System::builtin("caricature").unwrap();
         let rows: Vec<([f64; 3], &str, i64)> = (0..=100)
             .map(|i| ([1.0 - f64::from(i) / 100.0, 0.5, -1.0], "plus", 0))
-            .chain(
-                (0..=100)
-                    .map(|i| ([0.0, 0.5 - f64::from(i) / 50.0, -1.0 + f64::from(i) / 50.0], "sliding-attracting", 1)),
-            )
+            .chain((0..=100).map(|i| {
+                (
+                    [0.0, 0.5 - f64::from(i) / 50.0, -1.0 + f64::from(i) / 50.0],
+                    "sliding-attracting",
+                    1,
+                )
+            }))
             .collect();
         let source = Source { label: "i", title: "", system: &system, table: table(&rows) };
         let camera = Camera { axes: [1, 2, 0], azimuth: -60.0, elevation: 18.0 };
@@ -268,8 +299,12 @@ mod tests {
             views[0].data["areas"].as_array().unwrap().len() == 3
                 && views[0].data["marks"].as_array().unwrap().len() == 1
         );
-        let axes: Vec<&str> =
-            views[0].data["axes"].as_array().unwrap().iter().map(|a| a["name"].as_str().unwrap()).collect();
+        let axes: Vec<&str> = views[0].data["axes"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|a| a["name"].as_str().unwrap())
+            .collect();
         assert_eq!(axes, ["y", "z", "x"]);
     }
 
@@ -286,7 +321,8 @@ mod tests {
     #[test]
     fn only_figures_in_space_have_views() {
         let figures = crate::figures::all();
-        let known: Vec<&str> = figures.iter().map(|f| &*f.id).filter(|id| camera(&figures, id).is_some()).collect();
+        let known: Vec<&str> =
+            figures.iter().map(|f| &*f.id).filter(|id| camera(&figures, id).is_some()).collect();
         assert_eq!(known, ["fig4"]);
         assert!(camera(&figures, "nothing").is_none());
     }

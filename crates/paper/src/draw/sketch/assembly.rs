@@ -1,7 +1,8 @@
 //! Fig. 1: the wheel assembly in space and from above, drawn to scale from the model's geometry.
 //!
-//! Coordinates: origin at the axle of the disc, first axis along the wheel's line, second from the axle to the line. The wheel stands
-//! at (r, d); its axle points along (sin gamma, cos gamma), it rolls along (cos gamma, -sin gamma), as in eq. (2).
+//! Coordinates: origin at the axle of the disc, first axis along the wheel's line, second from the
+//! axle to the line. The wheel stands at (r, d); its axle points along (sin gamma, cos gamma), it
+//! rolls along (cos gamma, -sin gamma), as in eq. (2).
 
 use super::{lines_of, lines_table};
 use twofold_job::table::Table;
@@ -16,7 +17,8 @@ use twofold_system::Wheel;
 /// A line of the drawing: its name decides its look.
 type Line = (String, Vec<[f64; 2]>);
 
-/// Radius of the disc, in the model's lengths; the model does not need it, only that the wheel stays on it.
+/// Radius of the disc, in the model's lengths; the model does not need it, only that the wheel
+/// stays on it.
 const DISC: f64 = 1.7;
 /// Half length and half width of the tyre's print.
 const TYRE: [f64; 2] = [0.34, 0.09];
@@ -26,7 +28,9 @@ pub fn tables(wheel: &Wheel, r: f64) -> Vec<Table> {
     let centre = [r, wheel.d];
     let (s, c) = (sin(wheel.gamma), cos(wheel.gamma));
     let (rolling, axle) = ([c, -s], [s, c]);
-    let at = |a: f64, b: f64| [centre[0] + a * rolling[0] + b * axle[0], centre[1] + a * rolling[1] + b * axle[1]];
+    let at = |a: f64, b: f64| {
+        [centre[0] + a * rolling[0] + b * axle[0], centre[1] + a * rolling[1] + b * axle[1]]
+    };
     let mut lines: Vec<Line> = Vec::new();
     let mut add = |name: &str, points: Vec<[f64; 2]>| lines.push((name.to_owned(), points));
 
@@ -38,7 +42,8 @@ pub fn tables(wheel: &Wheel, r: f64) -> Vec<Table> {
     let half = twofold_num::elementary::sqrt((reach * reach - wheel.d * wheel.d).max(0.0));
     add("track", vec![[-half, wheel.d], [half, wheel.d]]);
     add("distance", vec![[0.0, 0.0], [0.0, wheel.d]]);
-    // Spring with a straight lead at each end, its turns shrinking with r: it is drawn as long as it is.
+    // Spring with a straight lead at each end, its turns shrinking with r: it is drawn as long as
+    // it is.
     let (from, to) = (0.06 * r, r - 0.30);
     let turns = 9;
     let mut spring = vec![[0.0, wheel.d], [from, wheel.d]];
@@ -53,7 +58,8 @@ pub fn tables(wheel: &Wheel, r: f64) -> Vec<Table> {
     add("axle", vec![at(0.0, -0.42), at(0.0, 0.42)]);
     add("rolling", vec![at(a, 0.0), at(a + 0.34, 0.0)]);
     add("slip", vec![at(0.0, 0.42), at(0.0, 0.72)]);
-    // The axle makes the angle pi/2 - gamma with the line; gamma is between the rolling direction and the line.
+    // The axle makes the angle pi/2 - gamma with the line; gamma is between the rolling direction
+    // and the line.
     let degrees = wheel.gamma * 180.0 / std::f64::consts::PI;
     add("angle", arc(centre, 0.55, -degrees, 0.0));
     add("speed", vec![[r + 0.62, wheel.d], [r + 0.92, wheel.d]]);
@@ -82,7 +88,8 @@ pub fn draw(tables: &[Table]) -> Sheet {
 /// Height of the wheel's hub above the disc: the tyre stands on it.
 const HUB: f64 = TYRE[0];
 
-/// The assembly in space: the disc below, the wheel upright on it, and at the height of its hub the housing with the line along which it moves.
+/// The assembly in space: the disc below, the wheel upright on it, and at the height of its hub the
+/// housing with the line along which it moves.
 fn oblique(lines: &[Line]) -> SpacePanel {
     let thin = LineStyle::new(style::SOFT_INK, 0.6);
     let ink = LineStyle::new(style::INK, 0.9);
@@ -93,7 +100,11 @@ fn oblique(lines: &[Line]) -> SpacePanel {
         .unboxed();
     for (name, points) in lines {
         // What lies on the disc, and what at the height of the hub.
-        let height = if matches!(name.as_str(), "disc" | "disc-turns" | "slip" | "rolling") { 0.0 } else { HUB };
+        let height = if matches!(name.as_str(), "disc" | "disc-turns" | "slip" | "rolling") {
+            0.0
+        } else {
+            HUB
+        };
         let lifted: Vec<[f64; 3]> = points.iter().map(|p| [p[0], p[1], height]).collect();
         let last = lifted[lifted.len() - 1];
         panel = match name.as_str() {
@@ -101,7 +112,11 @@ fn oblique(lines: &[Line]) -> SpacePanel {
                 .surface(vec![Patch { corners: lifted.clone(), colour: style::CROSSING }])
                 .line(lifted, ink)
                 .note([0.0, -1.2, 0.0], "disc", Anchor::Centre),
-            "housing" => panel.line(lifted, thin.dashed()).note([-1.1, -0.75, HUB], "housing", Anchor::Centre),
+            "housing" => panel.line(lifted, thin.dashed()).note(
+                [-1.1, -0.75, HUB],
+                "housing",
+                Anchor::Centre,
+            ),
             "track" => panel.line(lifted, thin.dotted()),
             "distance" => panel
                 .line(vec![[0.0, 0.0, 0.0], [0.0, 0.0, HUB]], ink)
@@ -110,17 +125,24 @@ fn oblique(lines: &[Line]) -> SpacePanel {
             "tyre" => {
                 let at = |i: usize| [points[i][0], points[i][1]];
                 let (near, far) = (wheel_side([at(0), at(1)]), wheel_side([at(3), at(2)]));
-                let tread = near.windows(2).zip(far.windows(2)).map(|(a, b)| vec![a[0], a[1], b[1], b[0]]);
+                let tread =
+                    near.windows(2).zip(far.windows(2)).map(|(a, b)| vec![a[0], a[1], b[1], b[0]]);
                 let grey = |corners| Patch { corners, colour: style::INK.lighten(0.35) };
                 let wheel = tread.chain([near.clone(), far.clone()]).map(grey).collect();
                 panel.surface(wheel).line(far, ink).line(near, ink)
             }
             "spring" => panel.line(lifted, LineStyle::new(style::BLUE, 0.9)),
-            "slip" => {
-                panel.arrow(lifted, LineStyle::new(style::VERMILLION, 1.1)).note(last, " slip *h*", Anchor::Below)
-            }
+            "slip" => panel.arrow(lifted, LineStyle::new(style::VERMILLION, 1.1)).note(
+                last,
+                " slip *h*",
+                Anchor::Below,
+            ),
             "rolling" => panel.arrow(lifted, ink).note(last, " *V*", Anchor::Left),
-            "speed" => panel.arrow(lifted, LineStyle::new(style::BLUE, 1.1)).note(last, "*v*", Anchor::Above),
+            "speed" => panel.arrow(lifted, LineStyle::new(style::BLUE, 1.1)).note(
+                last,
+                "*v*",
+                Anchor::Above,
+            ),
             "disc-turns" => panel.arrow(lifted, ink).note(last, "*ω*_{0}", Anchor::Below),
             "housing-turns" => panel.arrow(lifted, thin).note(last, " *ω*", Anchor::Left),
             "angle" => panel,
@@ -158,21 +180,28 @@ fn from_above(lines: &[Line]) -> PlanePanel {
             }
             "spring" => {
                 let left = [-0.04, last[1] + 0.14];
-                panel.line(points, LineStyle::new(style::BLUE, 0.9)).note(left, "*k*_{w}, *c*_{w}", Anchor::Right).note(
-                    [0.25 * last[0], last[1] - 0.06],
-                    "*r*",
-                    Anchor::Below,
-                )
+                panel
+                    .line(points, LineStyle::new(style::BLUE, 0.9))
+                    .note(left, "*k*_{w}, *c*_{w}", Anchor::Right)
+                    .note([0.25 * last[0], last[1] - 0.06], "*r*", Anchor::Below)
             }
             "tyre" => panel.solid(points.clone(), style::INK.lighten(0.35)).line(points, ink),
             "axle" => panel.line(points, ink),
             "rolling" => panel.arrow(points, ink).note(last, " rolling speed *V*", Anchor::Left),
-            "slip" => panel.arrow(points, LineStyle::new(style::VERMILLION, 1.1)).note(last, " slip *h*", Anchor::Left),
+            "slip" => panel.arrow(points, LineStyle::new(style::VERMILLION, 1.1)).note(
+                last,
+                " slip *h*",
+                Anchor::Left,
+            ),
             "angle" => {
                 let middle = points[points.len() / 2];
                 panel.line(points, thin).note(middle, " *γ*", Anchor::Left)
             }
-            "speed" => panel.arrow(points, LineStyle::new(style::BLUE, 1.1)).note(last, " *v*", Anchor::Left),
+            "speed" => panel.arrow(points, LineStyle::new(style::BLUE, 1.1)).note(
+                last,
+                " *v*",
+                Anchor::Left,
+            ),
             "disc-turns" => panel.arrow(points, ink).note(last, "*ω*_{0}", Anchor::Below),
             "housing-turns" => panel.arrow(points, thin).note(last, "*ω*, *c*_{h}", Anchor::Right),
             _ => panel.line(points, ink),

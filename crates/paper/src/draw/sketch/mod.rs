@@ -1,5 +1,5 @@
-//! The paper's sketches, computed: the wheel assembly drawn to scale from its model, and the regions and orbits about a
-//! two-fold.
+//! The paper's sketches, computed: the wheel assembly drawn to scale from its model, and the
+//! regions and orbits about a two-fold.
 
 pub mod assembly;
 pub mod portrait;
@@ -8,7 +8,10 @@ use twofold_job::table::{Column, Entry, Table};
 
 /// Lines of a sketch as a table: a name per line, a row per point.
 fn lines_table<const N: usize>(columns: [&str; N], lines: &[(String, Vec<[f64; N]>)]) -> Table {
-    let mut table = Table::new("lines", std::iter::once(Column::words("line")).chain(columns.map(Column::numbers)));
+    let mut table = Table::new(
+        "lines",
+        std::iter::once(Column::words("line")).chain(columns.map(Column::numbers)),
+    );
     for (name, points) in lines {
         for point in points {
             let mut row = vec![Entry::Word(name.clone())];

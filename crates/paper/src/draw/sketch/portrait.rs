@@ -1,5 +1,5 @@
-//! Fig. 3: what happens about a two-fold of the normal form (4): regions of the surface, orbits that cross it, orbits that slide
-//! on it.
+//! Fig. 3: what happens about a two-fold of the normal form (4): regions of the surface, orbits
+//! that cross it, orbits that slide on it.
 
 use nalgebra::vector;
 
@@ -26,7 +26,8 @@ pub fn system(v: f64, w: f64) -> Caricature {
     Caricature { v_plus: v, v_minus: w, ..Caricature::with_reinjection(0.0, 0.0) }
 }
 
-/// Computed orbits: single flights of f+ and f- between two crossings, and sliding orbits in both sliding regions.
+/// Computed orbits: single flights of f+ and f- between two crossings, and sliding orbits in both
+/// sliding regions.
 ///
 /// # Errors
 ///
@@ -42,9 +43,11 @@ pub fn tables(v: f64, w: f64) -> Result<Vec<Table>, JobError> {
                   t_end: f64|
      -> Result<(), JobError> {
         let mut trajectory = Trajectory::new(12).until_two_fold();
-        // Long sliding: the portrait shows the sliding flow up to the region's edge, not a choice of exit.
+        // Long sliding: the portrait shows the sliding flow up to the region's edge, not a choice
+        // of exit.
         let rule = ExitRule::AfterTime { time: t_end, side: Side::Plus };
-        let _ = run(&system, start.into(), t_end, &settings, rule, &mut trajectory)?.within_budget()?;
+        let _ =
+            run(&system, start.into(), t_end, &settings, rule, &mut trajectory)?.within_budget()?;
         if let Some(piece) = trajectory.pieces.iter().find(|p| mode(p.mode)) {
             let inside = |x: &[f64; 3]| x[1].abs() <= 1.02 * REACH && x[2].abs() <= 1.02 * REACH;
             let points: Vec<[f64; 3]> =
@@ -53,7 +56,8 @@ pub fn tables(v: f64, w: f64) -> Result<Vec<Table>, JobError> {
         }
         Ok(())
     };
-    // Flights that start in the crossing regions; each lands where the parabola of the normal form says.
+    // Flights that start in the crossing regions; each lands where the parabola of the normal form
+    // says.
     for (y, z) in [(-0.25, 0.35), (-0.38, 0.7), (-0.12, 0.85)] {
         follow(&mut lines, "plus", [0.0, y, z], |m| m == Mode::Plus, 3.0)?;
     }
@@ -63,15 +67,22 @@ pub fn tables(v: f64, w: f64) -> Result<Vec<Table>, JobError> {
     for k in 0..7 {
         // From the edge of the square into the two-fold.
         let s = (f64::from(k) + 0.5) / 7.0;
-        let (y, z) = if s < 0.5 { (REACH, 2.0 * s * REACH) } else { (2.0 * (1.0 - s) * REACH, REACH) };
+        let (y, z) =
+            if s < 0.5 { (REACH, 2.0 * s * REACH) } else { (2.0 * (1.0 - s) * REACH, REACH) };
         follow(&mut lines, "attracting", [0.0, y, z], |m| m == Mode::SlidingAttracting, 10.0)?;
     }
-    // Out of the two-fold: (y, z) -> (-y, -z) maps the sliding flow to itself run backwards, so the mirror image of a point on the
-    // way in, taken close to the two-fold, is the start of the mirror image's way out.
-    let ways_in: Vec<Vec<[f64; 3]>> =
-        lines.iter().filter(|(name, _)| name.starts_with("attracting")).map(|(_, points)| points.clone()).collect();
+    // Out of the two-fold: (y, z) -> (-y, -z) maps the sliding flow to itself run backwards, so the
+    // mirror image of a point on the way in, taken close to the two-fold, is the start of the
+    // mirror image's way out.
+    let ways_in: Vec<Vec<[f64; 3]>> = lines
+        .iter()
+        .filter(|(name, _)| name.starts_with("attracting"))
+        .map(|(_, points)| points.clone())
+        .collect();
     for points in ways_in {
-        if let Some([_, y, z]) = points.into_iter().find(|[_, y, z]| y.abs().max(z.abs()) < 0.03 * REACH) {
+        if let Some([_, y, z]) =
+            points.into_iter().find(|[_, y, z]| y.abs().max(z.abs()) < 0.03 * REACH)
+        {
             follow(&mut lines, "repelling", [0.0, -y, -z], |m| m == Mode::SlidingRepelling, 10.0)?;
         }
     }
@@ -109,8 +120,11 @@ pub fn draw(tables: &[Table], v: f64, w: f64) -> Sheet {
             chart = chart.line(points, sliding);
         }
     }
-    chart = chart.markers(vec![[0.0, 0.0, 0.0]], MarkerStyle::new(MarkerShape::Dot, style::MAGENTA));
-    let area = |colour, text: &str| LegendEntry::new(LegendKey::Area(colour, style::SURFACE_OPACITY), text);
+    chart =
+        chart.markers(vec![[0.0, 0.0, 0.0]], MarkerStyle::new(MarkerShape::Dot, style::MAGENTA));
+    let area = |colour, text: &str| {
+        LegendEntry::new(LegendKey::Area(colour, style::SURFACE_OPACITY), text)
+    };
     Sheet::new(ColumnWidth::Wide, 1, "")
         .subtitle("normal form (4)")
         .panel("", "", chart)
@@ -119,7 +133,10 @@ pub fn draw(tables: &[Table], v: f64, w: f64) -> Sheet {
         .legend(area(style::CROSSING, "orbits cross"))
         .legend(LegendEntry::new(LegendKey::Line(flight), "flight"))
         .legend(LegendEntry::new(LegendKey::Line(sliding), "sliding"))
-        .legend(LegendEntry::new(LegendKey::Marker(MarkerStyle::new(MarkerShape::Dot, style::MAGENTA)), "two-fold"))
+        .legend(LegendEntry::new(
+            LegendKey::Marker(MarkerStyle::new(MarkerShape::Dot, style::MAGENTA)),
+            "two-fold",
+        ))
         .footer(format!(
             "*v* = {}, *w* = {}, *vw* = {} > 1; every line is a computed orbit",
             number(v),

@@ -12,8 +12,13 @@ use twofold_job::record::{Layer, listed};
 
 pub(super) fn figure(html: &mut String, figure: &FigureReport, links: Links) {
     let id = figure_id(figure);
-    let title = if figure.title.is_empty() { String::new() } else { format!(": {}", rich(&figure.title)) };
-    put!(html, "<section aria-labelledby=\"{id}\">\n<h2 id=\"{id}\">{}{title}</h2>", escape(&figure_name(&figure.id)));
+    let title =
+        if figure.title.is_empty() { String::new() } else { format!(": {}", rich(&figure.title)) };
+    put!(
+        html,
+        "<section aria-labelledby=\"{id}\">\n<h2 id=\"{id}\">{}{title}</h2>",
+        escape(&figure_name(&figure.id))
+    );
     for picture in &figure.pictures {
         self::picture(html, picture, links);
     }
@@ -28,7 +33,8 @@ pub(super) fn figure(html: &mut String, figure: &FigureReport, links: Links) {
         let img = image(preview, &format!("The picture {}; no record describes it", file.path));
         put!(
             html,
-            "<figure>{img}<figcaption>No record stands beside this picture. {}</figcaption></figure>\n</article>",
+            "<figure>{img}<figcaption>No record stands beside this picture. \
+                {}</figcaption></figure>\n</article>",
             links.to(&file.path, "PNG")
         );
     }
@@ -47,7 +53,8 @@ pub(super) fn image(preview: &Preview, alt: &str) -> String {
 pub(super) fn picture(html: &mut String, picture: &PictureReport, links: Links) {
     let id = identifier(&picture.name);
     put!(html, "<article aria-labelledby=\"{id}\">");
-    let reading = picture.reading.map_or(String::new(), |r| tag("", &format!("{} reading", r.word())));
+    let reading =
+        picture.reading.map_or(String::new(), |r| tag("", &format!("{} reading", r.word())));
     put!(
         html,
         "<h3 id=\"{id}\"><span>{}</span> {reading} {}</h3>",
@@ -55,7 +62,11 @@ pub(super) fn picture(html: &mut String, picture: &PictureReport, links: Links) 
         reference_tag(&picture.reference)
     );
     if !picture.alterations.is_empty() {
-        put!(html, "<p class=\"notice\">Not the published picture: {}.</p>", escape(&picture.alterations.join("; ")));
+        put!(
+            html,
+            "<p class=\"notice\">Not the published picture: {}.</p>",
+            escape(&picture.alterations.join("; "))
+        );
     }
     put!(html, "<figure>");
     match &picture.images.actual {
@@ -67,7 +78,9 @@ pub(super) fn picture(html: &mut String, picture: &PictureReport, links: Links) 
     put!(html, "<ul class=\"links\">");
     for file in picture.files.iter().filter(|f| f.integrity != Integrity::Missing) {
         let text = match (file.role, &file.panel) {
-            (Role::Data, Some(panel)) if file.path.ends_with("-events.csv") => format!("CSV ({panel}), events"),
+            (Role::Data, Some(panel)) if file.path.ends_with("-events.csv") => {
+                format!("CSV ({panel}), events")
+            }
             (Role::Data, Some(panel)) => format!("CSV ({panel})"),
             (Role::Data, None) => file.path.rsplit('/').next().unwrap_or(&file.path).to_owned(),
             (Role::Png, _) => match picture.size {
@@ -95,17 +108,25 @@ pub(super) fn picture(html: &mut String, picture: &PictureReport, links: Links) 
 /// What differs: the layer, the numbers, and ours | difference | theirs.
 pub(super) fn mismatch(html: &mut String, picture: &PictureReport) {
     let (layer, panels, comparison, note) = match &picture.reference {
-        Reference::Different { layer, panels, comparison, note, .. } => (layer, panels, comparison, note),
+        Reference::Different { layer, panels, comparison, note, .. } => {
+            (layer, panels, comparison, note)
+        }
         Reference::Missing { why } => {
-            put!(html, "<p class=\"notice\">There is no reference to compare with: {}.</p>", escape(why));
+            put!(
+                html,
+                "<p class=\"notice\">There is no reference to compare with: {}.</p>",
+                escape(why)
+            );
             return;
         }
         _ => return,
     };
-    let of = if panels.is_empty() { String::new() } else { format!(" of panel {}", listed(panels)) };
+    let of =
+        if panels.is_empty() { String::new() } else { format!(" of panel {}", listed(panels)) };
     put!(
         html,
-        "<div class=\"notice\" data-mismatch=\"{}\">\n<p>Differs from the committed reference. The first layer that differs: <strong>{}{}</strong> \
+        "<div class=\"notice\" data-mismatch=\"{}\">\n<p>Differs from the committed reference. The \
+            first layer that differs: <strong>{}{}</strong> \
          ({}).</p>",
         identifier(&picture.name),
         escape(layer.name()),
@@ -127,7 +148,10 @@ pub(super) fn mismatch(html: &mut String, picture: &PictureReport) {
         (
             "Difference",
             i.difference.as_ref(),
-            format!("Difference of {name}: orange where only the reference has ink, blue where only ours has"),
+            format!(
+                "Difference of {name}: orange where only the reference has ink, blue where only \
+                    ours has"
+            ),
         ),
         ("Reference", i.expected.as_ref(), format!("Reference: the committed {name}")),
     ];
@@ -135,15 +159,21 @@ pub(super) fn mismatch(html: &mut String, picture: &PictureReport) {
         put!(html, "<div class=\"triptych\" data-triptych=\"{}\">", identifier(name));
         for (word, preview, alt) in shown {
             if let Some(preview) = preview {
-                put!(html, "<figure>{}<figcaption>{word}</figcaption></figure>", image(preview, &alt));
+                put!(
+                    html,
+                    "<figure>{}<figcaption>{word}</figcaption></figure>",
+                    image(preview, &alt)
+                );
             }
         }
         put!(html, "</div>");
         if i.difference.is_some() {
             put!(
                 html,
-                "<p>In the difference: orange, ink only in the reference; blue, only in ours; grey, shared. It is smaller than the pictures: \
-                 where several of their pixels are one of its own, that shows the most different one.</p>"
+                "<p>In the difference: orange, ink only in the reference; blue, only in ours; \
+                    grey, shared. It is smaller than the pictures: \
+                 where several of their pixels are one of its own, that shows the most different \
+                 one.</p>"
             );
         }
     }
@@ -152,13 +182,24 @@ pub(super) fn mismatch(html: &mut String, picture: &PictureReport) {
 /// What the page's script needs to turn a panel in space; without script nothing of it is seen.
 pub(super) fn spaces(html: &mut String, picture: &PictureReport, id: &str) {
     for view in &picture.spaces {
-        // Inside a script element no character reference is read, in HTML: what would end it or be markup in XML is written as JSON escapes.
-        let data = view.data.to_string().replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026");
+        // Inside a script element no character reference is read, in HTML: what would end it or be
+        // markup in XML is written as JSON escapes.
+        let data = view
+            .data
+            .to_string()
+            .replace('<', "\\u003c")
+            .replace('>', "\\u003e")
+            .replace('&', "\\u0026");
         let several = picture.spaces.len() > 1;
-        let panel = if several { format!(" ({}) {}", view.label, wording::plain(&view.title)) } else { String::new() };
+        let panel = if several {
+            format!(" ({}) {}", view.label, wording::plain(&view.title))
+        } else {
+            String::new()
+        };
         put!(
             html,
-            "<script type=\"application/json\" class=\"space\" id=\"{id}-{}-space\" data-title=\"{}{}\" data-panel=\"{}\">{data}</script>",
+            "<script type=\"application/json\" class=\"space\" id=\"{id}-{}-space\" \
+                data-title=\"{}{}\" data-panel=\"{}\">{data}</script>",
             identifier(&view.label),
             escape(&picture.name),
             escape(panel.trim_end()),
@@ -183,7 +224,8 @@ pub(super) fn numbers(c: &Comparison) -> String {
         return format!("All {} by {} pixels are the same; RMS 0, SSIM 1.", c.width, c.height);
     }
     format!(
-        "{} of {} by {} pixels changed ({}); largest difference {} of 255 levels; RMS {} levels, {} in the worst block; SSIM {}, {} in the worst \
+        "{} of {} by {} pixels changed ({}); largest difference {} of 255 levels; RMS {} levels, \
+            {} in the worst block; SSIM {}, {} in the worst \
          window.",
         grouped(c.changed_pixels),
         c.width,
@@ -217,10 +259,16 @@ pub(super) fn verdicts(html: &mut String, picture: &PictureReport, id: &str) {
         return;
     }
     put!(html, "<h4>The paper’s claims</h4>");
-    table_start(html, &format!("Claims and verdicts, {}", picture.name), &format!("{id}-verdicts"), None);
+    table_start(
+        html,
+        &format!("Claims and verdicts, {}", picture.name),
+        &format!("{id}-verdicts"),
+        None,
+    );
     put!(
         html,
-        "<thead><tr><th scope=\"col\">Panel</th><th scope=\"col\">The paper</th><th scope=\"col\">Verdict</th><th \
+        "<thead><tr><th scope=\"col\">Panel</th><th scope=\"col\">The paper</th><th \
+            scope=\"col\">Verdict</th><th \
          scope=\"col\">What the run shows</th></tr></thead>\n<tbody>"
     );
     for v in &picture.verdicts {
@@ -250,7 +298,10 @@ pub(super) fn runs(html: &mut String, picture: &PictureReport, id: &str) {
             ("Start", format!("({}) = ({})", names.join(", "), rich(&start.join(", ")))),
             ("Time", format!("0 to {}", rich(&wording::number(p.run.t_end)))),
             ("Method", rich(&wording::method(&p.run.method))),
-            ("Restarts and kicks", if schedule.is_empty() { "none".to_owned() } else { rich(&schedule) }),
+            (
+                "Restarts and kicks",
+                if schedule.is_empty() { "none".to_owned() } else { rich(&schedule) },
+            ),
         ];
         for (term, text) in lines {
             put!(html, "<dt>{term}</dt><dd>{text}</dd>");
@@ -260,7 +311,8 @@ pub(super) fn runs(html: &mut String, picture: &PictureReport, id: &str) {
     table_start(
         html,
         &format!(
-            "Work done, {}. NDSolve’s MaxSteps was {} for one call of LSODA, that is between restarts.",
+            "Work done, {}. NDSolve’s MaxSteps was {} for one call of LSODA, that is between \
+                restarts.",
             picture.name,
             grouped(NDSOLVE_MAX_STEPS)
         ),
@@ -321,10 +373,16 @@ pub(super) fn hashes(html: &mut String, picture: &PictureReport, id: &str) {
         _ => None,
     };
     put!(html, "<details>\n<summary>Hashes</summary>");
-    table_start(html, &format!("SHA-256 of each layer, {}", picture.name), &format!("{id}-hashes"), None);
+    table_start(
+        html,
+        &format!("SHA-256 of each layer, {}", picture.name),
+        &format!("{id}-hashes"),
+        None,
+    );
     put!(
         html,
-        "<thead><tr><th scope=\"col\">Layer</th><th scope=\"col\">SHA-256</th><th scope=\"col\">Reference</th></tr></thead>\n<tbody>"
+        "<thead><tr><th scope=\"col\">Layer</th><th scope=\"col\">SHA-256</th><th \
+            scope=\"col\">Reference</th></tr></thead>\n<tbody>"
     );
     let h = &picture.hashes;
     let layers = [
@@ -352,7 +410,8 @@ pub(super) fn hashes(html: &mut String, picture: &PictureReport, id: &str) {
     table_start(html, &format!("Files, {}", picture.name), &format!("{id}-files"), None);
     put!(
         html,
-        "<thead><tr><th scope=\"col\">File</th><th scope=\"col\" class=\"number\">Bytes</th><th scope=\"col\">SHA-256</th><th \
+        "<thead><tr><th scope=\"col\">File</th><th scope=\"col\" class=\"number\">Bytes</th><th \
+            scope=\"col\">SHA-256</th><th \
          scope=\"col\">Against its record</th></tr></thead>\n<tbody>"
     );
     for f in &picture.files {
@@ -363,11 +422,15 @@ pub(super) fn hashes(html: &mut String, picture: &PictureReport, id: &str) {
         };
         put!(
             html,
-            "<tr><th scope=\"row\"><code>{}</code></th><td class=\"number\">{}</td><td><code>{}</code></td><td>{}</td></tr>",
+            "<tr><th scope=\"row\"><code>{}</code></th><td \
+                class=\"number\">{}</td><td><code>{}</code></td><td>{}</td></tr>",
             escape(&f.path),
             grouped(f.bytes),
             f.sha256.as_ref().map_or("–", |h| h.as_str()),
-            tag(class, if f.role == Role::Record { "the record itself" } else { f.integrity.words() })
+            tag(
+                class,
+                if f.role == Role::Record { "the record itself" } else { f.integrity.words() }
+            )
         );
     }
     put!(html, "</tbody>\n</table>\n</section>\n</details>");

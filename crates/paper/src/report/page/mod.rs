@@ -1,7 +1,8 @@
-//! The report as one page: HTML that is also well-formed XML, with style, script and pictures inside. It asks the network for nothing,
-//! and says so to the browser (Content-Security-Policy).
+//! The report as one page: HTML that is also well-formed XML, with style, script and pictures
+//! inside. It asks the network for nothing, and says so to the browser (Content-Security-Policy).
 //!
-//! From top to bottom: the summary and the claims; findings; odds; the figures; all verdicts; rules; how it was made and how to cite.
+//! From top to bottom: the summary and the claims; findings; odds; the figures; all verdicts;
+//! rules; how it was made and how to cite.
 
 /// Appends formatted text; writing to a String cannot fail.
 macro_rules! put {
@@ -25,7 +26,8 @@ use super::names;
 const STYLE: &str = include_str!("../page.css");
 const SCRIPT: &str = include_str!("../page.js");
 
-/// Whether the page stands in the folder of the figures, so that it can link to the files beside it.
+/// Whether the page stands in the folder of the figures, so that it can link to the files beside
+/// it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Links {
     /// It does: files are linked to.
@@ -71,11 +73,13 @@ fn head(html: &mut String, report: &Report) {
     let a = &report.article;
     put!(
         html,
-        "<!DOCTYPE html>\n<html lang=\"en\" xmlns=\"http://www.w3.org/1999/xhtml\">\n<head>\n<meta charset=\"utf-8\"/>"
+        "<!DOCTYPE html>\n<html lang=\"en\" xmlns=\"http://www.w3.org/1999/xhtml\">\n<head>\n<meta \
+            charset=\"utf-8\"/>"
     );
     put!(
         html,
-        "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; style-src {}; script-src {}; \
+        "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; \
+            style-src {}; script-src {}; \
          base-uri 'none'; form-action 'none'\"/>",
         source_hash(STYLE),
         source_hash(SCRIPT)
@@ -90,8 +94,10 @@ fn head(html: &mut String, report: &Report) {
     put!(html, "<h1>Figures of {} ({}), recomputed</h1>", escape(a.author), a.year);
     put!(
         html,
-        "<p class=\"lead\">What {} finds when it computes the figures of <cite>{}</cite>: the pictures, the paper’s claims held \
-         against them, the work behind them, and the hashes by which any reader can check them.</p>",
+        "<p class=\"lead\">What {} finds when it computes the figures of <cite>{}</cite>: the \
+            pictures, the paper’s claims held \
+         against them, the work behind them, and the hashes by which any reader can check \
+         them.</p>",
         escape(&report.made_by),
         escape(a.title)
     );
@@ -100,7 +106,12 @@ fn head(html: &mut String, report: &Report) {
         put!(html, "<li><a href=\"#odds\">Odds</a></li>");
     }
     for figure in &report.figures {
-        put!(html, "<li><a href=\"#{}\">{}</a></li>", figure_id(figure), escape(&figure_name(&figure.id)));
+        put!(
+            html,
+            "<li><a href=\"#{}\">{}</a></li>",
+            figure_id(figure),
+            escape(&figure_name(&figure.id))
+        );
     }
     for (id, name) in [
         ("verdicts", "All verdicts"),
@@ -124,12 +135,14 @@ fn foot(html: &mut String, report: &Report, links: Links) {
     );
     put!(
         html,
-        "<p>To check: <code>make check</code> recomputes everything and compares; <code>twofold check --against FOLDER</code> checks published \
+        "<p>To check: <code>make check</code> recomputes everything and compares; <code>twofold \
+            check --against FOLDER</code> checks published \
          pictures; <code>twofold inspect FILE</code> reads what a picture says of itself.</p>"
     );
     put!(
         html,
-        "<p>This page holds no path, and no time but those of <code>{}</code>: the same folder gives the same bytes.</p>\n</footer>",
+        "<p>This page holds no path, and no time but those of <code>{}</code>: the same folder \
+            gives the same bytes.</p>\n</footer>",
         names::MAKING
     );
     put!(html, "<script>{SCRIPT}</script>\n</body>\n</html>");

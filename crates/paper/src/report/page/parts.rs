@@ -9,10 +9,14 @@ use crate::Reading;
 /// "Figure 7" for fig7, the folder's name with a capital for others.
 pub(super) fn figure_name(id: &str) -> String {
     match id.strip_prefix("fig") {
-        Some(number) if !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit()) => format!("Figure {number}"),
+        Some(number) if !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit()) => {
+            format!("Figure {number}")
+        }
         _ => {
             let mut characters = id.chars();
-            characters.next().map_or(String::new(), |first| first.to_uppercase().chain(characters).collect())
+            characters
+                .next()
+                .map_or(String::new(), |first| first.to_uppercase().chain(characters).collect())
         }
     }
 }
@@ -36,7 +40,9 @@ pub(super) fn agreement(agrees: bool) -> String {
 pub(super) fn reference_tag(reference: &Reference) -> String {
     match reference {
         Reference::Same => tag("good", "✓ matches the reference"),
-        Reference::Different { layer, .. } => tag("bad", &format!("✗ differs in its {}", layer.name())),
+        Reference::Different { layer, .. } => {
+            tag("bad", &format!("✗ differs in its {}", layer.name()))
+        }
         Reference::Missing { .. } => tag("bad", "! no reference"),
         Reference::Altered => tag("", "altered, no reference"),
     }
@@ -48,12 +54,18 @@ pub(super) fn count(number: usize, singular: &str, plural: &str) -> String {
 
 pub(super) fn capitalised(text: &str) -> String {
     let mut characters = text.chars();
-    characters.next().map_or(String::new(), |first| first.to_uppercase().chain(characters).collect())
+    characters
+        .next()
+        .map_or(String::new(), |first| first.to_uppercase().chain(characters).collect())
 }
 
 /// The finding in a few words: its kind, or the whole line where there is no kind.
 pub(super) fn short(verdict: &VerdictReport) -> &str {
-    if verdict.recorded.pointer("/evidence/section").is_some() { &verdict.kind } else { &verdict.found }
+    if verdict.recorded.pointer("/evidence/section").is_some() {
+        &verdict.kind
+    } else {
+        &verdict.found
+    }
 }
 
 /// A table in a box of its own that scrolls sideways, also with the keyboard.
@@ -61,7 +73,8 @@ pub(super) fn table_start(html: &mut String, caption: &str, id: &str, announce: 
     let class = if id == "claims-table" { "scroll claims" } else { "scroll" };
     put!(
         html,
-        "<section class=\"{class}\" tabindex=\"0\" aria-labelledby=\"{id}-caption\">\n<table id=\"{id}\"{}>\n\
+        "<section class=\"{class}\" tabindex=\"0\" aria-labelledby=\"{id}-caption\">\n<table \
+            id=\"{id}\"{}>\n\
          <caption id=\"{id}-caption\">{}</caption>",
         announce.map_or(String::new(), |a| format!(" data-sortable=\"{a}\"")),
         escape(caption)

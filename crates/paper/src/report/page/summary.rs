@@ -10,12 +10,19 @@ use crate::wording;
 
 pub(super) fn summary(html: &mut String, report: &Report) {
     let s = &report.summary;
-    put!(html, "<section aria-labelledby=\"summary\">\n<h2 id=\"summary\">Summary</h2>\n<div class=\"prose\">");
     put!(
         html,
-        "<p>The paper’s parameters are taken in two readings, side by side: as printed ({}), and with one digit of <i>α</i> changed \
-         ({}), because the numbers as printed need not be the ones the pictures were made with. Each claim of the paper about a panel is held \
-         against what the run shows by one rule, the same for both readings; a claim “differs” when the run shows something else, not \
+        "<section aria-labelledby=\"summary\">\n<h2 id=\"summary\">Summary</h2>\n<div \
+            class=\"prose\">"
+    );
+    put!(
+        html,
+        "<p>The paper’s parameters are taken in two readings, side by side: as printed ({}), and \
+            with one digit of <i>α</i> changed \
+         ({}), because the numbers as printed need not be the ones the pictures were made with. \
+         Each claim of the paper about a panel is held \
+         against what the run shows by one rule, the same for both readings; a claim “differs” \
+         when the run shows something else, not \
          when the run is wrong.</p>\n</div>",
         rich(&parameters(Reading::Printed)),
         rich(&parameters(Reading::Reconstructed)),
@@ -30,25 +37,36 @@ pub(super) fn summary(html: &mut String, report: &Report) {
     put!(html, "<div class=\"cards\">");
     for reading in &s.readings {
         let title = match reading.reading {
-            Some(r) => format!("{}<br/>{}", capitalised(&format!("{} reading", r.word())), rich(&parameters(r))),
+            Some(r) => format!(
+                "{}<br/>{}",
+                capitalised(&format!("{} reading", r.word())),
+                rich(&parameters(r))
+            ),
             None => "Figures with one reading".to_owned(),
         };
         put!(
             html,
-            "<div class=\"card\">\n<h3>{}</h3>\n<p class=\"figure-of\">{} of {} <small>claims agree</small></p>",
+            "<div class=\"card\">\n<h3>{}</h3>\n<p class=\"figure-of\">{} of {} <small>claims \
+                agree</small></p>",
             title,
             reading.agree,
             reading.claims
         );
         put!(html, "<p>What its judged panels show:</p>\n<ul>");
         for found in &reading.found {
-            put!(html, "<li>{}: {}</li>", escape(&found.kind), count(found.panels, "panel", "panels"));
+            put!(
+                html,
+                "<li>{}: {}</li>",
+                escape(&found.kind),
+                count(found.panels, "panel", "panels")
+            );
         }
         put!(html, "</ul>");
         if let Some(alike) = &reading.all_alike {
             put!(
                 html,
-                "<p>All {} noise-free sections end alike ({}): where the paper says the same of one of them, that is no evidence for this \
+                "<p>All {} noise-free sections end alike ({}): where the paper says the same of \
+                    one of them, that is no evidence for this \
                  reading.</p>",
                 alike.panels,
                 escape(&alike.kind)
@@ -59,14 +77,19 @@ pub(super) fn summary(html: &mut String, report: &Report) {
     let whole = s.pictures > 0 && s.same == s.pictures && s.damaged_files == 0;
     put!(
         html,
-        "<div class=\"card\">\n<h3>Reproduced bytes {}</h3>\n<p class=\"figure-of\">{} of {} <small>pictures match the reference</small></p>\n<ul>",
+        "<div class=\"card\">\n<h3>Reproduced bytes {}</h3>\n<p class=\"figure-of\">{} of {} \
+            <small>pictures match the reference</small></p>\n<ul>",
         if whole { tag("good", "✓ all") } else { tag("bad", "! not all") },
         s.same,
         s.pictures
     );
     put!(html, "<li>{} from it</li>", count(s.different, "differs", "differ"));
     put!(html, "<li>{} without a committed reference</li>", s.without_reference);
-    put!(html, "<li>{} changed or lost since they were made</li>", count(s.damaged_files, "file", "files"));
+    put!(
+        html,
+        "<li>{} changed or lost since they were made</li>",
+        count(s.damaged_files, "file", "files")
+    );
     if s.altered > 0 {
         put!(
             html,
@@ -77,8 +100,10 @@ pub(super) fn summary(html: &mut String, report: &Report) {
     put!(html, "</ul>\n</div>");
     put!(
         html,
-        "<div class=\"card\">\n<h3>Steps between restarts</h3>\n<p class=\"figure-of\">{} of {} <small>panels by LSODA stay within \
-         NDSolve’s limit</small></p>\n<p>Mathematica’s NDSolve, whose method that was, stopped after MaxSteps = {} steps by default; each interval between \
+        "<div class=\"card\">\n<h3>Steps between restarts</h3>\n<p class=\"figure-of\">{} of {} \
+            <small>panels by LSODA stay within \
+         NDSolve’s limit</small></p>\n<p>Mathematica’s NDSolve, whose method that was, stopped \
+         after MaxSteps = {} steps by default; each interval between \
          restarts is one call.</p>\n</div>\n</div>",
         s.panels_by_ndsolves_method - s.panels_beyond_ndsolve_limit,
         s.panels_by_ndsolves_method,
@@ -117,7 +142,10 @@ pub(super) fn claims(html: &mut String, report: &Report) {
             for verdict in &picture.verdicts {
                 let found = (picture.reading, picture, verdict);
                 let line = lines.iter_mut().find(|l| {
-                    l.base == base && l.panel == verdict.panel && l.claim == verdict.claim && l.figure.id == figure.id
+                    l.base == base
+                        && l.panel == verdict.panel
+                        && l.claim == verdict.claim
+                        && l.figure.id == figure.id
                 });
                 match line {
                     Some(line) => line.found.push(found),
@@ -136,7 +164,8 @@ pub(super) fn claims(html: &mut String, report: &Report) {
         put!(html, "<p>No claim of the paper was judged in these pictures.</p>");
         return;
     }
-    let readings: Vec<Option<Reading>> = report.summary.readings.iter().map(|r| r.reading).collect();
+    let readings: Vec<Option<Reading>> =
+        report.summary.readings.iter().map(|r| r.reading).collect();
     put!(html, "<h3 id=\"claims\">The paper’s claims, panel by panel</h3>");
     table_start(html, "What the paper says and what each reading shows", "claims-table", None);
     put!(html, "<thead><tr><th scope=\"col\">Panel, and what the paper says</th>");
@@ -178,7 +207,16 @@ pub(super) fn all_verdicts(html: &mut String, report: &Report) {
         Some("sorted"),
     );
     put!(html, "<thead><tr>");
-    for head in ["Picture", "Panel", "Reading", "Method", "The paper", "Found", "Verdict", "What the run shows"] {
+    for head in [
+        "Picture",
+        "Panel",
+        "Reading",
+        "Method",
+        "The paper",
+        "Found",
+        "Verdict",
+        "What the run shows",
+    ] {
         put!(html, "<th scope=\"col\">{head}</th>");
     }
     put!(html, "</tr></thead>\n<tbody>");
@@ -188,7 +226,8 @@ pub(super) fn all_verdicts(html: &mut String, report: &Report) {
                 let altered = if picture.alterations.is_empty() { "" } else { " (altered)" };
                 put!(
                     html,
-                    "<tr><th scope=\"row\"><a href=\"#{}\">{}</a>{altered}</th><td data-sort=\"{:04}\">({})</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>\
+                    "<tr><th scope=\"row\"><a href=\"#{}\">{}</a>{altered}</th><td \
+                        data-sort=\"{:04}\">({})</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>\
                      <td data-sort=\"{}\">{}</td><td class=\"wide\">{}</td></tr>",
                     identifier(&picture.name),
                     escape(&picture.name),
