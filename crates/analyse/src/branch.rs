@@ -196,7 +196,7 @@ impl Newton {
         self.atol + self.rtol * largest(u)
     }
 
-    /// What counts as closed for the return `r` of `u`.
+    /// Largest distance that counts as closed for the return `r` of `u`.
     ///
     /// # Errors
     /// If all of it is a point.
@@ -324,7 +324,7 @@ fn largest(matrix: &[f64]) -> f64 {
     matrix.iter().fold(0.0, |a, b| b.abs().max(a))
 }
 
-/// What happens to an orbit's stability between two members of a branch.
+/// A change of an orbit's stability between two members of a branch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Change {

@@ -125,7 +125,7 @@ impl<F: VectorField<3>> WithStepper<3> for Follow<'_, F> {
     }
 }
 
-/// How well a method reproduces one crossing.
+/// Agreement of a method with the reference orbit at one crossing.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Agreement {

@@ -59,12 +59,12 @@ pub enum Error {
             events, and the return map has no derivative there"
     )]
     Grazing {
-        /// How near its neighbours were looked at.
+        /// Distance of the neighbouring orbits that were compared.
         distance: f64,
     },
 }
 
-/// What happened on the way, without when and where.
+/// The sequence of events on the way, without times and places.
 type Itinerary = Vec<(std::mem::Discriminant<EventKind>, Option<Mode>, Option<Mode>)>;
 
 /// Watches for crossings and set-valued moments.

@@ -36,7 +36,7 @@ pub struct ConvergenceQuestion {
     pub times: Vec<f64>,
     /// The smoothing parameters (tanh).
     pub eps: Vec<f64>,
-    /// How the Filippov orbit is computed; its tolerance is that of the smoothed orbits too.
+    /// Options of the Filippov orbit; its tolerance is that of the smoothed orbits too.
     pub settings: FilippovOptions,
 }
 
@@ -169,7 +169,7 @@ pub struct AfterVisitQuestion {
     pub refinements: usize,
     /// Exit times of a refinement, at least 3.
     pub finer: usize,
-    /// How Filippov orbits are computed.
+    /// Options of the Filippov orbits.
     pub settings: FilippovOptions,
 }
 

@@ -113,7 +113,7 @@ pub fn contrast(
     })
 }
 
-/// What a cell is.
+/// The kind of a cell.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Place {
     Island,

@@ -46,14 +46,14 @@ pub struct Cycle {
     pub captured_at: f64,
     /// From this time on every point is within a dot's size of its centre, if that has happened.
     pub settled_at: Option<f64>,
-    /// How fast the distance from the cycle shrinks, where that could be fitted.
+    /// Rate at which the distance from the cycle shrinks, where it could be fitted.
     pub approach: Option<Rate>,
     /// Mean angle of the motion around the cycle per turn, in full circles, in (-1/2, 1/2]; absent
     /// when the points lie on a line or within rounding of the centre.
     pub rotation: Option<f64>,
 }
 
-/// What a run settles on, judged from its section.
+/// The attractor of a run, judged from its section.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Verdict {
