@@ -39,7 +39,7 @@ pub struct EnsembleRun<const N: usize> {
     pub options: DriveOptions,
 }
 
-/// How one run ended.
+/// The end of one run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct End<O, const N: usize> {
     /// The summary, as [`drive`](super::drive) returns it.
@@ -117,7 +117,7 @@ impl Carried<'_> {
 /// The instruction set in which lanes are computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InstructionSet {
-    /// What the program was compiled for, one lane.
+    /// The instructions that the program was compiled for, one lane.
     Portable,
     /// AVX2, four lanes an instruction.
     Avx2,
@@ -356,7 +356,7 @@ impl<E: BatchedField<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize, cons
     }
 }
 
-/// What a lane's run needs besides its numbers.
+/// Data of a lane's run besides its numbers.
 struct Lane<O, const N: usize> {
     run: usize,
     options: DriveOptions,
@@ -459,7 +459,7 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
         }
     }
 
-    /// What is a run's own besides its options, for lane `l`.
+    /// Data of a run besides its options, for lane `l`.
     fn give(&mut self, l: usize, numbers: &[f64], corner: Option<&SVector<f64, N>>) {
         for (of_lanes, number) in self.numbers.iter_mut().zip(numbers) {
             put(&mut of_lanes.0, l, *number);

@@ -437,7 +437,7 @@ impl Gates {
     }
 }
 
-/// What was missed in a step: from and to which fraction of it.
+/// A missed part of a step, as fractions of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Missed {
     from: f64,
@@ -601,14 +601,14 @@ const STEPS_THROUGH: f64 = 16.0;
 /// A structure of this part of the time is too short for steps.
 const SHORTEST: f64 = 1e-12;
 
-/// How far a method goes, and with how long steps.
+/// End time and longest step of a method.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stage {
     pub(super) end: f64,
     pub(super) max_step: f64,
 }
 
-/// How a method comes to the end of what it was asked for.
+/// The approach of a method to the end of its interval.
 #[derive(Clone, Debug)]
 pub(super) struct Stages {
     asked: Stage,

@@ -288,7 +288,7 @@ fn smallest(f: &dyn Fn(f64) -> f64, mut a: f64, mut b: f64, sign: f64) -> (f64, 
     if fc < fd { (c, sign * fc) } else { (d, sign * fd) }
 }
 
-/// How a function begins at the left end of an interval, for [`first_zero`].
+/// The behaviour of a function at the left end of an interval, for [`first_zero`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Start {
     /// Not zero there.
@@ -417,7 +417,7 @@ const AFTER_TANGENCY: f64 = 1.5e-8;
 /// Enclosures made for one step at most.
 const MOST_PIECES: usize = 50_000;
 
-/// What [`scan`] found first.
+/// The first finding of [`scan`].
 enum Scan {
     Nothing,
     /// The function changes sign between these two fractions.

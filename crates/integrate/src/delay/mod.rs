@@ -113,7 +113,7 @@ pub enum DelayError {
     NoHistory {
         /// When; not above zero.
         t: f64,
-        /// What happens there.
+        /// The reason.
         what: String,
     },
 }
@@ -273,7 +273,7 @@ pub(super) trait Cuttable<const N: usize> {
     fn at(&self, theta: Self::Number) -> SVector<Self::Number, N>;
     /// Ends the last step at the time `end` within it.
     fn cut(&mut self, end: Self::Number);
-    /// What it has done.
+    /// Its statistics.
     fn statistics(&self) -> &Statistics;
 }
 
@@ -322,7 +322,7 @@ pub enum LateSwitch {
     Relay {
         /// Half the width of the band, above zero.
         band: f64,
-        /// What it begins with inside the band.
+        /// The field with which it begins inside the band.
         inside: Inside,
     },
 }
@@ -411,7 +411,7 @@ impl<'a, P: PiecewiseSmooth<N> + Clone, const N: usize> Delayed<'a, P, N> {
         }
     }
 
-    /// What the smooth rule is described by, if this is one.
+    /// Layer, delay and history of a smooth rule, if this is one.
     fn smooth(&self) -> Option<((Transition, f64), f64, History)> {
         match self.switch {
             LateSwitch::Delayed { delay, smooth, history } => {

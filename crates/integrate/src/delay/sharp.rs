@@ -24,7 +24,7 @@ struct Coming<S> {
     /// From when on.
     at: S,
     plus: bool,
-    /// What a disturbance makes of it.
+    /// The effect of a disturbance on it.
     shift: Shift,
 }
 
@@ -66,7 +66,7 @@ pub(super) struct Sharp<'a, P, M: Cuttable<N>, const N: usize> {
 const KEPT: f64 = 0.5;
 /// So much longer than need be a step is asked to be.
 const LONGER: f64 = 1.02;
-/// How long a mode may last compared with the time before, as a first guess.
+/// First guess of the longest duration of a mode, relative to the time before.
 const AS_BEFORE: f64 = 1.25;
 
 impl<'a, P: PiecewiseSmooth<N> + Clone, M: Cuttable<N>, const N: usize> Sharp<'a, P, M, N> {
@@ -230,7 +230,7 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
         time(b)
     }
 
-    /// What a disturbance makes of a passage at the fraction `theta` of the last step.
+    /// The effect of a disturbance on a passage at the fraction `theta` of the last step.
     fn shift(&self, theta: f64) -> Shift {
         let at = || self.methods[usize::from(self.plus)].last().at(theta);
         self.carry.map_or_else(Shift::default, |carry| carry.shift(&at(), self.plus))

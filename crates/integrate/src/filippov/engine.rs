@@ -84,7 +84,7 @@ pub(super) struct Origin<const N: usize> {
     pub departure: Departure<N>,
 }
 
-/// What is known of a run's start.
+/// Data about a run's start.
 #[derive(Clone, Debug)]
 pub(super) enum Departure<const N: usize> {
     /// Wherever the state is.
@@ -208,7 +208,7 @@ pub(super) fn up_to(t_end: f64, t: f64) -> f64 {
     if t_end - t <= LIMITS.end * t_end.abs() { t_end } else { t }
 }
 
-/// How a flight begins: what is known of the growth of |h|.
+/// The beginning of a flight: the known growth of |h|.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum FlightStart {
     /// Off the surface.
@@ -522,7 +522,7 @@ fn flight(side: Side) -> String {
     format!("flight to h {} 0", if side == Side::Plus { ">" } else { "<" })
 }
 
-/// What ended a stretch of sliding within a step.
+/// The event that ended a stretch of sliding within a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum SlidingEnd {
     /// L+h (`Plus`) or L-h (`Minus`) came to zero.

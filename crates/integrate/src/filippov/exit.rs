@@ -58,7 +58,7 @@ impl SlidingLaw {
     }
 }
 
-/// How an orbit leaves repelling sliding.
+/// The rule by which an orbit leaves repelling sliding.
 ///
 /// In the repelling region sliding may end at any moment, to either side: Filippov's equation has
 /// all these solutions (Filippov 1988, sec. 10), and a passage through a two-fold puts every orbit
@@ -188,7 +188,7 @@ impl ExitRule {
     }
 }
 
-/// What a rule says about one stretch of repelling sliding.
+/// The decision of a rule about one stretch of repelling sliding.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ExitPlan {
     pub side: Side,

@@ -68,7 +68,7 @@ fn cross<S: Elementary>(a: &[S; 2], b: &[S; 2]) -> S {
     a[0] * b[1] - a[1] * b[0]
 }
 
-/// What may follow at a point of the intersection.
+/// A possible continuation at a point of the intersection.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Continuation<const N: usize> {
     /// Flight with the field of this number.

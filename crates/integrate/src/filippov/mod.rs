@@ -103,7 +103,7 @@ impl From<Side> for Mode {
     }
 }
 
-/// What happened at an event.
+/// The kind of an event.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", tag = "kind")]
 pub enum EventKind {
@@ -177,7 +177,7 @@ pub struct ModeEvent<const N: usize> {
     pub t: f64,
     /// Where; on the surface.
     pub state: SVector<f64, N>,
-    /// What happened.
+    /// Its kind.
     pub kind: EventKind,
     /// The mode before; `None` at the start of a run.
     pub from: Option<Mode>,
@@ -316,7 +316,7 @@ pub enum FilippovError {
         t: f64,
         /// State reached.
         state: Vec<f64>,
-        /// What vanishes.
+        /// The quantity that vanishes.
         what: &'static str,
     },
     /// Several motions are possible, and nothing says which is followed.
@@ -326,7 +326,7 @@ pub enum FilippovError {
         t: f64,
         /// State reached.
         state: Vec<f64>,
-        /// What could be chosen.
+        /// The possible choices.
         choice: Box<Choice>,
     },
     /// The switching function is not continuous along the motion.
@@ -393,12 +393,12 @@ pub struct Choice {
     pub remedy: &'static str,
 }
 
-/// What helps where an exit rule can choose.
+/// Advice where an exit rule can choose.
 const CHOOSE: &str = "Nothing is chosen silently: say which is followed by --exit, such as \
     at-once:plus, after-time:0.3:minus, after-arc:0.2:plus, random:exponential:0.5, or all; or end \
     the run before (--t-end)";
 
-/// What helps where no rule can choose.
+/// Advice where no rule can choose.
 const WITHOUT_CHOICE: &str = "Nothing is chosen here: end the run before that time (--t-end), \
     start elsewhere (--start), change a parameter (--set), or smooth the switches (--switch \
     smoothed)";

@@ -47,7 +47,7 @@ const END_OF_SPIRAL: f64 = 1e-4;
 /// intersection.
 const SLID: f64 = 100.0;
 
-/// What the next part of a run is.
+/// The next part of a run.
 enum Part<const N: usize> {
     /// A run of the one-surface engine on surface `active`, on the side `beyond` of the other.
     Face {
@@ -61,7 +61,7 @@ enum Part<const N: usize> {
     Intersection(Box<Mixture<N>>),
 }
 
-/// What the first event of a part is called.
+/// The kind of a part's first event.
 #[derive(Clone, Copy, Debug)]
 enum First {
     /// As the engine says.
@@ -239,7 +239,7 @@ where
     }
 }
 
-/// How a run came to the intersection.
+/// The way in which a run came to the intersection.
 #[derive(Clone, Copy, Debug)]
 struct Arrival {
     mode: Mode,
@@ -300,7 +300,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> SurfacesRun<'_, P, N> {
         self.observer.event(&ModeEvent { t: self.t, state: self.x, kind, from, to: Some(to) })
     }
 
-    /// What follows at the intersection; `None`, if the run starts there.
+    /// The continuation at the intersection; `None` if the run starts there.
     fn decide(&mut self, arrival: Option<Arrival>) -> Result<Part<N>, FilippovError> {
         let mut found = continuations(self.faces, &self.x);
         match found.as_slice() {

@@ -11,7 +11,7 @@ use twofold_num::elementary::tanh;
 use twofold_num::{Given, Registers};
 use twofold_system::VectorField;
 
-/// How many parts of a layer are gone through side by side.
+/// Number of parts of a layer that are computed side by side.
 pub(super) const PARTS: usize = 8;
 
 /// A number for each part.

@@ -49,7 +49,7 @@ const BEYOND: f64 = 1.0;
 /// Jorba & Zou (2005), sec. 3: the step is shortened by exp(-0.7/(p - 1)) for safety.
 const SAFETY_EXPONENT: f64 = -0.7;
 
-/// How often the parts of the layer may be halved before the layer is left to the other method.
+/// Maximum number of halvings of the layer's parts, after which the other method is used.
 const HALVINGS: u32 = 5;
 
 /// Whether the equation on `tape` can be integrated by [`Layered`].
@@ -98,7 +98,7 @@ pub struct Layered<const N: usize> {
     sliding: Sliding,
 }
 
-/// What is known of an equation.
+/// Data about an equation.
 #[derive(Clone)]
 struct Equation<const N: usize> {
     tape: Arc<Tape>,
@@ -371,7 +371,7 @@ impl<const N: usize> Layered<N> {
         Ok(Some(Made::Arc))
     }
 
-    /// What an orbit in the layer at `u` does: crosses if u moves the same way whatever tanh is.
+    /// The motion in the layer at `u`: crossing if u moves the same way for every value of tanh.
     fn arrived<F: VectorField<N>>(&mut self, field: &F, u: f64) -> Place {
         let crosses = self.equation.as_ref().is_some_and(|equation| equation.layer.is_some());
         let [minus, plus] = self.speeds(field);
