@@ -181,11 +181,11 @@ pub struct ColumnHeading {
     pub name: String,
     /// Its unit, "1" for a pure number.
     pub unit: String,
-    /// What it holds.
+    /// The kind of its cells.
     pub kind: ColumnKind,
 }
 
-/// What a file of this table says about itself.
+/// The description of this table in its file.
 pub(super) fn heading(table: &Table, about: &Value) -> Heading {
     Heading {
         made_by: concat!("twofold ", env!("CARGO_PKG_VERSION")).to_owned(),
@@ -253,7 +253,7 @@ pub fn csv_tail(table: &Table, about: &Value) -> Vec<u8> {
     bytes
 }
 
-/// What is between them: a line for each row.
+/// The lines between them, one for each row.
 pub fn csv_rows(table: &Table) -> Vec<u8> {
     csv_rows_after(Vec::new(), table)
 }
@@ -301,7 +301,7 @@ fn quoted(cells: &Cells) -> Vec<Vec<u8>> {
     words.vocabulary.iter().map(quote).collect()
 }
 
-/// What the CSV file of a run says of itself: it is written before it is known how the run ends.
+/// The description of a run in its CSV file, written before the run has ended.
 pub fn about_run(run: &dyn Question) -> Value {
     json!({ "kind": run.kind(), "question": run.json() })
 }

@@ -44,7 +44,7 @@ use super::table::{Column, Entry, Table};
 pub struct GeneralRun {
     /// The system.
     pub model: Model,
-    /// How it is followed.
+    /// Options of the run.
     pub options: Options,
 }
 
@@ -387,7 +387,7 @@ impl Question for GeneralExponents {
     }
 }
 
-/// How the state at the end of a run changes with the start and with parameters.
+/// Derivatives of the state at the end of a run by the start and by parameters.
 #[derive(Clone, Debug)]
 pub struct GeneralSensitivities {
     /// System, start, times and method.
@@ -476,7 +476,7 @@ pub struct Resting {
     pub family: Option<Family>,
     /// Real and imaginary parts.
     pub eigenvalues: Vec<[f64; 2]>,
-    /// What its eigenvalues say: "attracts", "saddle" ...
+    /// Its stability by the eigenvalues: "attracts", "saddle" ...
     pub kind: String,
     /// An event that changes motion before it comes to the rest.
     #[serde(default, skip_serializing_if = "Option::is_none")]

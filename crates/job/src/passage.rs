@@ -106,7 +106,7 @@ impl TwoFoldPassage {
 pub struct Leaving {
     /// The system; three states, the first one its switching function.
     pub system: System,
-    /// How it switches; not Filippov's motion, of which leaving is not a property.
+    /// The switching rule; not Filippov's motion, for which leaving is not defined.
     pub switch: SwitchSpec,
     /// The runs: their starts and what happens around them.
     pub runs: Vec<([f64; 3], Schedule)>,

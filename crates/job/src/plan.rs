@@ -25,7 +25,7 @@ struct Task {
     question: AnyQuestion,
     /// Tasks that rest on this one.
     followers: Vec<usize>,
-    /// How many unfinished ones it rests on.
+    /// Number of its unfinished dependencies.
     waits_for: AtomicUsize,
     rank: usize,
 }

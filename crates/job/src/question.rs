@@ -25,7 +25,7 @@ pub const NUMERICS: &str = env!("TWOFOLD_NUMERICS");
 /// the thread that asks it and starts no others: parallel is only what is asked side by side
 /// ([`Executor::gather`]).
 pub trait Question: fmt::Debug + Send + Sync {
-    /// What kind of computation it is: "run".
+    /// The kind of computation: "run".
     fn kind(&self) -> &'static str;
 
     /// Every number that the answer depends on.

@@ -63,7 +63,7 @@ pub struct Basin {
     pub cells: Vec<(usize, usize)>,
 }
 
-/// What a scan found.
+/// The result of a scan.
 #[derive(Debug)]
 pub struct Scanned {
     /// Over one setting `passages`, a row a crossing; over two `endings`, a row a run.
@@ -81,14 +81,14 @@ pub struct Scanned {
 /// Maximum number of runs of a scan, whose rows are kept in memory.
 pub const MOST_RUNS: u64 = 1_000_000;
 
-/// What a run ends on, and where that is.
+/// The attractor of a run, and its place.
 #[derive(Clone, Debug, PartialEq)]
 struct Landing {
     word: String,
     place: Vec<Vec<f64>>,
 }
 
-/// What is kept of a run.
+/// Data kept of a run.
 struct Found {
     settings: Vec<Entry>,
     /// Late crossings: time and state.

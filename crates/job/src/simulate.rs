@@ -90,7 +90,7 @@ pub fn answer(spec: &RunSpec, monitor: &dyn Monitor) -> Result<Answer, JobError>
 
 const UP_TO_EIGHT: &str = "runs are computed with up to eight states";
 
-/// How a streamed run ended.
+/// The end of a streamed run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Streamed {
     /// Final time.
@@ -136,7 +136,7 @@ pub fn stream(
 /// Receives parts of a recording; says whether more is wanted.
 type Sink<'a, const D: usize> = &'a mut dyn FnMut(Data<D>) -> bool;
 
-/// What looks on while a recording grows.
+/// Receivers of a growing recording.
 struct Aside<'a, const D: usize> {
     /// Takes parts of it away; without one everything is kept.
     sink: Option<Sink<'a, D>>,
@@ -427,7 +427,7 @@ fn discontinuous<P: Motions<D> + ?Sized, const D: usize>(
     }
 }
 
-/// How a Filippov run is made.
+/// Options of a Filippov run.
 fn settings(spec: &RunSpec) -> filippov::FilippovOptions {
     filippov::FilippovOptions {
         tolerance: spec.method.tolerance,

@@ -40,7 +40,7 @@ use twofold_system::{Field, Relaxation, System, Transition};
 pub struct RunSpec {
     /// The piecewise-smooth system.
     pub system: System,
-    /// How the switch at h = 0 is modelled.
+    /// The model of the switch at h = 0.
     pub switch: SwitchSpec,
     /// Initial state, one number for each of the system's.
     pub start: Vec<f64>,
@@ -50,11 +50,11 @@ pub struct RunSpec {
     pub method: MethodSpec,
     /// Restarts and kicks.
     pub schedule: Schedule,
-    /// What is recorded.
+    /// The observation.
     pub observe: Observation,
 }
 
-/// What stands in for the discontinuity.
+/// The model of the switch: smoothed, hysteretic, delayed, a relay, or discontinuous.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum SwitchSpec {
@@ -96,7 +96,7 @@ pub enum SwitchSpec {
     Relay {
         /// Half the width of the band.
         band: f64,
-        /// What the run begins with if it starts inside the band.
+        /// The field with which a run begins inside the band.
         #[serde(default)]
         inside: Inside,
     },
@@ -227,7 +227,7 @@ pub fn finest_extended(bits: u16) -> f64 {
     }
 }
 
-/// What is recorded of a run.
+/// The observation of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Observation {

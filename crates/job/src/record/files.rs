@@ -23,7 +23,7 @@ use super::Hash;
 #[derive(Debug, thiserror::Error)]
 #[error("cannot {action} {}: {source}", path.display())]
 pub struct FileError {
-    /// What was tried.
+    /// The operation that failed.
     pub action: &'static str,
     /// On which path.
     pub path: PathBuf,

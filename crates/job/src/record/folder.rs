@@ -13,7 +13,7 @@ use super::files::{self, FileError};
 pub struct FileBytes {
     /// Its path inside the folder, with forward slashes.
     pub path: String,
-    /// What is in it.
+    /// Its content.
     pub bytes: Vec<u8>,
 }
 
@@ -38,7 +38,7 @@ pub struct Tree {
     pub dangling: Vec<String>,
 }
 
-/// How deep folders are looked into: a figure's files are one folder down.
+/// Maximum depth of folders: a figure's files are one folder down.
 const DEPTH: usize = 4;
 
 /// The most that is read of a folder: all full-length figures have some 250 MB.

@@ -68,9 +68,9 @@ pub struct PanelEntry {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct VerdictEntry {
-    /// What is claimed.
+    /// The claim.
     pub claim: String,
-    /// What was found.
+    /// The finding.
     pub found: String,
     /// Whether they agree.
     pub agrees: bool,
@@ -82,11 +82,11 @@ pub struct VerdictEntry {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Layer {
-    /// What was asked.
+    /// The question.
     Spec,
     /// The numbers.
     Data,
-    /// What the numbers are held to mean.
+    /// The interpretation of the numbers.
     Verdict,
     /// The decoded picture.
     Pixels,
@@ -121,7 +121,7 @@ pub enum ManifestError {
     Syntax {
         /// Where it came from.
         name: String,
-        /// What the parser met.
+        /// The parser's message.
         source: serde_json::Error,
     },
     /// Another format version.
@@ -143,7 +143,7 @@ pub enum ManifestError {
     Name {
         /// Where it came from.
         name: String,
-        /// What it names so.
+        /// The kind of thing named.
         bad: String,
     },
     /// Two entries for one picture.

@@ -59,7 +59,7 @@ pub struct Outcome {
 /// An outcome with its place, which distinguishes attractors of one kind.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ending {
-    /// What the run settles on.
+    /// The outcome.
     pub outcome: Outcome,
     /// The points of a closed orbit in the plane of the section, in the order of the motion, or the
     /// state at rest; else nothing.
@@ -197,7 +197,7 @@ impl OutcomeQuestion {
         }
     }
 
-    /// What the run settles on, and where.
+    /// The outcome and its place.
     ///
     /// # Errors
     ///

@@ -128,7 +128,7 @@ impl Row {
         self.number
     }
 
-    /// How it ended, in a word.
+    /// Its outcome, in a word.
     pub fn outcome(&self) -> &str {
         self.cell_from_last(15).word()
     }
@@ -294,7 +294,7 @@ impl Rows {
         shard.rows(&self.sweep).filter(move |row| !there.contains(row))
     }
 
-    /// How many [`Rows::missing`] are.
+    /// Number of [`Rows::missing`].
     pub fn missing_count(&self, shard: Shard) -> u64 {
         shard.count(&self.sweep) - self.lines.keys().filter(|row| shard.has(**row)).count() as u64
     }
