@@ -144,7 +144,7 @@ impl DoubleDouble {
         self.high
     }
 
-    /// What [`DoubleDouble::high`] leaves out.
+    /// The part that [`DoubleDouble::high`] leaves out.
     #[inline]
     pub const fn low(self) -> f64 {
         self.low

@@ -376,7 +376,7 @@ impl Sum {
 /// Puts sums into the order in which they can be computed.
 struct Writer<'a> {
     reduced: &'a Reduced,
-    /// How often each quantity is wanted.
+    /// Number of uses of each quantity.
     wanted: Vec<usize>,
     /// Factors that have become series.
     places: Vec<(Affine, usize)>,

@@ -30,7 +30,7 @@ type Series = usize;
 /// A series of [`Recurrence::Weighted`].
 type Weights = usize;
 
-/// How the coefficients of one series come from others.
+/// The recurrence of one series: its coefficients from those of others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Recurrence<S> {
     Constant(S),
@@ -87,7 +87,7 @@ impl<S: Elementary> Recurrence<S> {
     }
 }
 
-/// What an equation's constants and parameters, given in decimal, stand for.
+/// The interpretation of an equation's constants and parameters, given in decimal.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Constants {
     /// The nearest `f64`, and terms without variables are computed in `f64`: the same equation that
@@ -108,7 +108,7 @@ pub enum LayerKind {
     Erf,
 }
 
-/// How an operation fails to be analytic somewhere, or to show far away what it does near by.
+/// The way in which an operation is not analytic, or nearly constant far from a structure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MarkKind {
     /// A sign: jumps where its argument changes sign.

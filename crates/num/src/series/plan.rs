@@ -323,7 +323,7 @@ fn tanh<S: Elementary>(table: &mut impl Table<S>, a: S, weights: Weights, to: Se
     u
 }
 
-/// What the coefficients of a series are from degree 1 on.
+/// The kind of a series' coefficients from degree 1 on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Tail {
     /// Computed.
@@ -385,7 +385,7 @@ impl<S: Elementary> SeriesPlan<S> {
     }
 }
 
-/// What is known of all series before anything is computed.
+/// Properties of all series that are known in advance.
 struct Tails {
     of: Vec<Tail>,
     /// Whether coefficients from degree 1 on are sums that began with zero, which are never
