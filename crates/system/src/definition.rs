@@ -666,7 +666,7 @@ impl std::fmt::Display for Place {
     }
 }
 
-/// What is wrong with a document.
+/// An error of a document.
 struct Problem {
     place: Place,
     /// An expression's text and the part of it that is wrong.

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::ops::Range;
 
-/// What is wrong in a text, where, and what to do.
+/// An error in a text: its message, its place, and advice.
 ///
 /// ```text
 /// unknown name `alhpa`
@@ -15,7 +15,7 @@ use std::ops::Range;
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Diagnostic {
-    /// What is wrong.
+    /// The message.
     pub message: String,
     /// Where: a file's name, or words such as `component y of f+`.
     pub origin: String,
@@ -23,7 +23,7 @@ pub struct Diagnostic {
     pub line: usize,
     /// Column in characters, from 1.
     pub column: usize,
-    /// What to do.
+    /// Advice.
     pub help: Option<String>,
     /// The line in which the error is, shortened if it is long.
     excerpt: String,

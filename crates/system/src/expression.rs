@@ -298,15 +298,15 @@ pub enum Expression {
     Not(Box<Expression>),
 }
 
-/// What is wrong with an expression, and where in its text.
+/// An error of an expression, and its place in the text.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{message}")]
 pub struct ExpressionError {
-    /// What is wrong.
+    /// The message.
     pub message: String,
     /// Where: bytes of the expression's text.
     pub span: Range<usize>,
-    /// What to do.
+    /// Advice.
     pub help: Option<String>,
 }
 
@@ -452,7 +452,7 @@ impl Expression {
         }
     }
 
-    /// How tightly the expression holds together.
+    /// The precedence of the expression's outermost operation.
     fn level(&self) -> u8 {
         match self {
             Expression::Or(..) => 1,
@@ -468,7 +468,7 @@ impl Expression {
     }
 }
 
-/// How tightly sums, products, signs and atoms hold together.
+/// Precedences of sums, products, signs and atoms.
 const SUM: u8 = 5;
 const PRODUCT: u8 = 6;
 const SIGN: u8 = 7;

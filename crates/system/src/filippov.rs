@@ -11,7 +11,7 @@ use super::{PiecewiseSmooth, variables};
 use twofold_num::elementary::sqrt;
 use twofold_num::{Dual, Elementary};
 
-/// What happens at a point of the surface h = 0.
+/// The kind of motion at a point of the surface h = 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Region {
@@ -99,7 +99,7 @@ pub fn sliding_field<P: PiecewiseSmooth<N>, S: Elementary, const N: usize>(
     SVector::from_fn(|i, _| minus[i] + (plus[i] - minus[i]) * lambda)
 }
 
-/// How a field is tangent to the surface at a fold, seen from its own side.
+/// The tangency of a field to the surface at a fold, seen from its own side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Visibility {

@@ -8,7 +8,7 @@ use super::{PiecewiseSmooth, VectorField};
 use twofold_num::tape::Recorded;
 use twofold_num::{Arithmetic, Elementary};
 
-/// How eq. (10)'s two divisions by eps' are read.
+/// The reading of eq. (10)'s two divisions by eps'.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Relaxation {

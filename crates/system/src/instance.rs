@@ -62,7 +62,7 @@ pub enum ParameterError {
     Unknown {
         /// The name.
         name: String,
-        /// What to do.
+        /// Advice.
         help: String,
     },
     /// The value is outside what the definition allows.
@@ -72,7 +72,7 @@ pub enum ParameterError {
         name: String,
         /// The value.
         value: String,
-        /// What it must be.
+        /// The allowed range.
         rule: String,
         /// The parameter's meaning, in brackets, if it has one.
         meaning: String,
@@ -191,7 +191,7 @@ impl System {
         Self::made(self.definition, values)
     }
 
-    /// What the system is, apart from its parameters' values.
+    /// The definition of the system, without its parameters' values.
     pub fn definition(&self) -> &Definition {
         &self.definition
     }
