@@ -60,11 +60,11 @@ pub enum CliError {
     /// No panel of that name.
     #[error("there is no panel \"{panel}\" in {figure}; choose one of {known}")]
     NoSuchPanel {
-        /// What was asked for.
+        /// The name that was asked for.
         panel: String,
         /// The figure.
         figure: String,
-        /// What there is.
+        /// The names that exist.
         known: String,
     },
     /// A wrong number.
@@ -86,7 +86,7 @@ pub enum CliError {
         #[from]
         source: FileError,
     },
-    /// What was computed anew is not what was there.
+    /// A recomputed result differs from the kept one.
     #[error("{0}")]
     Differs(String),
     /// Threads could not be started.
@@ -103,7 +103,7 @@ pub enum CliError {
     /// The user asked to stop; finished results are kept.
     #[error("{said}")]
     Stopped {
-        /// What was kept, and where.
+        /// The results that were kept, and their place.
         said: String,
         /// By which signal.
         exit: Exit,
@@ -139,7 +139,7 @@ impl CliError {
     }
 }
 
-/// What to do about a place that cannot be used.
+/// Advice about a place that cannot be used.
 fn advice(error: &FileError) -> &'static str {
     if error.action == "read" || error.action == "list" {
         return "";

@@ -196,7 +196,7 @@ pub fn make(
 
 /// A picture that is there.
 struct Made {
-    /// What is known about it.
+    /// Its record.
     record: PictureRecord,
     /// Whether it was drawn by this call, and did not stand there already.
     anew: bool,

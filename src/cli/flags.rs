@@ -201,7 +201,7 @@ pub enum Switch {
     Filippov,
 }
 
-/// What a command makes of a run.
+/// The use that a command makes of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Use {
     /// `twofold run`: the path, or crossings if a section is given.

@@ -341,7 +341,7 @@ fn section(text: &str, model: &Model) -> Result<Expression, CliError> {
     Ok(Expression::Sub(Box::new(left), Box::new(right)))
 }
 
-/// What a failed run says under the command line.
+/// The error of a failed run.
 pub fn failed(error: HybridError) -> CliError {
     match error {
         HybridError::Equation(_) | HybridError::Start(_) | HybridError::Bad(_) => {

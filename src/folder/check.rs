@@ -135,7 +135,7 @@ enum Take {
     Count,
 }
 
-/// What is checked.
+/// The check.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "check", rename_all = "kebab-case")]
 enum Check {
@@ -188,7 +188,7 @@ pub struct Verdict {
     pub data: Hash,
     /// Whether the claim holds.
     pub agrees: bool,
-    /// What was found.
+    /// The finding.
     pub found: String,
     /// Repeated runs in which it holds, and all of them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -497,7 +497,7 @@ fn start(source: &Source) -> Result<Vec<f64>, FolderError> {
     }
 }
 
-/// What a claim reads of its first source.
+/// The number that a claim reads of its first source.
 fn reading(origin: &Origin, place: &Range<usize>, c: &ClaimFile) -> Result<Read, FolderError> {
     let wrong = |at: Range<usize>, why: String, help: &str| {
         FolderError::at(origin, at, why, Some(help.to_owned()))
@@ -784,7 +784,7 @@ fn period(points: &[Vec<f64>], within: f64) -> Option<usize> {
         .find(|n| points.iter().zip(&points[*n..]).all(|(a, b)| distance(a, b) <= near))
 }
 
-/// How far two sets of points lie apart (Hausdorff's distance), relative to their extent.
+/// Hausdorff's distance of two sets of points, relative to their extent.
 fn apart(a: &[Vec<f64>], b: &[Vec<f64>]) -> Result<f64, String> {
     if a[0].len() != b[0].len() {
         return Err("the two sections have other states".into());

@@ -50,7 +50,7 @@ pub enum State {
     Same,
     /// Another outcome, data or rule.
     Differs {
-        /// What differs.
+        /// The difference.
         what: String,
     },
     /// Nothing is expected yet.
@@ -157,7 +157,7 @@ impl Folder {
         Ok(path)
     }
 
-    /// What was made against what is expected, pictures first.
+    /// Compares the results with the expectation, pictures first.
     ///
     /// # Errors
     /// If a file of `expected/` cannot be read.

@@ -803,7 +803,7 @@ impl Folder {
         Ok(Points { name: name.clone(), points: found })
     }
 
-    /// What is called so.
+    /// The thing that is named.
     fn source(&self, origin: &Origin, name: &Spanned<String>) -> Result<&Source, FolderError> {
         self.sources.get(name.get_ref()).ok_or_else(|| {
             let known: Vec<&str> = self.sources.keys().map(String::as_str).collect();

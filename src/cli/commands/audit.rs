@@ -55,7 +55,7 @@ pub struct Arguments {
 /// The sweeps of a file or figure, by name.
 type Sweeps = Vec<(String, Rows)>;
 
-/// What came of it.
+/// The result.
 struct Report {
     name: String,
     recomputed: usize,

@@ -42,7 +42,7 @@ pub struct Arguments {
     quiet: bool,
 }
 
-/// What was found of one picture, or of a figure's manifest.
+/// The finding about one picture, or about a figure's manifest.
 #[derive(Debug, Serialize)]
 struct Finding {
     /// The picture, or the figure if its manifest cannot be used.

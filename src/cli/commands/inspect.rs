@@ -31,7 +31,7 @@ pub struct Arguments {
     json: bool,
 }
 
-/// How the seal stands.
+/// The state of the seal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 enum Seal {
@@ -45,7 +45,7 @@ enum Seal {
     Absent,
 }
 
-/// How the file stands to the committed manifests.
+/// The comparison of the file with the committed manifests.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(tag = "state", rename_all = "kebab-case")]
 enum Committed {

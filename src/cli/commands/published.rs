@@ -14,7 +14,7 @@ use crate::paper::pipeline::{Computed, compute, pixel_hash, questions};
 use crate::record::{FileBytes, Hash, read_tree};
 use crate::render::{decode_png, png_size};
 
-/// What was found of one of their files, or of one of our pictures that they do not have.
+/// The finding about one of their files, or about one of our pictures that they do not have.
 #[derive(Debug, Serialize)]
 struct Finding {
     /// The file's path in their folder; our picture's name if there is none.
@@ -26,7 +26,7 @@ struct Finding {
     criterion: Option<Criterion>,
     /// In words.
     found: String,
-    /// How the two differ, where that could be measured.
+    /// The difference of the two, where it could be measured.
     comparison: Option<Comparison>,
 }
 
