@@ -493,3 +493,64 @@ fn a_type_name_that_stood_for_several_things_stands_for_one() {
     }
     assert_eq!(defined.len(), 1, "the test sees definitions: {defined:?}");
 }
+
+/// Public items that a user begins with, by file: each has an example in its documentation, which
+/// `cargo test --doc` runs.
+const EXAMPLES: [(&str, &[&str]); 30] = [
+    ("num/src/dual.rs", &["struct Dual"]),
+    ("num/src/double_double.rs", &["struct DoubleDouble"]),
+    ("num/src/multi.rs", &["struct MultiFloat"]),
+    ("num/src/interval.rs", &["struct Interval"]),
+    ("num/src/random.rs", &["struct RandomStream"]),
+    ("system/src/lib.rs", &["trait VectorField", "trait PiecewiseSmooth"]),
+    ("system/src/definition.rs", &["fn from_toml"]),
+    ("system/src/instance.rs", &["struct System", "fn builtin"]),
+    ("system/src/field.rs", &["struct Field"]),
+    ("system/src/smoothed.rs", &["struct Smoothed"]),
+    ("system/src/filippov.rs", &["fn sliding_field", "fn two_fold"]),
+    ("integrate/src/lsoda/mod.rs", &["struct Lsoda"]),
+    ("integrate/src/taylor.rs", &["struct Taylor"]),
+    ("integrate/src/layered/mod.rs", &["struct Layered"]),
+    ("integrate/src/filippov/engine.rs", &["fn run"]),
+    ("integrate/src/filippov/surfaces.rs", &["fn run_two_surfaces"]),
+    ("integrate/src/filippov/funnel.rs", &["fn funnel"]),
+    ("integrate/src/delay/mod.rs", &["struct Delayed"]),
+    ("analyse/src/section.rs", &["struct SectionRecorder"]),
+    ("analyse/src/path.rs", &["struct PathRecorder", "struct TimesRecorder"]),
+    ("analyse/src/motion.rs", &["struct MotionRecorder"]),
+    ("analyse/src/lyapunov.rs", &["fn largest"]),
+    ("analyse/src/floquet.rs", &["fn closed_orbit"]),
+    ("analyse/src/branch.rs", &["fn follow"]),
+    ("rigor/src/cycle.rs", &["fn prove_cycle"]),
+    ("job/src/run.rs", &["struct Run"]),
+    ("job/src/general.rs", &["struct GeneralRun", "struct GeneralRests"]),
+    ("job/src/orbit.rs", &["struct ClosedOrbit"]),
+    ("job/src/exponent.rs", &["struct LargestExponent"]),
+    ("job/src/store.rs", &["struct Store"]),
+];
+
+/// Whether the documentation of `pub item` in this file has an example.
+fn has_example(text: &str, item: &str) -> bool {
+    let ends = |c: Option<char>| c.is_none_or(|c| !c.is_alphanumeric() && c != '_');
+    let lines: Vec<&str> = text.lines().map(str::trim).collect();
+    let is = |line: &&str| {
+        let rest = line.strip_prefix("pub ").and_then(|l| l.strip_prefix(item));
+        rest.is_some_and(|rest| ends(rest.chars().next()))
+    };
+    let at = lines.iter().position(|line| is(&line)).unwrap_or_else(|| panic!("no pub {item}"));
+    let above = lines[..at].iter().rev().take_while(|l| l.starts_with("///") || !l.ends_with('}'));
+    let docs = above.skip_while(|l| !l.starts_with("///")).take_while(|l| l.starts_with("///"));
+    docs.filter(|l| l.starts_with("/// ```")).count() >= 2
+}
+
+#[test]
+fn what_a_user_begins_with_has_an_example() {
+    for (file, items) in EXAMPLES {
+        let text = fs::read_to_string(root().join("crates").join(file)).unwrap();
+        for item in items {
+            assert!(has_example(&text, item), "crates/{file}: pub {item} has no example");
+        }
+    }
+    assert!(!has_example("/// One.\n#[inline]\npub fn one() {}\n", "fn one"));
+    assert!(has_example("/// One.\n/// ```\n/// ```\npub fn one<T>() {}\n", "fn one"));
+}
