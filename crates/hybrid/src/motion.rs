@@ -210,7 +210,7 @@ pub enum HybridError {
         "the motion is not decided at t = {t}, state {x:?}: on {surfaces} it can go on in more \
             than one way ({ways}). Nothing is chosen here: end the run before that time (--t-end), \
             start elsewhere (--start), change a parameter (--set), choose a side (--exit \
-            at-once:plus or at-once:minus), or of mixtures one (--intersection)"
+            at-once:plus or at-once:minus), or choose a mixture (--intersection)"
     )]
     Undecided {
         /// When.
