@@ -1,5 +1,5 @@
-//! The audit: at which alpha and beta the paper's outcomes of figs 7, 8 and 9(i) are likely. Not a
-//! figure of the paper. Its data are committed beside it and made by `make census`.
+//! The parameter map: at which alpha and beta the paper's outcomes of figs 7, 8 and 9(i) are likely. Not a figure of the paper. Its data are committed
+//! beside it and in figures/capture, and made by `make census` and `make capture`.
 
 use std::sync::Arc;
 
@@ -8,6 +8,7 @@ use twofold::job::table::Table;
 use twofold::job::{AnyQuestion, JobError};
 use twofold::num::elementary::sqrt;
 use twofold::paper::audit::{self, Candidate, Cell, PRIORS};
+use twofold::paper::capture;
 use twofold::paper::census;
 use twofold::paper::claims::claims;
 use twofold::paper::study::Computed;
@@ -17,9 +18,8 @@ use twofold::record::Hash;
 use twofold::render::sheet::*;
 use twofold::render::style;
 
-/// What is made for this figure: fig. 7's intervals, fig. 8's sigmas and fig. 9's hysteretic switch
-/// over alpha and beta, Dormand-Prince at NDSolve's tolerance; and the candidates, one exponent
-/// changed, by LSODA as the figures are.
+/// What is made for this figure: the candidates, one exponent changed, by LSODA as the figures are; and fig. 7's intervals, fig. 8's sigmas and fig. 9's
+/// hysteretic switch over alpha and beta by Dormand-Prince at NDSolve's tolerance, which docs/parameters.md compares with LSODA's map.
 pub const DATA: &[(&str, &[u8])] = &[
     ("fig7.csv", include_bytes!("fig7.csv")),
     ("fig8.csv", include_bytes!("fig8.csv")),
@@ -32,16 +32,17 @@ pub const DATA: &[(&str, &[u8])] = &[
     ("beta9.csv", include_bytes!("beta9.csv")),
 ];
 
-/// The printed and the reconstructed numbers of figs 7 and 8 are the census'.
-const CENSUS: [(&str, &[u8]); 2] = [
+/// The printed and the reconstructed numbers of figs 7 and 8 are the census'; the map is that of the study of times of capture.
+const OTHERS: [(&str, &[u8]); 4] = [
     ("../census/fig7.csv", include_bytes!("../census/fig7.csv")),
     ("../census/fig8.csv", include_bytes!("../census/fig8.csv")),
+    ("../capture/map7.csv", include_bytes!("../capture/map7.csv")),
+    ("../capture/map8.csv", include_bytes!("../capture/map8.csv")),
 ];
 
 /// The committed content of a file.
 fn committed(name: &str) -> Result<Vec<u8>, JobError> {
-    let found =
-        DATA.iter().chain(&CENSUS).find(|(n, _)| *n == name).map(|(_, bytes)| bytes.to_vec());
+    let found = DATA.iter().chain(&OTHERS).find(|(n, _)| *n == name).map(|(_, bytes)| bytes.to_vec());
     found.ok_or_else(|| JobError::Other(format!("the audit has no {name}")))
 }
 
@@ -117,14 +118,13 @@ pub fn support(panel: &str, reading: Reading) -> Result<Support, JobError> {
 const READINGS: [[f64; 2]; 2] = [[1e-3, 1e-5], [1e-1, 1e-5]];
 
 fn tables() -> Result<Vec<Table>, JobError> {
-    let [fig7, fig8, fig9] =
-        ["fig7.csv", "fig8.csv", "fig9.csv"].map(|name| table_of(&committed(name)?));
-    let cells = audit::cells(&[vec![fig7?], vec![fig8?], vec![fig9?]], audit::ALL, &claims().rules);
-    Ok(vec![audit::cell_table(&cells), audit::candidate_table(&candidates()?[0])])
+    let [fig7, fig8] = ["../capture/map7.csv", "../capture/map8.csv"].map(|name| table_of(&committed(name)?));
+    let map = capture::map_table([&fig7?, &fig8?], &claims().rules);
+    Ok(vec![map, audit::candidate_table(&candidates()?[0])])
 }
 
 fn questions() -> Vec<AnyQuestion> {
-    let data: Vec<Hash> = DATA.iter().chain(&CENSUS).map(|(_, bytes)| Hash::of(bytes)).collect();
+    let data: Vec<Hash> = DATA.iter().chain(&OTHERS).map(|(_, bytes)| Hash::of(bytes)).collect();
     vec![Arc::new(Computed {
         kind: "audit",
         question: serde_json::json!({ "data": data, "rules": claims().rules, "priors": PRIORS }),
@@ -234,17 +234,9 @@ fn draw(tables: &[Table]) -> Sheet {
             Anchor::Below,
         );
     }
-    let runs: Vec<i64> = cells
-        .columns
-        .iter()
-        .filter(|c| c.name.starts_with("runs"))
-        .flat_map(|c| cells.integers(&c.name))
-        .copied()
-        .collect();
-    let (fewest, most) =
-        (runs.iter().min().copied().unwrap_or(0), runs.iter().max().copied().unwrap_or(0));
+    let runs = cells.integers("runs").iter().min().copied().unwrap_or(0);
     sheet
-        .panel("(a)", "likelihood of the seven outcomes", map)
+        .panel("(a)", "likelihood of the six outcomes of figs 7 and 8", map)
         .panel("(b)", "posterior of *α* (above) and *β*", odds)
         .legend(LegendEntry::new(
             LegendKey::Area(style::BLUE, 100),
@@ -263,10 +255,8 @@ fn draw(tables: &[Table]) -> Sheet {
             ),
         ))
         .footer(format!(
-            "(a) Probability that one new run of each panel of figs 7 and 8 and of 9(i) comes out \
-                as the paper says, from {fewest} to {most} runs of each panel in each cell \
-             (Dormand-Prince at NDSolve's tolerance, *t* = 200000). Most likely: *α* = {}, *β* = \
-             {}.",
+            "(a) Probability that one new run of each panel of figs 7 and 8 comes out as the paper says, from {runs} runs in each cell \
+             (LSODA at NDSolve's tolerance, *t* = 200000). Most likely: *α* = {}, *β* = {}.",
             number(alpha[best]),
             number(beta[best])
         ))
@@ -287,10 +277,8 @@ pub fn figure() -> Figure {
             name: "audit".into(),
             reading: None,
             title: "At which parameters the paper's outcomes are likely".into(),
-            caption: "(a) How likely the seven outcomes that the paper reports in figs 7, 8 and \
-                9(i) are at each α and β, with the printed, the reconstructed and \
-                      the most likely pair. (b) How probable it is that one digit of an exponent \
-                      was misprinted, under two priors."
+            caption: "(a) How likely the six outcomes that the paper reports in figs 7 and 8 are at each α and β, by LSODA, with the printed, the reconstructed and \
+                      the most likely pair. (b) How probable it is that one digit of an exponent was misprinted, under two priors: from these and 9(i)."
                 .into(),
             view: View::Study(Study { questions, draw: |answers| draw(&Study::tables(answers)) }),
             panels: Vec::new(),

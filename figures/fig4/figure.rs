@@ -32,7 +32,7 @@ pub fn figure() -> Figure {
             };
             vec![FigurePanel::new(
                 "i",
-                format!("{back}; drawn are 10, followed for {horizon}"),
+                format!("{back}; 10 are drawn, for {horizon}"),
                 RunSpec {
                     system: reading.caricature().into(),
                     switch: SwitchSpec::Filippov {

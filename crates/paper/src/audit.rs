@@ -197,37 +197,6 @@ pub fn candidates(cells: &[Cell], rules: &Rules) -> Option<Vec<Candidate>> {
     Some(chosen.into_iter().enumerate().map(candidate).collect())
 }
 
-/// Cells as a table.
-pub fn cell_table(cells: &[Cell]) -> Table {
-    let mut columns = vec![
-        Column::numbers("alpha"),
-        Column::numbers("beta"),
-        Column::numbers("log10_likelihood"),
-        Column::integers("far"),
-    ];
-    columns.extend(PANELS.iter().flat_map(|p| {
-        let name = p.name.replace(['(', ')'], "_");
-        [Column::integers(&format!("runs_{name}")), Column::integers(&format!("hits_{name}"))]
-    }));
-    let mut table = Table::new("audit", columns);
-    for cell in cells {
-        let counts = cell
-            .runs
-            .iter()
-            .zip(&cell.hits)
-            .flat_map(|(n, k)| [*n, *k])
-            .map(|v| Entry::Integer(v as i64));
-        let head: [Entry; 4] = [
-            cell.alpha.into(),
-            cell.beta.into(),
-            cell.log_likelihood.into(),
-            Entry::Integer(cell.far as i64),
-        ];
-        table.push(head.into_iter().chain(counts));
-    }
-    table
-}
-
 /// Candidates as a table.
 pub fn candidate_table(candidates: &[Candidate]) -> Table {
     let mut columns =

@@ -10,7 +10,7 @@ use super::census::{self, CensusRun, MotionKind, PANELS, tally};
 use super::claims::Rules;
 use super::effects::{self, Estimate, LogRank, Time};
 use twofold_analyse::counts::wilson;
-use twofold_job::table::{Entry, Table};
+use twofold_job::table::{Column, Entry, Table};
 use twofold_num::elementary::{exp10, log10};
 use twofold_num::random::RandomStream;
 
@@ -351,7 +351,17 @@ fn mapped([fig7, fig8]: [&Table; 2], rules: &Rules) -> Vec<Mapped> {
     pairs.map(cell).collect()
 }
 
-/// The map of the six panels' likelihood by LSODA, compared with that by Dormand-Prince.
+/// The map of the six panels' likelihood as a table, from sweeps of figs 7 and 8 over both parameters.
+pub fn map_table(sweeps: [&Table; 2], rules: &Rules) -> Table {
+    let numbers = ["alpha", "beta", "log10_likelihood"].map(Column::numbers);
+    let mut table = Table::new("map", numbers.into_iter().chain([Column::integers("runs")]));
+    for Mapped { at, log_likelihood, runs } in mapped(sweeps, rules) {
+        table.push([at[0].into(), at[1].into(), log_likelihood.into(), Entry::Integer(runs.len() as i64)]);
+    }
+    table
+}
+
+/// The map of the six panels' likelihood by LSODA, and how it differs from that by Dormand-Prince.
 pub fn map_text(lsoda: [&Table; 2], dopri5: [&Table; 2], rules: &Rules) -> String {
     let [ours, other] = [lsoda, dopri5].map(|tables| mapped(tables, rules));
     let mixed = |cell: &Mapped| tally(&cell.runs, rules.end).iter().filter(|n| **n > 0).count() > 1;
