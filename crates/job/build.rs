@@ -17,7 +17,17 @@ fn numerics() -> std::io::Result<String> {
         return Ok(format!("version {}", env!("CARGO_PKG_VERSION")));
     }
     let mut sources = twofold_digest::Sources::default();
-    for name in ["num", "system", "hybrid", "integrate", "analyse", "instances", "job"] {
+    for name in [
+        "num",
+        "system",
+        "hybrid",
+        "integrate",
+        "analyse",
+        "instances",
+        "instances-switched",
+        "instances-tangent",
+        "job",
+    ] {
         sources.add(root, &format!("crates/{name}/src"), |_| true)?;
     }
     sources.add(root, "systems", |file| file.ends_with(".toml") && file != "systems/Cargo.toml")?;

@@ -6,9 +6,8 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Every crate below the command, with the crates that it may be built on and the libraries that
-/// only it may name.
-const CRATES: [(&str, &[&str], &[&str]); 12] = [
+/// Every crate below the command, with the crates that it may be built on and the libraries that only it may name.
+const CRATES: [(&str, &[&str], &[&str]); 14] = [
     ("digest", &[], &["proc-macro2"]),
     // The only crate that names a math library or a random generator.
     ("num", &[], &["libm", "rand", "rand_chacha"]),
@@ -20,16 +19,24 @@ const CRATES: [(&str, &[&str], &[&str]); 12] = [
     ("rigor", &["num", "system", "integrate"], &[]),
     ("analyse", &["num", "system", "integrate", "rigor"], &[]),
     ("instances", &["system", "integrate", "analyse"], &[]),
+    ("instances-switched", &["system", "integrate", "analyse", "instances"], &[]),
+    ("instances-tangent", &["system", "integrate", "analyse"], &[]),
     (
         "job",
-        &["num", "system", "hybrid", "integrate", "rigor", "analyse", "instances"],
+        &[
+            "num",
+            "system",
+            "hybrid",
+            "integrate",
+            "rigor",
+            "analyse",
+            "instances",
+            "instances-switched",
+            "instances-tangent",
+        ],
         &["csv", "zmij"],
     ),
-    (
-        "render",
-        &["num"],
-        &["plotters", "plotters-backend", "tiny-skia", "pdf-writer", "png", "miniz_oxide"],
-    ),
+    ("render", &["num"], &["plotters", "plotters-backend", "tiny-skia", "pdf-writer", "png", "miniz_oxide"]),
     (
         "paper",
         &["num", "system", "hybrid", "integrate", "rigor", "analyse", "job", "render"],

@@ -43,13 +43,19 @@ pub trait Orbits<const N: usize>: Sync {
     ) -> Result<Summary<N>, Failure>;
 }
 
-/// A run as a computation over any stepper.
-pub(crate) struct Waiting<'a, F, const N: usize> {
-    pub(crate) field: &'a F,
-    pub(crate) x0: SVector<f64, N>,
-    pub(crate) options: DriveOptions,
-    pub(crate) observer: &'a mut dyn Observer<N>,
-    pub(crate) monitor: &'a dyn Monitor,
+/// A run without its method.
+#[doc(hidden)]
+pub struct Waiting<'a, F, const N: usize> {
+    /// The equation.
+    pub field: &'a F,
+    /// The start.
+    pub x0: SVector<f64, N>,
+    /// How far, and with what restarts and kicks.
+    pub options: DriveOptions,
+    /// Receives the steps.
+    pub observer: &'a mut dyn Observer<N>,
+    /// Receives how far the run has come.
+    pub watch: &'a dyn Watch,
 }
 
 impl<F: VectorField<N>, const N: usize> WithStepper<N> for Waiting<'_, F, N> {

@@ -7,7 +7,7 @@ use twofold_integrate::delay::{DelayError, Delayed, LateSwitch, Own, Sides};
 use twofold_integrate::{Failure, Monitor, Observer, Summary};
 use twofold_system::{BindError, Bound, Caricature, Compiled, PiecewiseSmooth, System};
 
-use crate::orbit::{How, Waiting};
+use twofold_instances::{How, Waiting};
 
 /// A system of `N` states whose switch may act late or have a memory.
 pub trait Late<const N: usize> {
