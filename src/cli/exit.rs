@@ -167,18 +167,6 @@ pub fn part_of(file: &std::path::Path) -> PathBuf {
     name.into()
 }
 
-/// Says that beside a finished file lies what an earlier run left that did not finish. It may be
-/// all that there is of that run, and is kept.
-pub fn say_older_part(file: &std::path::Path) {
-    let part = part_of(file);
-    if part.exists() {
-        super::speak::complain(&format!(
-            "{} is of an earlier run that did not finish",
-            part.display()
-        ));
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

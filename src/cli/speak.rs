@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use super::CliError;
-use super::exit::say_older_part;
+use super::exit::part_of;
 use crate::record;
 
 /// Prints text for people to standard output, and a newline.
@@ -74,6 +74,14 @@ pub fn deliver(to: Option<&Path>, bytes: &[u8]) -> Result<(), CliError> {
             Ok(())
         }
         _ => print_bytes(bytes),
+    }
+}
+
+/// Says that beside a finished file lies what an earlier run left that did not finish. It may be all that there is of that run, and is kept.
+pub fn say_older_part(file: &Path) {
+    let part = part_of(file);
+    if part.exists() {
+        complain(&format!("{} is of an earlier run that did not finish", part.display()));
     }
 }
 
