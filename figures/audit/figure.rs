@@ -1,5 +1,6 @@
-//! The parameter map: at which alpha and beta the paper's outcomes of figs 7, 8 and 9(i) are likely. Not a figure of the paper. Its data are committed
-//! beside it and in figures/capture, and made by `make census` and `make capture`.
+//! The parameter map: at which alpha and beta the paper's outcomes of figs 7, 8 and 9(i) are
+//! likely. Not a figure of the paper. Its data are committed beside it and in figures/capture, and
+//! made by `make census` and `make capture`.
 
 use std::sync::Arc;
 
@@ -18,8 +19,9 @@ use twofold::record::Hash;
 use twofold::render::sheet::*;
 use twofold::render::style;
 
-/// What is made for this figure: the candidates, one exponent changed, by LSODA as the figures are; and fig. 7's intervals, fig. 8's sigmas and fig. 9's
-/// hysteretic switch over alpha and beta by Dormand-Prince at NDSolve's tolerance, which docs/parameters.md compares with LSODA's map.
+/// What is made for this figure: the candidates, one exponent changed, by LSODA as the figures are;
+/// and fig. 7's intervals, fig. 8's sigmas and fig. 9's hysteretic switch over alpha and beta by
+/// Dormand-Prince at NDSolve's tolerance, which docs/parameters.md compares with LSODA's map.
 pub const DATA: &[(&str, &[u8])] = &[
     ("fig7.csv", include_bytes!("fig7.csv")),
     ("fig8.csv", include_bytes!("fig8.csv")),
@@ -32,7 +34,8 @@ pub const DATA: &[(&str, &[u8])] = &[
     ("beta9.csv", include_bytes!("beta9.csv")),
 ];
 
-/// The printed and the reconstructed numbers of figs 7 and 8 are the census'; the map is that of the study of times of capture.
+/// The printed and the reconstructed numbers of figs 7 and 8 are the census'; the map is that of
+/// the study of times of capture.
 const OTHERS: [(&str, &[u8]); 4] = [
     ("../census/fig7.csv", include_bytes!("../census/fig7.csv")),
     ("../census/fig8.csv", include_bytes!("../census/fig8.csv")),

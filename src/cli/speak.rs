@@ -77,7 +77,8 @@ pub fn deliver(to: Option<&Path>, bytes: &[u8]) -> Result<(), CliError> {
     }
 }
 
-/// Says that beside a finished file lies what an earlier run left that did not finish. It may be all that there is of that run, and is kept.
+/// Says that beside a finished file lies what an earlier run left that did not finish. It may be
+/// all that there is of that run, and is kept.
 pub fn say_older_part(file: &Path) {
     let part = part_of(file);
     if part.exists() {

@@ -36,7 +36,11 @@ const CRATES: [(&str, &[&str], &[&str]); 14] = [
         ],
         &["csv", "zmij"],
     ),
-    ("render", &["num"], &["plotters", "plotters-backend", "tiny-skia", "pdf-writer", "png", "miniz_oxide"]),
+    (
+        "render",
+        &["num"],
+        &["plotters", "plotters-backend", "tiny-skia", "pdf-writer", "png", "miniz_oxide"],
+    ),
     (
         "paper",
         &["num", "system", "hybrid", "integrate", "rigor", "analyse", "job", "render"],

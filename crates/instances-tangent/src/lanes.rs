@@ -3,7 +3,7 @@
 use nalgebra::SVector;
 use twofold_analyse::lyapunov::{self, Exponent};
 use twofold_integrate::ensemble::InstructionSet;
-use twofold_integrate::{Failure, Watch};
+use twofold_integrate::{Failure, Monitor};
 use twofold_system::ParameterBatch;
 
 /// Equations of `N` states with one tangent vector, whose exponents are computed side by side.
@@ -14,7 +14,7 @@ pub trait Exponents<const N: usize> {
         set: InstructionSet,
         starts: &[SVector<f64, N>],
         settings: &lyapunov::LyapunovOptions,
-        watch: &dyn Watch,
+        watch: &dyn Monitor,
     ) -> Option<Vec<Result<Exponent, Failure>>>;
 }
 
@@ -26,7 +26,7 @@ macro_rules! exponents {
                 set: InstructionSet,
                 starts: &[SVector<f64, $n>],
                 settings: &lyapunov::LyapunovOptions,
-                watch: &dyn Watch,
+                watch: &dyn Monitor,
             ) -> Option<Vec<Result<Exponent, Failure>>> {
                 lyapunov::largest_side_by_side::<$n, $m, _>(set, self, starts, settings, watch)
             }

@@ -45,8 +45,13 @@ lanes! {
     3 Smoothed<Caricature>;
 }
 
-/// The smoothed equation of the paper's system, if `system` is that: compiled, it gives the same bits sooner.
-pub fn smoothed_in_lanes(system: &System, transition: Transition, eps: f64) -> Option<impl Lanes<3>> {
+/// The smoothed equation of the paper's system, if `system` is that: compiled, it gives the same
+/// bits sooner.
+pub fn smoothed_in_lanes(
+    system: &System,
+    transition: Transition,
+    eps: f64,
+) -> Option<impl Lanes<3>> {
     match system.compiled() {
         Some(Compiled::Caricature(system)) => Some(Smoothed { system, transition, eps }),
         _ => None,

@@ -55,7 +55,7 @@ pub struct Waiting<'a, F, const N: usize> {
     /// Receives the steps.
     pub observer: &'a mut dyn Observer<N>,
     /// Receives how far the run has come.
-    pub watch: &'a dyn Watch,
+    pub monitor: &'a dyn Monitor,
 }
 
 impl<F: VectorField<N>, const N: usize> WithStepper<N> for Waiting<'_, F, N> {

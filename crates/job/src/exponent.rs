@@ -13,7 +13,7 @@ use twofold_analyse::lyapunov::{self, Estimate, Exponent};
 use twofold_analyse::tangent::Tangent;
 use twofold_instances_switched::{self as switched, Late};
 use twofold_instances_tangent::{Exponents, Growth};
-use twofold_integrate::Watch;
+use twofold_integrate::Monitor;
 use twofold_integrate::ensemble::InstructionSet;
 use twofold_system::{
     Bound, BoundField, Compiled, Field, Hysteretic, ParameterBatch, Smoothed, System,
@@ -177,15 +177,19 @@ impl LargestExponent {
     /// Of a switch that depends on the past.
     fn of_late_switch(&self, monitor: &dyn Monitor) -> Result<Estimate, String> {
         match self.start.len() {
-            1 => self.late::<1>(&self.bound()?, watch),
-            2 => self.late::<2>(&self.bound()?, watch),
-            3 => self.late::<3>(&*switched::late(&self.system).map_err(|e| e.to_string())?, watch),
-            4 => self.late::<4>(&self.bound()?, watch),
-            5 => self.late::<5>(&self.bound()?, watch),
-            6 => self.late::<6>(&self.bound()?, watch),
-            7 => self.late::<7>(&self.bound()?, watch),
-            8 => self.late::<8>(&self.bound()?, watch),
-            n => Err(format!("exponents of switches with a past are computed for up to eight states, not for {n}")),
+            1 => self.late::<1>(&self.bound()?, monitor),
+            2 => self.late::<2>(&self.bound()?, monitor),
+            3 => {
+                self.late::<3>(&*switched::late(&self.system).map_err(|e| e.to_string())?, monitor)
+            }
+            4 => self.late::<4>(&self.bound()?, monitor),
+            5 => self.late::<5>(&self.bound()?, monitor),
+            6 => self.late::<6>(&self.bound()?, monitor),
+            7 => self.late::<7>(&self.bound()?, monitor),
+            8 => self.late::<8>(&self.bound()?, monitor),
+            n => Err(format!(
+                "exponents of switches with a past are computed for up to eight states, not for {n}"
+            )),
         }
     }
 

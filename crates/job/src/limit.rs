@@ -14,7 +14,7 @@ use super::table::{Column, Entry, Table};
 use twofold_analyse::limit::{AfterVisitQuestion, ConvergenceQuestion};
 use twofold_analyse::passage::PassageQuestion;
 use twofold_instances_switched as switched;
-use twofold_integrate::Watch;
+use twofold_integrate::Monitor;
 use twofold_integrate::filippov::Mode;
 use twofold_system::{System, Transition};
 
@@ -45,10 +45,14 @@ impl Question for SmoothingLimit {
         5e4
     }
 
-    fn compute(&self, _: &Executor<'_>, _: &dyn Watch) -> Result<Answer, JobError> {
+    fn compute(&self, _: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
         let found = switched::sliding(&self.system)?.convergence(&self.compared)?;
-        let columns =
-            [Column::numbers("eps"), Column::numbers("t"), Column::words("mode"), Column::numbers("distance")];
+        let columns = [
+            Column::numbers("eps"),
+            Column::numbers("t"),
+            Column::words("mode"),
+            Column::numbers("distance"),
+        ];
         let mut table = Table::new("before", columns);
         for row in &found.rows {
             let mode = if row.mode == Mode::SlidingAttracting { "sliding" } else { "free" };
@@ -137,9 +141,12 @@ impl Question for AfterVisit {
 
     fn compute(&self, executor: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
         let crossings = self.smoothed(executor)?;
-        let mut crossing = |eps: f64| Ok(crossings.iter().find(|c| c.0 == eps).and_then(|c| c.1.clone()));
+        let mut crossing =
+            |eps: f64| Ok(crossings.iter().find(|c| c.0 == eps).and_then(|c| c.1.clone()));
         let found = switched::sliding(&self.system)?.after_visit(&self.compared, &mut crossing)?;
-        let kinds = |name: &str| if name.ends_with("side") { Column::words(name) } else { Column::numbers(name) };
+        let kinds = |name: &str| {
+            if name.ends_with("side") { Column::words(name) } else { Column::numbers(name) }
+        };
         let names = self.system.coordinates();
         let (b, c) = (names[1], names[2]);
         let mut members = Table::new("funnel", ["exit_time", "side", b, c].map(kinds));

@@ -20,7 +20,7 @@ use twofold_analyse::filippov_return;
 use twofold_analyse::floquet::{self, ReturnPlane, Returned};
 use twofold_instances_switched::Motions;
 use twofold_instances_tangent::Returns;
-use twofold_integrate::{Failure, Schedule, Tolerance, Watch};
+use twofold_integrate::{Failure, Monitor, Schedule, Tolerance};
 use twofold_num::elementary::sqrt;
 use twofold_num::tape::Program;
 use twofold_system::{Bound, BoundField, Field, System};

@@ -10,7 +10,9 @@ use super::recording::{Data, Future, Recording};
 use super::spec::{FunnelSpec, MethodSpec, Observation, RunSpec, SpecError, SwitchSpec};
 use super::table::Table;
 use twofold_analyse::path::MOST_POINTS;
-use twofold_analyse::{Motion, MotionRecorder, PathRecorder, Sample, SectionRecorder, TimedMotion, TimesRecorder};
+use twofold_analyse::{
+    Motion, MotionRecorder, PathRecorder, Sample, SectionRecorder, TimedMotion, TimesRecorder,
+};
 use twofold_instances::{self as instances, How, Orbits};
 use twofold_instances_switched::{self as switched, Late, Motions, TwoSurfaces};
 use twofold_integrate::delay::{DelayError, History};
@@ -349,12 +351,18 @@ fn three_states(
             observe(spec, &*field, vector![x0[0], x0[1], x0[2], phi0], aside, monitor)
         }
         SwitchSpec::Delayed { .. } | SwitchSpec::Relay { .. } => {
-            late(spec, &*switched::late(&spec.system)?, x0, aside, watch)
+            late(spec, &*switched::late(&spec.system)?, x0, aside, monitor)
         }
-        SwitchSpec::Filippov { exit, funnel } if spec.system.faces().is_none() => {
-            discontinuous(spec, &*switched::sliding(&spec.system)?, x0, exit, funnel, aside, watch)
-        }
-        SwitchSpec::Filippov { .. } => record::<3, 4>(spec, aside, watch),
+        SwitchSpec::Filippov { exit, funnel } if spec.system.faces().is_none() => discontinuous(
+            spec,
+            &*switched::sliding(&spec.system)?,
+            x0,
+            exit,
+            funnel,
+            aside,
+            monitor,
+        ),
+        SwitchSpec::Filippov { .. } => record::<3, 4>(spec, aside, monitor),
     }
 }
 

@@ -351,12 +351,18 @@ fn mapped([fig7, fig8]: [&Table; 2], rules: &Rules) -> Vec<Mapped> {
     pairs.map(cell).collect()
 }
 
-/// The map of the six panels' likelihood as a table, from sweeps of figs 7 and 8 over both parameters.
+/// The map of the six panels' likelihood as a table, from sweeps of figs 7 and 8 over both
+/// parameters.
 pub fn map_table(sweeps: [&Table; 2], rules: &Rules) -> Table {
     let numbers = ["alpha", "beta", "log10_likelihood"].map(Column::numbers);
     let mut table = Table::new("map", numbers.into_iter().chain([Column::integers("runs")]));
     for Mapped { at, log_likelihood, runs } in mapped(sweeps, rules) {
-        table.push([at[0].into(), at[1].into(), log_likelihood.into(), Entry::Integer(runs.len() as i64)]);
+        table.push([
+            at[0].into(),
+            at[1].into(),
+            log_likelihood.into(),
+            Entry::Integer(runs.len() as i64),
+        ]);
     }
     table
 }

@@ -10,7 +10,9 @@ use crate::cli::exit::part_of;
 use crate::cli::flags::{RunFlags, Use};
 use crate::cli::general;
 use crate::cli::progress::Progress;
-use crate::cli::speak::{Delivery, complain, deliver, is_standard_output, try_delivery};
+use crate::cli::speak::{
+    Delivery, complain, deliver, is_standard_output, say_older_part, try_delivery,
+};
 use crate::cli::{CliError, Exit};
 use crate::job::general::GeneralRun;
 use crate::job::spec::{Method, SwitchSpec};
