@@ -32,7 +32,6 @@ use std::sync::Arc;
 
 use nalgebra::SVector;
 
-use super::delay::Cuttable;
 use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance, finite};
 use twofold_num::elementary::{exp, ln, rough_pow};
 use twofold_num::series::{Constants, LayerKind, MarkKind, Solution};
@@ -865,6 +864,40 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
             power = power * self.h;
         }
     }
+}
+
+/// A method whose last step can be ended earlier, in its own arithmetic.
+pub(crate) trait Cuttable<const N: usize> {
+    /// The numbers that it computes in.
+    type Number: Precision;
+    /// Whether a step that is cut short is as exact as a step of that length.
+    const CUTS_EXACTLY: bool;
+    /// A time and a state as they are meant.
+    fn exactly(&self, t: f64, x: SVector<f64, N>) -> (Self::Number, SVector<Self::Number, N>);
+    /// Starts towards `end` with steps no longer than `longest`; `again` says that the field is the
+    /// last one.
+    fn begin<F: VectorField<N>>(
+        &mut self,
+        field: &F,
+        from: (Self::Number, SVector<Self::Number, N>),
+        end: Self::Number,
+        longest: f64,
+        again: bool,
+    ) -> Result<(), Failure>;
+    /// Makes a step.
+    fn advance<F: VectorField<N>>(&mut self, field: &F) -> Result<(), Failure>;
+    /// The last step, as far as it was cut.
+    fn last(&self) -> Step<'_, N>;
+    /// The last step's beginning.
+    fn start(&self) -> Self::Number;
+    /// Time and state reached.
+    fn reached(&self) -> (Self::Number, SVector<Self::Number, N>);
+    /// The state at the fraction `theta` of the last step.
+    fn at(&self, theta: Self::Number) -> SVector<Self::Number, N>;
+    /// Ends the last step at the time `end` within it.
+    fn cut(&mut self, end: Self::Number);
+    /// Its statistics.
+    fn statistics(&self) -> &Statistics;
 }
 
 impl<const N: usize, S: Precision> Cuttable<N> for Taylor<N, S> {

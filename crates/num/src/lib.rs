@@ -17,6 +17,7 @@ pub mod fit;
 pub mod given;
 pub mod interval;
 pub mod interval_extended;
+mod interval_functions;
 pub mod jet;
 pub mod lanes;
 pub mod linear;

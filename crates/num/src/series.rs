@@ -10,6 +10,7 @@
 //! an equation has a layer, without being told (see [`Solution::layer_arguments`]).
 
 mod compiled;
+mod instruction;
 #[cfg(test)]
 mod plain;
 mod plan;
@@ -21,8 +22,8 @@ use super::Elementary;
 use super::decimal::{Decimal, FromDecimal};
 use super::tape::{Node, Operation, Tape};
 use compiled::Opening;
-use plan::{Equation, SeriesPlan, advance, start};
-use table::{Columns, LONGEST, ROW, advance_rows, start_rows};
+use plan::{Equation, SeriesPlan, advance, advance_rows, start};
+use table::{Columns, LONGEST, ROW, start_rows};
 
 /// A series: the state's components come first, then one for each recurrence.
 type Series = usize;

@@ -29,8 +29,7 @@ use serde::{Deserialize, Serialize};
 
 use super::method::{MOST_STATES, Method, WithStepper};
 use super::roots::{Crossing, CrossingFinder};
-use super::step::{Failure, Statistics, Step, Tolerance};
-use super::taylor::Precision;
+use super::step::{Failure, Step, Tolerance};
 use super::{Dopri5, Guarded, Radau5, Taylor};
 use past::Cut;
 use twofold_num::tape::{Operation, Replay};
@@ -241,40 +240,6 @@ impl<'a, P> Sides<'a, P> {
             None => passages.in_curved_step(step, |x| self.h(x) - level),
         }
     }
-}
-
-/// A method whose last step can be ended earlier, in its own arithmetic.
-pub(super) trait Cuttable<const N: usize> {
-    /// The numbers that it computes in.
-    type Number: Precision;
-    /// Whether a step that is cut short is as exact as a step of that length.
-    const CUTS_EXACTLY: bool;
-    /// A time and a state as they are meant.
-    fn exactly(&self, t: f64, x: SVector<f64, N>) -> (Self::Number, SVector<Self::Number, N>);
-    /// Starts towards `end` with steps no longer than `longest`; `again` says that the field is the
-    /// last one.
-    fn begin<F: VectorField<N>>(
-        &mut self,
-        field: &F,
-        from: (Self::Number, SVector<Self::Number, N>),
-        end: Self::Number,
-        longest: f64,
-        again: bool,
-    ) -> Result<(), Failure>;
-    /// Makes a step.
-    fn advance<F: VectorField<N>>(&mut self, field: &F) -> Result<(), Failure>;
-    /// The last step, as far as it was cut.
-    fn last(&self) -> Step<'_, N>;
-    /// The last step's beginning.
-    fn start(&self) -> Self::Number;
-    /// Time and state reached.
-    fn reached(&self) -> (Self::Number, SVector<Self::Number, N>);
-    /// The state at the fraction `theta` of the last step.
-    fn at(&self, theta: Self::Number) -> SVector<Self::Number, N>;
-    /// Ends the last step at the time `end` within it.
-    fn cut(&mut self, end: Self::Number);
-    /// Its statistics.
-    fn statistics(&self) -> &Statistics;
 }
 
 /// Times nearer to each other than this part of them are one.

@@ -4,9 +4,8 @@ use std::collections::VecDeque;
 
 use nalgebra::SVector;
 
-use super::Cuttable;
-use super::tangent::shortened;
 use crate::step::{Failure, Interpolant, Statistics, Step, Stepper};
+use crate::taylor::Cuttable;
 use twofold_system::VectorField;
 
 /// A polynomial of degree 4 by its Bernstein coefficients, less the state at the start.
@@ -260,4 +259,9 @@ impl<const N: usize> Past<N> {
     pub(super) fn len(&self) -> usize {
         self.pieces.len()
     }
+}
+
+/// The state with a shorter disturbance.
+pub(super) fn shortened<const M: usize>(z: &SVector<f64, M>, by: f64) -> SVector<f64, M> {
+    SVector::from_fn(|i, _| if i < M / 2 { z[i] } else { z[i] / by })
 }

@@ -5,13 +5,15 @@ use std::collections::VecDeque;
 
 use nalgebra::SVector;
 
-use super::tangent::{Carry, Shift, TangentStepper, shortened, square};
+use super::past::shortened;
+use super::tangent::{Carry, Shift, TangentStepper, square};
 use super::{
-    Backwards, Cuttable, DelayError, Delayed, History, LEAST_DELAY, LateSwitch, ONE_TIME, Sides,
-    is_due, resolves,
+    Backwards, DelayError, Delayed, History, LEAST_DELAY, LateSwitch, ONE_TIME, Sides, is_due,
+    resolves,
 };
 use crate::roots::{Crossing, CrossingFinder};
 use crate::step::{Failure, Statistics, Step, Stepper};
+use crate::taylor::Cuttable;
 use crate::taylor::Precision;
 use twofold_num::elementary::sqrt;
 use twofold_num::{Arithmetic, Scalar};

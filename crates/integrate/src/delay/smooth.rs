@@ -2,8 +2,8 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::past::{Look, Past};
-use super::tangent::{Carry, TangentStepper, shortened, square, square_of_past};
+use super::past::{Look, Past, shortened};
+use super::tangent::{Carry, TangentStepper, square, square_of_past};
 use super::{Backwards, DelayError, Delayed, History, ONE_TIME, Sides, is_due, resolves};
 use crate::driver::{DriveOptions, Observer, drive};
 use crate::guard::Redoable;

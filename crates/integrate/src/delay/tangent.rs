@@ -137,11 +137,6 @@ pub(super) fn square<const M: usize>(z: &SVector<f64, M>) -> f64 {
     z.iter().skip(M / 2).map(|v| v * v).sum()
 }
 
-/// The state with a shorter disturbance.
-pub(super) fn shortened<const M: usize>(z: &SVector<f64, M>, by: f64) -> SVector<f64, M> {
-    SVector::from_fn(|i, _| if i < M / 2 { z[i] } else { z[i] / by })
-}
-
 /// Points of the delay at which a disturbance of the past is read.
 const NODES: usize = 16;
 

@@ -14,7 +14,7 @@
 //! compiled. Other equations are interpreted, with the same bits, since both ways run each
 //! recurrence by [`begin`] and each instruction by [`carry_out`].
 
-use super::plan::{Action, Instruction, Saturated, begin, carry_out};
+use super::instruction::{Action, Instruction, Saturated, begin, carry_out};
 use super::table::{ROW, Table};
 use super::{Recurrence, Series};
 

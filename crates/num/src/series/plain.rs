@@ -1,6 +1,6 @@
 //! Reference implementation for tests: every recurrence at every degree, as in the literature.
 
-use super::plan::start_of;
+use super::instruction::start_of;
 use super::*;
 use crate::Arithmetic;
 use crate::tape::Recorded;

@@ -1,7 +1,6 @@
 //! Storage for the coefficients of all series while they are computed.
 
 use super::Series;
-use super::plan::{SeriesPlan, advance};
 use crate::Elementary;
 
 /// The coefficients below degree k of all series, and those of degree k of the series that have
@@ -69,8 +68,8 @@ pub(super) const LONGEST: usize = 21;
 /// reads two coefficients at once: that would have to wait until the younger one has arrived in
 /// memory.
 pub(super) struct Rows<'a, const T: usize> {
-    known: &'a mut [[f64; ROW]; T],
-    next: &'a mut [f64; ROW],
+    pub known: &'a mut [[f64; ROW]; T],
+    pub next: &'a mut [f64; ROW],
 }
 
 /// A series' place in a row, always within it, so that no bounds check is needed.
@@ -106,35 +105,11 @@ impl<const T: usize> Table<f64> for Rows<'_, T> {
     }
 }
 
-/// Does what [`start`](super::plan::start) does, on more than one row.
+/// Does what `start` of a plan does, on more than one row.
 #[inline(always)]
 pub(super) fn start_rows(rows: &mut [[f64; ROW]], start: impl FnOnce(&mut Rows<1>) -> u64) -> u64 {
     match rows.split_first_chunk_mut::<1>() {
         Some((known, [next, ..])) => start(&mut Rows { known, next }),
         _ => 0,
-    }
-}
-
-/// Carries a plan out at degree `k`, on more rows than k + 1.
-pub(super) fn advance_rows(plan: &SeriesPlan<f64>, rows: &mut [[f64; ROW]], k: usize) {
-    macro_rules! by_length {
-        ($($rows:literal)*) => {
-            match k + 1 {
-                $($rows => advance_in::<$rows>(plan, rows),)*
-                _ => unreachable!("no rows for degree {k}"),
-            }
-        };
-    }
-    by_length!(2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21)
-}
-
-#[inline(never)]
-fn advance_in<const T: usize>(plan: &SeriesPlan<f64>, rows: &mut [[f64; ROW]]) {
-    if let Some((known, [next, ..])) = rows.split_first_chunk_mut::<T>() {
-        let mut rows = Rows { known, next };
-        match &plan.compiled {
-            Some(compiled) => compiled.advance(&mut rows),
-            None => advance(plan, &mut rows),
-        }
     }
 }
