@@ -63,6 +63,8 @@ pub struct Compiled {
     colours: Vec<usize>,
     /// Watched values that are sums of variables with constant factors.
     pub(crate) affine: Vec<Option<Affine>>,
+    /// Whether there are others.
+    pub(crate) is_curved: bool,
     /// What can be flat where a step looks and steep elsewhere, and the program of its arguments.
     pub(crate) gates: Vec<Gate>,
     pub(crate) gate_arguments: Program,
@@ -505,14 +507,14 @@ impl Equation {
         let touches: Vec<Vec<usize>> =
             (n..outputs).map(|o| (0..=n).filter(|v| on(o, *v)).collect()).collect();
         let (gates, watched_gates) = (gates(&tape.select(0..n)), gates(&tape.select(n..outputs)));
+        let affine = affine(&tape).split_off(n);
         Compiled {
             field: Program::new(&tape.select(0..n)),
             watched: Program::new(&tape.select(n..outputs)),
             outputs: outputs - n,
-            place: (0..self.guards.len())
-                .map(|guard| active.iter().position(|a| *a == guard))
-                .collect(),
-            affine: affine(&tape).split_off(n),
+            place: (0..self.guards.len()).map(|guard| active.iter().position(|a| *a == guard)).collect(),
+            is_curved: affine.contains(&None),
+            affine,
             colours: colours(&touches, n + 1),
             touches,
             depends,

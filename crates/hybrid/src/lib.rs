@@ -40,6 +40,7 @@ pub mod definition;
 pub mod equation;
 pub mod model;
 pub mod motion;
+mod range;
 pub mod rests;
 mod roots;
 pub mod selection;

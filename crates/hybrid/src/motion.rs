@@ -6,6 +6,7 @@
 //! from the equations on both sides.
 
 mod clock;
+mod locate;
 mod meeting;
 mod search;
 pub mod sensitivity;
@@ -28,6 +29,7 @@ use twofold_system::Expression;
 use crate::definition::{Direction, When};
 use crate::equation::{Compiled, Configuration, Equation, EquationError};
 use crate::model::Model;
+use crate::range::Range;
 use crate::roots::{PLACES, at_fraction, first, first_of_polynomial, first_of_series, stays};
 use crate::selection::{
     Intersection, MOST_TOGETHER, Mixture, Way, groups, mixture, nearest_of_hull, possibilities,
@@ -431,6 +433,8 @@ struct Follower<'a> {
     scale: Vec<f64>,
     room: Vec<f64>,
     samples: [Vec<f64>; 5],
+    /// What variables and watched values can be in a step.
+    ranges: [Vec<Range>; 2],
     expansions: series::Expansions,
     reached: Option<&'a dyn Fn(f64) -> bool>,
     outcome: Outcome,
@@ -654,6 +658,7 @@ impl<'a> Follower<'a> {
             scale: Vec::new(),
             room: Vec::new(),
             samples: Default::default(),
+            ranges: Default::default(),
             expansions: Default::default(),
             reached: None,
             outcome: Outcome {
@@ -769,13 +774,9 @@ impl<'a> Follower<'a> {
             if to_stop {
                 wanted = stop - self.t;
             }
-            let Some(Accepted { length: wanted, error, parts, rejected }) =
-                self.step_within(&mut step, wanted)
-            else {
-                if self.land_at_an_edge()? {
-                    continue;
-                }
-                if self.comes_to_rest(self.t) {
+            let accepted = self.step_within(&mut step, wanted, &mut list);
+            let Some(Accepted { length: wanted, error, parts, rejected }) = accepted else {
+                if self.land_at_an_edge()? || self.comes_to_rest(self.t) {
                     continue;
                 }
                 return Err(self.left_domain(self.t, &step.x.clone()));
@@ -794,7 +795,6 @@ impl<'a> Follower<'a> {
                         }
                 }
             };
-            self.sought(&step, &mut list);
             let found = self.find(&step, &list, &parts, &mut last_values);
             let earliest = found.iter().map(|(theta, _)| *theta).fold(f64::INFINITY, f64::min);
             // Together is what no rounding of the time tells apart.
@@ -871,11 +871,11 @@ impl<'a> Follower<'a> {
         }
     }
 
-    /// Makes a step of at most this length that the tolerance allows and that has seen what there
-    /// is; none if none is short enough.
-    fn step_within(&mut self, step: &mut Step, longest: f64) -> Option<Accepted> {
+    /// Makes a step of at most this length that the tolerance allows and that has seen what there is, with the list of what is [sought](Self::sought) in
+    /// it; none if none is short enough.
+    fn step_within(&mut self, step: &mut Step, longest: f64, list: &mut Vec<(Sought, f64)>) -> Option<Accepted> {
         let mut scale = std::mem::take(&mut self.scale);
-        let accepted = self.step_in_units(step, longest, &mut scale);
+        let accepted = self.step_in_units(step, longest, &mut scale, list);
         self.scale = scale;
         accepted
     }
@@ -885,6 +885,7 @@ impl<'a> Follower<'a> {
         step: &mut Step,
         longest: f64,
         scale: &mut Vec<f64>,
+        list: &mut Vec<(Sought, f64)>,
     ) -> Option<Accepted> {
         let mut length = longest;
         let mut noise = None;
@@ -903,13 +904,14 @@ impl<'a> Follower<'a> {
                 let unseen = self.unseen(step, scale).map(|theta| theta.clamp(0.05, 0.9));
                 match unseen.or_else(|| self.too_long_for_tangents(step)) {
                     Some(factor) => factor,
-                    None => match self.parts(step) {
-                        Some(parts) => {
+                    None => {
+                        self.sought(step, list);
+                        if let Some(parts) = self.parts(step, list) {
                             self.noisy = noise.is_some();
                             return Some(Accepted { length, error, parts, rejected: tried > 0 });
                         }
-                        None => search::SHORTER,
-                    },
+                        search::SHORTER
+                    }
                 }
             } else if error.is_nan() {
                 0.1
@@ -931,124 +933,6 @@ impl<'a> Follower<'a> {
         self.rhs(step.t - rounding, &step.x, &mut before);
         self.rhs(step.t + rounding, &step.x, &mut after);
         before.iter().zip(&after).map(|(a, b)| (b - a).abs()).collect()
-    }
-
-    /// What is met first in a step, with its place and all else in the same part of the step;
-    /// `last` takes the values where the search ends.
-    fn find(
-        &mut self,
-        step: &Step,
-        list: &[(Sought, f64)],
-        parts: &[(f64, f64)],
-        last: &mut Vec<f64>,
-    ) -> Vec<(f64, Sought)> {
-        let mut found = Vec::new();
-        if list.is_empty() {
-            return found;
-        }
-        // Sums of states are polynomials, which need no evaluation.
-        let polynomial = |follower: &Self, sought: Sought| {
-            if step.series.is_some() {
-                return None;
-            }
-            let b = follower.polynomial_of(step, sought)?;
-            b.iter().all(|b| b.is_finite()).then_some(b)
-        };
-        if list.iter().all(|(sought, _)| polynomial(self, *sought).is_some()) {
-            last.clear();
-            for (sought, side) in list {
-                let Some(b) = polynomial(self, *sought) else { continue };
-                let mut v = PLACES.map(|theta| at_fraction(&b, theta));
-                last.push(v[4]);
-                if self.is_fresh(*sought) || v[0] * side < 0.0 {
-                    v[0] = 0.0;
-                }
-                found.extend(first_of_polynomial(v, *side).map(|theta| (theta, *sought)));
-            }
-            return found;
-        }
-        // So they are in a step of a series, whatever else is sought.
-        let mut open: Vec<bool> = vec![true; list.len()];
-        let mut ends = vec![0.0; list.len()];
-        if step.series.is_some() {
-            let fresh = list.iter().any(|(sought, _)| self.is_fresh(*sought));
-            let terms = if fresh { self.rates(&self.config.clone()).1.terms } else { Vec::new() };
-            for (j, (sought, side)) in list.iter().enumerate() {
-                if let Some(c) = self.series_of(step, *sought, parts.len() <= 1) {
-                    // Of the two ends of a whole part one is left.
-                    let far = matches!(sought, Sought::Guard { guard,
-                        .. } if self.equation.guards[*guard].whole && c[0] > 0.5);
-                    let begins = (self.is_fresh(*sought) && !far).then(|| {
-                        let terms = self
-                            .place_of(*sought)
-                            .and_then(|place| terms.get(place))
-                            .unwrap_or(&0.0);
-                        // What leaves sliding is tangent to the surface.
-                        let left = if let Sought::Guard { guard, .. } = sought {
-                            self.left[*guard]
-                        } else {
-                            0.0
-                        };
-                        SMALLEST_SLOPE * step.h * terms.max(left)
-                    });
-                    let place = first_of_series(&c, *side, begins);
-                    found.extend(place.map(|theta| (theta, *sought)));
-                    (open[j], ends[j]) = (false, c.iter().rev().sum());
-                }
-            }
-            if !open.contains(&true) {
-                *last = ends;
-                return found;
-            }
-        }
-        let known = found.iter().map(|(theta, _)| *theta).fold(f64::INFINITY, f64::min);
-        let mut at = std::mem::take(&mut self.room);
-        at.resize(self.n, 0.0);
-        let mut values = std::mem::take(&mut self.samples);
-        let whole = [(0.0, 1.0)];
-        for &(from, to) in if parts.is_empty() { &whole } else { parts } {
-            for (place, values) in PLACES.iter().zip(&mut values) {
-                let theta = from + place * (to - from);
-                if theta == 1.0 {
-                    at.copy_from_slice(&step.y);
-                } else {
-                    step.at(theta, &mut at);
-                }
-                self.measure(list, step.t + theta * step.h, &at, values);
-            }
-            for (j, (sought, side)) in list.iter().enumerate() {
-                let mut v: [f64; 5] = std::array::from_fn(|i| values[i][j]);
-                if !open[j] {
-                    continue;
-                }
-                if from == 0.0 && (self.is_fresh(*sought) || v[0] * side < 0.0) {
-                    v[0] = 0.0;
-                }
-                if v.iter().any(|v| v.is_nan()) {
-                    // Weights of sliding where there are none: shorter steps find the place.
-                    if matches!(sought, Sought::Leave { .. } | Sought::Repelling) {
-                        found.push((from + 0.5 * (to - from), *sought));
-                    }
-                    continue;
-                }
-                if stays(&v, *side) {
-                    continue;
-                }
-                let (one, mut value) = ([(*sought, *side)], Vec::new());
-                let mut f = |theta: f64| {
-                    step.at(theta, &mut at);
-                    self.measure(&one, step.t + theta * step.h, &at, &mut value);
-                    value[0]
-                };
-                found.extend(first(v, *side, from, to, &mut f, 0).map(|theta| (theta, *sought)));
-            }
-            if found.iter().any(|(theta, _)| *theta <= to) || known <= to {
-                break;
-            }
-        }
-        std::mem::swap(last, &mut values[4]);
-        (self.room, self.samples) = (at, values);
-        found
     }
 
     /// What is due at the present time, together with what is met here.

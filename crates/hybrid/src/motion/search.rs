@@ -4,6 +4,8 @@ use twofold_num::tape::Program;
 
 use super::*;
 use crate::equation::Gate;
+use crate::range::Range;
+use twofold_num::Arithmetic as _;
 
 /// Most parts of a step that are searched; one with more is made shorter, to this part.
 const MOST_PARTS: usize = 4096;
@@ -19,35 +21,36 @@ const ALONG: f64 = 1e-10;
 
 impl Follower<'_> {
     /// What may be met in a step, with the side that it is on.
-    pub(super) fn sought(&self, step: &Step, list: &mut Vec<(Sought, f64)>) {
+    pub(super) fn sought(&mut self, step: &Step, list: &mut Vec<(Sought, f64)>) {
         list.clear();
-        for (place, guard) in self.compiled.active.iter().enumerate() {
+        let compiled = self.compiled.clone();
+        let mut ranges = std::mem::take(&mut self.ranges);
+        self.bound(step, &mut ranges);
+        for (place, guard) in compiled.active.iter().enumerate() {
             let side = self.config.sides[*guard];
             if self.slides[*guard] {
                 continue;
             }
             if self.equation.guards[*guard].whole {
                 for (upper, boundary, way) in [(false, side, 1.0), (true, side + 1.0, -1.0)] {
-                    if self.fresh_guard[*guard] || !self.stays_away(step, place, boundary, way) {
+                    if self.fresh_guard[*guard] || !self.stays_away(step, &ranges, place, boundary, way) {
                         list.push((Sought::Guard { guard: *guard, upper }, 1.0));
                     }
                 }
-            } else if self.fresh_guard[*guard] || !self.stays_away(step, place, 0.0, side) {
+            } else if self.fresh_guard[*guard] || !self.stays_away(step, &ranges, place, 0.0, side) {
                 list.push((Sought::Guard { guard: *guard, upper: false }, side));
             }
         }
-        let watched = self.compiled.active.len();
         for (i, side) in self.watch_side.iter().enumerate() {
-            if *side != 0.0
-                && !self.fresh_watch[i]
-                && self.stays_away(step, watched + i, 0.0, *side)
-            {
+            let place = compiled.active.len() + i;
+            if *side != 0.0 && !self.fresh_watch[i] && self.stays_away(step, &ranges, place, 0.0, *side) {
                 continue;
             }
             if *side != 0.0 && !self.contacts.iter().any(|c| c.watched == i) {
                 list.push((Sought::Watched(i), *side));
             }
         }
+        self.ranges = ranges;
         for place in 0..self.sliding.len() {
             list.push((Sought::Leave { place, plus: false }, 1.0));
             list.push((Sought::Leave { place, plus: true }, 1.0));
@@ -58,14 +61,31 @@ impl Follower<'_> {
         list.extend((0..self.contacts.len()).map(|place| (Sought::Release(place), 1.0)));
     }
 
-    /// Whether a watched value stays on its side of `boundary` in a step, as can be told without
-    /// evaluating it: a sum of states is a polynomial along the step's continuous extension, and
-    /// lies between its Bernstein coefficients.
-    fn stays_away(&self, step: &Step, place: usize, boundary: f64, side: f64) -> bool {
+    /// What guards and watched expressions can be in a step, if one of them is no sum of states: their [`Range`]s for the states' ones.
+    fn bound(&mut self, step: &Step, ranges: &mut [Vec<Range>; 2]) {
+        let [variables, values] = ranges;
+        values.clear();
+        if step.series.is_some() || !self.compiled.is_curved {
+            return;
+        }
+        let n = self.n;
+        variables.clear();
+        variables.extend((0..n).map(|i| Range::between(&step.bernstein(i))));
+        variables.push(Range::between(&[step.t, step.t, step.t, step.t, step.t + step.h]));
+        variables.extend(self.variables[n + 1..].iter().map(|v| Range::from_f64(*v)));
+        values.resize(self.compiled.outputs, Range::default());
+        self.compiled.watched.evaluate(variables, values);
+    }
+
+    /// Whether a watched value stays on its side of `boundary` in a step, as can be told without evaluating it at places of the step: a sum of states is a
+    /// polynomial along the step's continuous extension, and lies between its Bernstein coefficients; others lie in their ranges.
+    fn stays_away(&self, step: &Step, ranges: &[Vec<Range>; 2], place: usize, boundary: f64, side: f64) -> bool {
         if step.series.is_some() {
             return false;
         }
-        let Some((b, size)) = self.polynomial(step, place, boundary) else { return false };
+        let Some((b, size)) = self.polynomial(step, place, boundary) else {
+            return ranges[1][place].is_beyond(boundary, side);
+        };
         let least = b.iter().fold(f64::INFINITY, |least, b| least.min(b * side));
         least > 1e-12 * size && crate::roots::keeps_away(&b, side)
     }
@@ -221,11 +241,11 @@ impl Follower<'_> {
         out
     }
 
-    /// Parts of a step in each of which what is sought is smooth: no operation in it is flat at
-    /// five places and steep between them. None if they are too many to be searched.
-    pub(super) fn parts(&mut self, step: &Step) -> Option<Vec<(f64, f64)>> {
+    /// Parts of a step in each of which what is sought is smooth: no operation in it is flat at five places and steep between them. None if they
+    /// are too many to be searched.
+    pub(super) fn parts(&mut self, step: &Step, list: &[(Sought, f64)]) -> Option<Vec<(f64, f64)>> {
         if step.series.is_none() {
-            return self.smooth_parts(step, 1, false);
+            return if list.is_empty() { Some(Vec::new()) } else { self.smooth_parts(step, 1, false) };
         }
         if !self.is_followed(step) {
             return None;

@@ -1,0 +1,138 @@
+//! Where in a step what is sought is met first.
+
+use super::*;
+
+impl Follower<'_> {
+    /// What is met first in a step, with its place and all else in the same part of the step; `last` takes the values where the search ends.
+    pub(super) fn find(
+        &mut self,
+        step: &Step,
+        list: &[(Sought, f64)],
+        parts: &[(f64, f64)],
+        last: &mut Vec<f64>,
+    ) -> Vec<(f64, Sought)> {
+        let mut found = Vec::new();
+        if list.is_empty() {
+            return found;
+        }
+        let ends = match step.series {
+            Some(_) => self.find_in_series(step, list, parts.len() <= 1, &mut found),
+            None => self.find_in_polynomials(step, list, &mut found),
+        };
+        match ends.iter().copied().collect() {
+            Some(ends) => *last = ends,
+            None => {
+                let open: Vec<bool> = ends.iter().map(Option::is_none).collect();
+                let whole = [(0.0, 1.0)];
+                self.find_by_values(step, list, &open, if parts.is_empty() { &whole } else { parts }, &mut found);
+                std::mem::swap(last, &mut self.samples[4]);
+            }
+        }
+        found
+    }
+
+    /// What is met first if sums of states are all that is sought: they are polynomials, which need no evaluation. Their values at the end; else none.
+    fn find_in_polynomials(
+        &self,
+        step: &Step,
+        list: &[(Sought, f64)],
+        found: &mut Vec<(f64, Sought)>,
+    ) -> Vec<Option<f64>> {
+        let polynomial = |sought: Sought| self.polynomial_of(step, sought).filter(|b| b.iter().all(|b| b.is_finite()));
+        let Some(all) = list.iter().map(|(sought, _)| polynomial(*sought)).collect::<Option<Vec<_>>>() else {
+            return vec![None; list.len()];
+        };
+        let end = |((sought, side), b): (&(Sought, f64), [f64; 5])| {
+            let mut v = PLACES.map(|theta| at_fraction(&b, theta));
+            let end = v[4];
+            if self.is_fresh(*sought) || v[0] * side < 0.0 {
+                v[0] = 0.0;
+            }
+            found.extend(first_of_polynomial(v, *side).map(|theta| (theta, *sought)));
+            Some(end)
+        };
+        list.iter().zip(all).map(end).collect()
+    }
+
+    /// What is met first by the series of each function, with the values at the end where there is one.
+    fn find_in_series(
+        &mut self,
+        step: &Step,
+        list: &[(Sought, f64)],
+        is_whole: bool,
+        found: &mut Vec<(f64, Sought)>,
+    ) -> Vec<Option<f64>> {
+        let fresh = list.iter().any(|(sought, _)| self.is_fresh(*sought));
+        let terms = if fresh { self.rates(&self.config.clone()).1.terms } else { Vec::new() };
+        let mut ends = Vec::new();
+        for (sought, side) in list {
+            let series = self.series_of(step, *sought, is_whole);
+            ends.push(series.as_ref().map(|c| c.iter().rev().sum()));
+            let Some(c) = series else { continue };
+            // Of the two ends of a whole part one is left.
+            let far = matches!(sought, Sought::Guard { guard, .. } if self.equation.guards[*guard].whole && c[0] > 0.5);
+            let begins = (self.is_fresh(*sought) && !far).then(|| {
+                let terms = self.place_of(*sought).and_then(|place| terms.get(place)).unwrap_or(&0.0);
+                // What leaves sliding is tangent to the surface.
+                let left = if let Sought::Guard { guard, .. } = sought { self.left[*guard] } else { 0.0 };
+                SMALLEST_SLOPE * step.h * terms.max(left)
+            });
+            found.extend(first_of_series(&c, *side, begins).map(|theta| (theta, *sought)));
+        }
+        ends
+    }
+
+    /// What is met first of what is `open`, by values at five places of each part, and more where these do not tell; the values at the end of the last part
+    /// are left in the last sample.
+    fn find_by_values(
+        &mut self,
+        step: &Step,
+        list: &[(Sought, f64)],
+        open: &[bool],
+        parts: &[(f64, f64)],
+        found: &mut Vec<(f64, Sought)>,
+    ) {
+        let known = found.iter().map(|(theta, _)| *theta).fold(f64::INFINITY, f64::min);
+        let mut at = std::mem::take(&mut self.room);
+        at.resize(self.n, 0.0);
+        let mut values = std::mem::take(&mut self.samples);
+        for &(from, to) in parts {
+            for (place, values) in PLACES.iter().zip(&mut values) {
+                let theta = from + place * (to - from);
+                if theta == 1.0 {
+                    at.copy_from_slice(&step.y);
+                } else {
+                    step.at(theta, &mut at);
+                }
+                self.measure(list, step.t + theta * step.h, &at, values);
+            }
+            for (j, (sought, side)) in list.iter().enumerate().filter(|(j, _)| open[*j]) {
+                let mut v: [f64; 5] = std::array::from_fn(|i| values[i][j]);
+                if from == 0.0 && (self.is_fresh(*sought) || v[0] * side < 0.0) {
+                    v[0] = 0.0;
+                }
+                if v.iter().any(|v| v.is_nan()) {
+                    // Weights of sliding where there are none: shorter steps find the place.
+                    if matches!(sought, Sought::Leave { .. } | Sought::Repelling) {
+                        found.push((from + 0.5 * (to - from), *sought));
+                    }
+                    continue;
+                }
+                if stays(&v, *side) {
+                    continue;
+                }
+                let (one, mut value) = ([(*sought, *side)], Vec::new());
+                let mut f = |theta: f64| {
+                    step.at(theta, &mut at);
+                    self.measure(&one, step.t + theta * step.h, &at, &mut value);
+                    value[0]
+                };
+                found.extend(first(v, *side, from, to, &mut f, 0).map(|theta| (theta, *sought)));
+            }
+            if found.iter().any(|(theta, _)| *theta <= to) || known <= to {
+                break;
+            }
+        }
+        (self.room, self.samples) = (at, values);
+    }
+}
