@@ -50,6 +50,8 @@ pub struct Compiled {
     pub watched: Program,
     /// The guards that the equations ask in this structure.
     pub active: Vec<usize>,
+    /// Those among them that the field asks, by itself or through others; the rest are asked by events alone.
+    pub deciding: Vec<usize>,
     /// Number of values of `watched`.
     pub outputs: usize,
     /// The place of each guard among the active ones.
@@ -467,31 +469,22 @@ impl Equation {
     }
 
     fn compile(&self, at: &Configuration) -> Compiled {
-        let mut active = Vec::new();
+        let (mut active, mut deciding) = (Vec::new(), Vec::new());
         let n = self.dimension();
         let tape = Tape::record(self.variables(), |v| {
             let mut writer =
                 Writer { equation: self, at, v, terms: HashMap::new(), guards: BTreeMap::new() };
             let mut outputs: Vec<Recorded> =
                 self.definition.modes[at.mode].field.iter().map(|e| writer.number(e)).collect();
+            writer.write_guards();
+            deciding.extend(writer.guards.keys());
             let watched: Vec<Recorded> = self.watched.iter().map(|e| writer.number(e)).collect();
             for event in &self.definition.events {
                 if let When::Becomes(e) = &event.when {
                     writer.condition(e);
                 }
             }
-            // A guard may ask others: until no new one is found.
-            loop {
-                let open: Vec<usize> =
-                    writer.guards.iter().filter(|(_, g)| g.is_none()).map(|(i, _)| *i).collect();
-                if open.is_empty() {
-                    break;
-                }
-                for i in open {
-                    let value = writer.number(&self.guards[i].expression.clone());
-                    writer.guards.insert(i, Some(value));
-                }
-            }
+            writer.write_guards();
             for (i, guard) in &writer.guards {
                 active.push(*i);
                 outputs.extend(guard);
@@ -529,6 +522,7 @@ impl Equation {
             watched_gates: watched_gates.into_iter().map(|(gate, _)| gate).collect(),
             gates: gates.into_iter().map(|(gate, _)| gate).collect(),
             active,
+            deciding,
             tape,
         }
     }
@@ -537,7 +531,9 @@ impl Equation {
     /// is no finite number, as words.
     pub fn broken(&self, compiled: &Compiled, variables: &[f64]) -> Option<String> {
         use twofold_num::tape::Operation;
-        let tape = compiled.tape.select(0..self.dimension());
+        let n = self.dimension();
+        let deciding = compiled.deciding.iter().filter_map(|guard| compiled.place(*guard));
+        let tape = compiled.tape.select((0..n).chain(deciding.map(|place| n + place)));
         let values = tape.values(variables);
         let needed = tape.needed();
         let names: Vec<String> = self.definition.states.iter().map(|s| s.name.clone()).collect();
@@ -557,13 +553,18 @@ impl Equation {
                     _ => "a number beyond the range of double precision",
                 };
                 // The component that it spoils, and the expression that is written there.
+                let (fields, guards) = tape.outputs().split_at(n);
                 let spoilt = self.definition.modes.iter().flat_map(|m| m.field.iter().enumerate());
-                let place = spoilt
-                    .zip(tape.outputs().iter().cycle())
-                    .find(|(_, out)| !values[**out].is_finite());
+                let place = spoilt.zip(fields.iter().cycle()).find(|(_, out)| !values[**out].is_finite());
+                let guard = || compiled.deciding.iter().zip(guards).find(|(_, out)| values[**out].is_nan());
                 return Some(match place {
                     Some(((i, e), _)) => format!("{what}, in the equation of {}, `{e}`", names[i]),
-                    None => what.into(),
+                    None => match guard() {
+                        Some((guard, _)) => {
+                            format!("{what}, in the switching function {}", self.guards[*guard].expression)
+                        }
+                        None => what.into(),
+                    },
                 });
             }
         }
@@ -834,6 +835,20 @@ impl Writer<'_> {
         let (i, flipped) = self.equation.guard(e, whole);
         self.guards.entry(i).or_insert(None);
         (i, flipped)
+    }
+
+    /// Writes all guards that were asked. One may ask others: until no new one is found.
+    fn write_guards(&mut self) {
+        loop {
+            let open: Vec<usize> = self.guards.iter().filter(|(_, g)| g.is_none()).map(|(i, _)| *i).collect();
+            if open.is_empty() {
+                break;
+            }
+            for i in open {
+                let value = self.number(&self.equation.guards[i].expression.clone());
+                self.guards.insert(i, Some(value));
+            }
+        }
     }
 
     fn side(&mut self, e: &Expression) -> Recorded {

@@ -797,6 +797,22 @@ impl<'a> Follower<'a> {
             };
             let found = self.find(&step, &list, &parts, &mut last_values);
             let earliest = found.iter().map(|(theta, _)| *theta).fold(f64::INFINITY, f64::min);
+            // The domain of what decides the field ends before anything is met: shorter steps come nearer to its end.
+            let ends = |((sought, _), value): (&(Sought, f64), &f64)| {
+                value.is_nan()
+                    && matches!(sought, Sought::Guard { guard, .. } if self.compiled.deciding.contains(guard))
+            };
+            if !earliest.is_finite() && list.iter().zip(&last_values).any(ends) {
+                h = search::SHORTER * wanted;
+                if self.t + h == self.t || h <= f64::EPSILON * 1e-6 * (self.options.t_end - self.options.t_start) {
+                    if self.land_at_an_edge()? {
+                        h = 0.0;
+                        continue;
+                    }
+                    return Err(self.left_domain(self.t, &self.x.clone()));
+                }
+                continue;
+            }
             // Together is what no rounding of the time tells apart.
             let together = (64.0 * f64::EPSILON * self.t.abs().max(wanted) / wanted).min(1e-9);
             let mut met: Vec<Sought> = found
@@ -946,9 +962,12 @@ impl<'a> Follower<'a> {
         let due = clock.take(self.t);
         let (mut config, sliding) = (self.config.clone(), self.sliding.clone());
         config.pieces = self.equation.tables.iter().map(|table| table.piece(self.t)).collect();
-        self.adopt(config, sliding);
+        let values = self.watched_values();
+        let slid: Vec<f64> = sliding.iter().map(|g| self.compiled.place(*g).map_or(f64::NAN, |p| values[p])).collect();
+        self.adopt(config, sliding.clone());
         if !self.equation.tables.is_empty() {
-            // A table's jump may carry switching functions over zero.
+            // A table's jump may carry switching functions over zero, or away from it.
+            self.leave_by_jump(&sliding, &slid);
             let zero = self.sliding.clone();
             self.follow_jumps(&zero)?;
         }

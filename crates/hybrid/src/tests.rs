@@ -1696,3 +1696,78 @@ fn a_flat_zero_is_met_once() {
     near(end(touched, 20.0)[2], 20.0, 1e-9);
     near(last("states = ['x', 'y']\nstart = [-1, 0]\nf = ['1', 'sign(3*x^2)']", 2.0), 2.0, 1e-12);
 }
+
+/// What the motion slides on may jump away, by another switch or by a table: the state stays where it is, and moves on from there.
+#[test]
+fn what_is_slid_upon_may_jump_away() {
+    let from = |f: &str| format!("states = ['x', 'y']\nstart = [0.3, 0]\nf = ['{f}', '1']");
+    for (f, t_end, want) in [
+        ("-sign(x - if(t > 3.5, 2, -0.25))", 5.0, 1.25),
+        ("-sign(x - if(y > 3.5, 2, -0.25))", 5.0, 1.25),
+        ("-sign(x - 2*sign(y - 3.5))", 5.0, -0.5),
+        ("-sign(x - heaviside(t - 3.5))", 4.0, 0.5),
+        ("-2*sign(x - floor(t))", 2.2, 1.4),
+        // It is met again, and slid upon.
+        ("-2*sign(x - floor(t))", 2.8, 2.0),
+        ("if(abs(x - floor(t)) < 0.2, -3, -2)*sign(x - floor(t))", 2.2, 1.4),
+    ] {
+        near(end(&from(f), t_end)[0], want, 1e-9);
+    }
+    // Two surfaces, of which one jumps.
+    let two =
+        "states = ['x', 'y', 'z']\nstart = [0.3, 0.2, 0]\nf = ['-sign(x - floor(z))', '-sign(y) + 0.5*sin(t)', '1']";
+    let found = end(two, 1.5);
+    near(found[0], 0.5, 1e-9);
+    near(found[1], 0.0, 1e-9);
+    let follows = |f: &str| {
+        let data = "t,u\n0,-1\n1,0.5\n2,-0.25\n3.5,2\n5,0\n6,0\n";
+        let table = "[tables.u]\nfile = 'u.csv'\ntime = 't'\ncolumn = 'u'\ninterpolation = 'previous'";
+        let model = model(&format!("states = ['x']\nstart = [0.3]\nf = ['{f}']\n{table}")).with_table("u", data);
+        run(&model.unwrap(), 6.0).1.unwrap().x[0]
+    };
+    near(follows("-sign(x - u)"), 0.25, 1e-9);
+    // It slides on u + sin(t)/10 from 2.55 on, leaves it at 3.5 and reaches it no more.
+    near(follows("-sign(x - u - 0.1*sin(t))"), -0.25 + 0.1 * 3.5_f64.sin() + 1.5 - 1.0, 1e-9);
+}
+
+/// The domain of what decides the field may end, though the field itself goes on: the run ends with the expression. What only events ask, and branches that
+/// are not taken, have none.
+#[test]
+fn the_domain_of_a_switching_function_ends() {
+    let ends = |f: &str, start: f64| {
+        let text = format!("states = ['x', 'y']\nstart = [{start}, 0]\nf = ['{f}', '1']");
+        match run(&model(&text), 3.0).1 {
+            Err(HybridError::Domain { t, what, .. }) => (t, what),
+            other => panic!("{f}: {other:?}"),
+        }
+    };
+    for (f, start, at, words) in [
+        (
+            "if(sqrt(x) > 0.5, -1, -2)",
+            1.0,
+            0.875,
+            "square root of a negative number, in the switching function sqrt(x) - 0.5",
+        ),
+        (
+            "-1 - 0.5*tanh(sign(log(x) - 9))",
+            1.0,
+            1.0 / (1.0 - 0.5 * 1.0_f64.tanh()),
+            "logarithm of a number that is not positive",
+        ),
+        ("if(sqrt(x) > 1, 1, 2)", -1.0, 0.0, "in the switching function sqrt(x) - 1"),
+        ("mod(x, 0)", 0.0, 0.0, "in the switching function x/0"),
+    ] {
+        let (t, what) = ends(f, start);
+        near(t, at, 1e-9);
+        assert!(what.contains(words), "{what}");
+    }
+    for (f, start, want) in [
+        ("if(x > 0, if(sqrt(x) > 0.5, -1, -2), -0.5)", 1.0, -0.5 * (3.0 - 0.875)),
+        ("if(x > 0 and log(x) > -1, -1, -2)", 1.0, -4.0 - (-1.0_f64).exp()),
+    ] {
+        let text = format!(
+            "states = ['x']\nstart = [{start}]\nf = ['{f}']\n[[event]]\nwhen = 'sqrt(x) - 9'\nset = {{ x = 5 }}\n[[event]]\nwhen = 'log(x) > 4'\nset = {{ x = 5 }}"
+        );
+        near(end(&text, 3.0)[0], want, 1e-9);
+    }
+}

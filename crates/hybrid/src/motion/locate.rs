@@ -83,7 +83,7 @@ impl Follower<'_> {
     }
 
     /// What is met first of what is `open`, by values at five places of each part, and more where these do not tell; the values at the end of the last part
-    /// are left in the last sample.
+    /// are left in the last sample, not-a-number where a function has no value on the way.
     fn find_by_values(
         &mut self,
         step: &Step,
@@ -116,6 +116,7 @@ impl Follower<'_> {
                     if matches!(sought, Sought::Leave { .. } | Sought::Repelling) {
                         found.push((from + 0.5 * (to - from), *sought));
                     }
+                    values[4][j] = f64::NAN;
                     continue;
                 }
                 if stays(&v, *side) {

@@ -76,7 +76,13 @@ impl Follower<'_> {
             }
         }
         self.adopt(self.config.clone(), Vec::new());
-        self.settle(&at_zero)
+        self.settle(&at_zero)?;
+        let values = self.watched_values();
+        let has_none = |guard: &usize| self.compiled.place(*guard).is_some_and(|place| values[place].is_nan());
+        if self.compiled.deciding.iter().any(has_none) {
+            return Err(self.left_domain(self.t, &self.x.clone()));
+        }
+        Ok(())
     }
 
     /// Sides of guards that a configuration asks and the present one does not.
@@ -140,6 +146,8 @@ impl Follower<'_> {
             self.adopt(config, Vec::new());
             return Ok(());
         }
+        let values = self.watched_values();
+        let before: Vec<f64> = zero.iter().map(|g| self.compiled.place(*g).map_or(f64::NAN, |p| values[p])).collect();
         let lows: Vec<f64> = zero.iter().map(|g| self.low(*g)).collect();
         let highs: Vec<f64> = zero.iter().map(|g| self.high(*g)).collect();
         let vertex = |follower: &mut Self, plus: &dyn Fn(usize) -> bool| {
@@ -421,6 +429,13 @@ impl Follower<'_> {
         self.ask_new(&mut config);
         sliding.sort_unstable();
         self.adopt(config, sliding);
+        let left = self.leave_by_jump(&zero, &before);
+        if !left.is_empty() {
+            let (rest, none) =
+                (zero.into_iter().filter(|g| !left.contains(g)).collect::<Vec<_>>(), vec![false; self.slides.len()]);
+            self.decide(&rest, &none)?;
+            return self.follow_jumps(&rest);
+        }
         if differ {
             if self.sliding.len() > MOST_CORNERS {
                 let why = format!(
@@ -508,6 +523,39 @@ impl Follower<'_> {
         self.undecided(guards, &why)
     }
 
+    /// Functions that were zero with these values, and that a switch or a table has made jump away from it, are on the side where they arrive, and
+    /// nothing slides on them any more: which they are.
+    pub(super) fn leave_by_jump(&mut self, zero: &[usize], before: &[f64]) -> Vec<usize> {
+        /// Smaller jumps, relative to a function's size, are drift.
+        const DRIFT: f64 = 1e-9;
+        let values = self.watched_values();
+        let mut config = self.config.clone();
+        let mut left = Vec::new();
+        for (guard, before) in zero.iter().zip(before) {
+            let Some(place) = self.compiled.place(*guard) else { continue };
+            let (g, value) = (&self.equation.guards[*guard], values[place]);
+            if value == *before || !value.is_finite() {
+                continue;
+            }
+            // By how much the function changes where states change by their sizes.
+            let gradient = self.gradient(self.t, place);
+            let reach: f64 = gradient.iter().zip(&self.size).map(|(g, size)| (g * size).abs()).sum();
+            let small = DRIFT * self.magnitude(&g.expression).max(reach);
+            let off = if g.whole { value - value.round() } else { value };
+            if (value - before).abs() > small && off.abs() > small {
+                config.sides[*guard] = if g.whole { value.floor() } else { value.signum() };
+                self.fresh_guard[*guard] = false;
+                left.push(*guard);
+            }
+        }
+        if !left.is_empty() {
+            self.ask_new(&mut config);
+            let rest = self.sliding.iter().copied().filter(|g| !left.contains(g)).collect();
+            self.adopt(config, rest);
+        }
+        left
+    }
+
     /// A switch may make other switching functions jump: they are on the side where they arrive.
     pub(super) fn follow_jumps(&mut self, zero: &[usize]) -> Result<(), HybridError> {
         for _ in 0..MOST_JUMPS {
@@ -553,12 +601,8 @@ impl Follower<'_> {
         let active = self.compiled.active.len();
         for i in 0..self.watch_side.len() {
             let (value, side) = (values[active + i], self.watch_side[i]);
-            let rests =
-                self.contacts.iter().any(|c| c.watched == i) || passed.contains(&i) || side == 0.0;
-            if rests
-                || value * side >= 0.0
-                || value.abs() <= 1e-12 * self.magnitude(&self.equation.watched[i])
-            {
+            let rests = self.contacts.iter().any(|c| c.watched == i) || passed.contains(&i) || side == 0.0;
+            if rests || !(value * side < 0.0) || value.abs() <= 1e-12 * self.magnitude(&self.equation.watched[i]) {
                 continue;
             }
             passed.push(i);
