@@ -1,10 +1,11 @@
 //! Data as functions of time: piecewise cubics.
 
+use serde::{Deserialize, Serialize};
+
 use crate::definition::{Interpolation, TableEntry};
 
-/// A table's values between its rows: on each piece a cubic in the time since the piece's
-/// beginning.
-#[derive(Clone, Debug, PartialEq)]
+/// A table's values between its rows: on each piece a cubic in the time since the piece's beginning.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Table {
     /// The times of the rows, increasing.
     pub knots: Vec<f64>,

@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 use twofold_num::elementary;
 use twofold_system::Expression;
 use twofold_system::diagnostic::nearest;
+use twofold_system::document::Ordered;
 use twofold_system::expression::General;
 
 use crate::data::{BadTable, Table};
@@ -148,19 +149,58 @@ impl Model {
         crate::Equation::new(self, None).is_ok_and(|equation| equation.depends_on_time())
     }
 
-    /// What decides the system's numbers, as data: what the file says, with these values, and the
-    /// tables' points.
+    /// What decides the system's numbers, as data: what the file says, with these values, the tables' points, and where names are not in the order of the
+    /// alphabet their order: motion begins in the first mode.
     pub fn json(&self) -> Value {
-        let mut document = serde_json::to_value(&self.definition.document).unwrap_or_default();
+        let d = &self.definition.document;
+        let mut document = serde_json::to_value(d).unwrap_or_default();
         for (name, value) in &self.given {
             document["parameters"][name] = json!(value);
         }
         for (name, table) in &self.tables {
-            document["tables"][name]["data"] =
-                json!({ "knots": table.knots, "pieces": table.pieces });
+            document["tables"][name]["data"] = json!(table);
+        }
+        let orders = [
+            ("parameters", names(&d.parameters)),
+            ("let", names(&d.terms)),
+            ("modes", names(&d.modes)),
+            ("tables", names(&d.tables)),
+        ];
+        for (list, names) in orders.iter().filter(|(_, names)| !names.is_sorted()) {
+            document["order"][*list] = json!(names);
         }
         document
     }
+
+    /// The system that [`Model::json`] has written.
+    ///
+    /// # Errors
+    /// If it is none.
+    pub fn from_json(mut document: Value) -> Result<Self, String> {
+        let mut tables = BTreeMap::new();
+        for (name, entry) in document["tables"].as_object_mut().into_iter().flatten() {
+            let data = entry.as_object_mut().and_then(|entry| entry.remove("data"));
+            tables.insert(name.clone(), serde_json::from_value(data.unwrap_or_default()).map_err(|e| e.to_string())?);
+        }
+        let order = document.as_object_mut().and_then(|d| d.remove("order")).unwrap_or_default();
+        let mut document: Document = serde_json::from_value(document).map_err(|e| e.to_string())?;
+        put_in_order(&mut document.parameters, &order["parameters"]);
+        put_in_order(&mut document.terms, &order["let"]);
+        put_in_order(&mut document.modes, &order["modes"]);
+        put_in_order(&mut document.tables, &order["tables"]);
+        let definition = Definition::from_document(document).map_err(|problem| problem.message)?;
+        Ok(Self { tables, ..Self::new(definition) })
+    }
+}
+
+fn names<V>(entries: &Ordered<V>) -> Vec<&str> {
+    entries.0.iter().map(|(name, _)| name.as_str()).collect()
+}
+
+/// The entries in the order of the list of their names, if there is one.
+fn put_in_order<V>(entries: &mut Ordered<V>, names: &Value) {
+    let place = |name: &str| names.as_array()?.iter().position(|n| n == name);
+    entries.0.sort_by(|(a, _), (b, _)| place(a).cmp(&place(b)).then_with(|| a.cmp(b)));
 }
 
 /// The value of an expression in `f64` with the value of each name; not-a-number where a name has

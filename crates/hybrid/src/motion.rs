@@ -77,6 +77,11 @@ pub enum Method {
 }
 
 impl Method {
+    /// The one of this name.
+    pub fn named(name: &str) -> Option<Self> {
+        [Method::Dopri5, Method::Radau5, Method::Taylor].into_iter().find(|method| method.name() == name)
+    }
+
     /// Its name.
     pub fn name(self) -> &'static str {
         match self {
@@ -88,7 +93,7 @@ impl Method {
 }
 
 /// How a system is followed.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// Where the time begins.
     pub t_start: f64,
@@ -467,6 +472,43 @@ pub fn follow_watched(
     let mut follower = Follower::new(model, options)?;
     follower.reached = Some(reached);
     follower.run_whole(observe).map(|(outcome, _)| outcome)
+}
+
+/// [`follow_watched`], and whether the motion at a finished run's end rests: whether it goes on for a time `longer` than that without moving by more than
+/// `within` of the largest size of a state. Equations that see the time do not rest.
+///
+/// # Errors
+/// As [`follow`].
+pub fn follow_to_rest(
+    model: &Model,
+    options: &Options,
+    observe: &mut dyn FnMut(&Point) -> bool,
+    reached: &dyn Fn(f64) -> bool,
+    longer: f64,
+    within: f64,
+) -> Result<(Outcome, bool), HybridError> {
+    let more = Options {
+        t_start: options.t_end,
+        t_end: options.t_end + longer,
+        record: Record::Times { every: f64::INFINITY },
+        ..options.clone()
+    };
+    let mut follower = Follower::new(model, options)?;
+    follower.reached = Some(reached);
+    let (outcome, mut follower) = follower.run_whole(observe)?;
+    if outcome.ending != Ending::Finished || follower.equation.depends_on_time() {
+        return Ok((outcome, false));
+    }
+    follower.options = &more;
+    let within = within * follower.size.iter().fold(0.0_f64, |most, s| most.max(*s));
+    let stays = |x: &[f64]| x.iter().zip(&outcome.x).all(|(a, b)| (a - b).abs() <= within);
+    // Where motion cannot go on it does not rest.
+    let ending = follower.run(&mut |point| stays(point.x));
+    let rests = ending == Ok(Ending::Finished) && stays(&follower.x);
+    if ending == Ok(Ending::Interrupted) && !reached(follower.t) {
+        return Ok((Outcome { ending: Ending::Interrupted, ..outcome }, false));
+    }
+    Ok((outcome, rests))
 }
 
 /// Steps between two words on the time reached.

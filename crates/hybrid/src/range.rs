@@ -110,7 +110,7 @@ impl Arithmetic for Range {
 
 impl Elementary for Range {
     fn tanh(self) -> Self {
-        self.within(self.middle.tanh(), 1.0, 1.0)
+        self.within(Elementary::tanh(self.middle), 1.0, 1.0)
     }
     fn exp(self) -> Self {
         // e^r - 1 is at most r + r^2 up to r = 1.79.
@@ -126,7 +126,7 @@ impl Elementary for Range {
     }
     fn sqrt(self) -> Self {
         // |a - A| / (sqrt a + sqrt A).
-        let root = self.middle.sqrt();
+        let root = Elementary::sqrt(self.middle);
         Self::new(root, self.radius / root + 0.0 * self.positive())
     }
     fn ln(self) -> Self {

@@ -4,15 +4,13 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use twofold_analyse::path::MOST_POINTS;
 use twofold_hybrid::motion::sensitivity::sensitivities;
-use twofold_hybrid::motion::tangent::{Return, closed_orbit, exponents};
-use twofold_hybrid::motion::{Exit, Record};
+use twofold_hybrid::motion::tangent::exponents;
+use twofold_hybrid::motion::{Exit, Method, Record};
 use twofold_hybrid::rests::rests;
 use twofold_hybrid::selection::Intersection;
-use twofold_hybrid::{
-    Definition, Ending, Equation, HybridError, Model, Options, Point, follow, follow_watched,
-};
-use twofold_integrate::Monitor;
-use twofold_system::System;
+use twofold_hybrid::{Definition, Ending, Equation, HybridError, Model, Options, Point, follow_watched};
+use twofold_integrate::Watch;
+use twofold_system::{Expression, System};
 
 use super::answer::{Answer, Stop};
 use super::executor::Executor;
@@ -20,27 +18,7 @@ use super::question::{JobError, Question};
 use super::table::{Column, Entry, Table};
 
 /// A run of a general system.
-///
-/// ```
-/// use twofold_hybrid::{Definition, Model, Options};
-/// use twofold_job::{Executor, general::GeneralRun};
-/// let text = "
-///     states = ['x', 'v']
-///     start = [1, 0]
-///     f = ['v', '-9.81']
-///     [[event]]
-///     name = 'impact'
-///     when = 'x'
-///     direction = 'down'
-///     set = { v = '-0.8*v' }
-/// ";
-/// let model = Model::new(Definition::from_toml(text, "ball.toml")?);
-/// let options = Options { t_end: 2.0, ..Options::default() };
-/// let answer = Executor::quiet().ask(&GeneralRun { model, options })?;
-/// assert!(answer.tables[0].words("event").any(|event| event == "impact"));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct GeneralRun {
     /// The system.
     pub model: Model,
@@ -63,6 +41,20 @@ pub fn model_of(system: &System) -> Result<Model, JobError> {
     let definition =
         Definition::from_json(&text, name).map_err(|e| HybridError::Bad(e.to_string()))?;
     Ok(Model::new(definition))
+}
+
+/// Reads an expression of a system's states, parameters, terms and tables.
+///
+/// # Errors
+/// Why it is none.
+pub fn expression(text: &str, model: &Model) -> Result<Expression, String> {
+    let definition = model.definition();
+    let terms = definition.document().terms.0.iter().map(|(n, _)| n.as_str());
+    let tables = definition.tables().iter().map(|(n, _)| n.as_str());
+    let parameters = definition.parameters().iter().map(|p| p.name.as_str());
+    let names: Vec<&str> = model.coordinates().into_iter().chain(parameters).chain(terms).chain(tables).collect();
+    Expression::parse_general(text, &names)
+        .map_err(|e| format!("{}{}", e.message, e.help.map_or(String::new(), |h| format!(" ({h})"))))
 }
 
 /// Rows are handed on in parts of so many.
@@ -102,7 +94,51 @@ impl GeneralRun {
         })
     }
 
-    /// The description of this run in its files.
+    /// The run that [`GeneralRun::json`] has written.
+    ///
+    /// # Errors
+    /// If it is none.
+    pub fn from_json(mut json: Value) -> Result<Self, String> {
+        let model = Model::from_json(json["system"].take())?;
+        let wrong = |what: &str| format!("{what} of a general run is none");
+        let number = |value: &Value, what: &str| value.as_f64().ok_or_else(|| wrong(what));
+        let read = |value: &Value| expression(value.as_str().unwrap_or_default(), &model);
+        let (method, observe) = (&json["method"], &json["observe"]);
+        // What is not finite is null.
+        let length = |value: &Value| value.as_f64().unwrap_or(f64::INFINITY);
+        let options = Options {
+            t_start: number(&json["t_start"], "the start")?,
+            t_end: number(&json["t_end"], "the end")?,
+            start: serde_json::from_value(json["start"].clone()).map_err(|e| e.to_string())?,
+            mode: 0,
+            rtol: number(&method["rtol"], "rtol")?,
+            atol: method["atol"].as_f64(),
+            max_step: length(&method["max_step"]),
+            max_steps: method["max_steps"].as_u64().ok_or_else(|| wrong("max_steps"))?,
+            record: match observe.get("section") {
+                Some(section) => Record::Section(read(section)?),
+                None => match observe["path"].get("chord") {
+                    Some(chord) => Record::Path { chord: number(chord, "the chord")? },
+                    None => Record::Times { every: length(&observe["times"]["every"]) },
+                },
+            },
+            exit: match json["exit"].as_str() {
+                Some("at-once:plus") => Exit::Plus,
+                Some("at-once:minus") => Exit::Minus,
+                _ => Exit::Undecided,
+            },
+            method: method["name"].as_str().and_then(Method::named).ok_or_else(|| wrong("the method"))?,
+            intersection: match (json["intersection"].as_str(), json["intersection"]["order"].as_array()) {
+                (Some("bilinear"), _) => Intersection::Bilinear,
+                (Some("hull-least-norm"), _) => Intersection::HullLeastNorm,
+                (_, Some(named)) => Intersection::Order(named.iter().map(read).collect::<Result<_, _>>()?),
+                _ => Intersection::Undecided,
+            },
+        };
+        Ok(Self { model, options })
+    }
+
+    /// What a file of this run says about itself.
     pub fn about(&self) -> Value {
         json!({ "kind": "general-run", "question": self.json() })
     }
@@ -252,79 +288,6 @@ impl Question for GeneralRun {
         }
         answer.tables = vec![whole];
         Ok(answer)
-    }
-}
-
-/// A closed orbit of a general system, by Newton's method once the motion has settled.
-#[derive(Clone, Debug)]
-pub struct GeneralOrbit {
-    /// System, start and method; `options.t_end` is the longest time of a return.
-    pub run: GeneralRun,
-    /// Time in which the motion settles first; whole periods of a drive.
-    pub settle: f64,
-    /// Where or when an orbit closes.
-    pub after: Return,
-}
-
-impl Question for GeneralOrbit {
-    fn kind(&self) -> &'static str {
-        "general-orbit"
-    }
-
-    fn label(&self) -> String {
-        "closed orbit".into()
-    }
-
-    fn json(&self) -> Value {
-        let mut json = self.run.json();
-        json["settle"] = self.settle.into();
-        json["closes"] = match self.after {
-            Return::Period(period) => json!({ "period": period }),
-            Return::Crossings(count) => json!({ "crossings": count }),
-        };
-        json
-    }
-
-    fn extent(&self) -> f64 {
-        self.run.options.t_start + self.settle
-    }
-
-    fn cost(&self) -> f64 {
-        self.settle
-    }
-
-    /// Facts: `states` (their names), `point`, `period`, `multipliers` (real and imaginary parts,
-    /// the largest first) and `gap` (how far the orbit is from closed, relative to its largest
-    /// state).
-    fn compute(&self, _: &Executor<'_>, monitor: &dyn Monitor) -> Result<Answer, JobError> {
-        let GeneralRun { model, options } = &self.run;
-        let mut options = options.clone();
-        // The phase of a drive is kept: whole periods.
-        let settle = match self.after {
-            Return::Period(period) => (self.settle / period).ceil() * period,
-            Return::Crossings(_) => self.settle,
-        };
-        if settle > 0.0 {
-            let t_end = options.t_start + settle;
-            let settling = Options {
-                t_end,
-                record: Record::Times { every: f64::INFINITY },
-                ..options.clone()
-            };
-            let end =
-                follow(model, &settling, &mut |point| monitor.reached(point.t).is_continue())?;
-            if end.ending == Ending::Interrupted {
-                return Err(JobError::Interrupted);
-            }
-            (options.start, options.mode) = (Some(end.x), end.mode);
-        }
-        let found = closed_orbit(model, &options, &self.after)?;
-        Ok(Answer::of_tables(Vec::new())
-            .with_fact("states", &model.coordinates())
-            .with_fact("point", &found.x)
-            .with_fact("period", &found.period)
-            .with_fact("multipliers", &found.multipliers)
-            .with_fact("gap", &found.gap))
     }
 }
 
@@ -580,33 +543,42 @@ mod tests {
 
     const DRIVEN: &str = "states = ['x']\nstart = [0]\nf = ['-x + 4*if(mod(t, 1) < 0.5, 1, 0)']";
 
-    /// x' = -x + 4 in the first half of each period of 1, -x in the other: the multiplier is 1/e,
-    /// and from x at the period's start it is x/e + 4 (1 - e^(-1/2)) e^(-1/2) at its end.
+    /// Names in no order of the alphabet, a table, expressions among the numbers: the run that is read is the one that was written.
     #[test]
-    fn a_driven_orbit_closes_as_its_formula_says() {
-        let question =
-            GeneralOrbit { run: run(DRIVEN, 10.0), settle: 0.5, after: Return::Period(1.0) };
-        let answer = Executor::quiet().ask(&question).unwrap();
-        let point: Vec<f64> = answer.fact("point").unwrap();
-        let multipliers: Vec<[f64; 2]> = answer.fact("multipliers").unwrap();
-        let half = (-0.5_f64).exp();
-        let expected = 4.0 * (1.0 - half) * half / (1.0 - half * half);
-        assert!((point[0] - expected).abs() < 1e-9, "{point:?} {expected}");
-        assert!((multipliers[0][0] - half * half).abs() < 1e-8, "{multipliers:?}");
+    fn a_run_is_read_as_it_was_written() {
+        let text = "states = ['x', 'v']\nstart = ['2*b', 0]\n[parameters]\nb = 0.1\na = '3*b'\n[let]\ns = 'x - a'\nc = 's^2'\n\
+            [tables.w]\nfile = 'w.csv'\ntime = 't'\ncolumn = 'w'\n[modes.z]\nf = ['v', '-sign(s) + w']\n[modes.m]\nf = ['v', 'c']\n\
+            [[event]]\nwhen = 'x + 1'\nmode = 'm'";
+        let model =
+            Model::new(Definition::from_toml(text, "f").unwrap()).with_table("w", "t,w\n0,0.1\n3,0.7\n20,0\n").unwrap();
+        let read = |text: &str| expression(text, &model).unwrap();
+        for (record, intersection, method) in [
+            (Record::Section(read("x - c*v/(1 + w)")), Intersection::Undecided, Method::Dopri5),
+            (Record::Times { every: f64::INFINITY }, Intersection::Order(vec![read("x - a")]), Method::Radau5),
+            (Record::Times { every: 0.1 }, Intersection::Bilinear, Method::Taylor),
+            (Record::Path { chord: 1e-3 }, Intersection::HullLeastNorm, Method::Dopri5),
+        ] {
+            let options = Options {
+                record,
+                intersection,
+                method,
+                start: Some(vec![0.1, 1.0 / 3.0]),
+                exit: Exit::Plus,
+                ..Options::default()
+            };
+            let run = GeneralRun { model: model.clone(), options };
+            assert_eq!(GeneralRun::from_json(run.json()).unwrap(), run);
+        }
+        assert!(GeneralRun::from_json(json!({ "system": model.json(), "t_start": 0 })).is_err());
     }
 
-    /// Settling ends in the second mode, from which the first one would not come back.
+    /// Motion begins in the first mode.
     #[test]
-    fn an_orbit_is_searched_in_the_mode_in_which_settling_ends() {
-        let text = "states = ['x']\nstart = [0]\n[modes.a]\nf = ['1']\n[modes.b]\nf = ['1']\n\
-            [[event]]\nfrom = 'a'\nwhen = 'x - 1'\ndirection = 'up'\nmode = 'b'\n\
-            [[event]]\nfrom = 'b'\nwhen = 'x - 2'\ndirection = 'up'\nmode = 'a'\nset = { x = 0 }";
-        let mut run = run(text, 10.0);
-        run.options.record =
-            Record::Section(twofold_system::Expression::parse_general("x - 0.5", &["x"]).unwrap());
-        let question = GeneralOrbit { run, settle: 1.5, after: Return::Crossings(1) };
-        let period: f64 = Executor::quiet().ask(&question).unwrap().fact("period").unwrap();
-        assert!((period - 2.0).abs() < 1e-9, "{period}");
+    fn the_order_of_modes_is_a_part_of_the_question() {
+        let of = |first: &str, second: &str| {
+            run(&format!("states = ['x']\nstart = [0]\n[modes.{first}]\nf = ['1']\n[modes.{second}]\nf = ['1']"), 1.0)
+        };
+        assert_ne!(Question::json(&of("a", "b")), Question::json(&of("b", "a")));
     }
 
     #[test]

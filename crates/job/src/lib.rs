@@ -50,6 +50,7 @@ pub mod encode;
 pub mod executor;
 pub mod exponent;
 pub mod general;
+pub mod general_orbit;
 pub mod horizon;
 pub mod limit;
 pub mod orbit;

@@ -13,9 +13,7 @@ use super::rest::{self, Rest};
 use super::run::Run;
 use super::spec::{Observation, RunSpec, SpecError, SwitchSpec};
 use super::table::{Column, Entry, Table};
-use twofold_analyse::branch::{
-    self, BranchOptions, End, Newton, Obstacle, Orbit, ReturnMap, Trouble,
-};
+use twofold_analyse::branch::{self, Branch, BranchOptions, End, Newton, Obstacle, Orbit, ReturnMap, Trouble};
 use twofold_analyse::filippov_return;
 use twofold_analyse::floquet::{self, ReturnPlane, Returned};
 use twofold_instances_switched::Motions;
@@ -112,19 +110,17 @@ pub struct Along {
     pub most: usize,
 }
 
-/// Largest |P(u) - u| that counts as closed, in relative tolerances of the orbit's extent; and
-/// never less than [`LEAST_CLOSED`].
-const CLOSED: f64 = 100.0;
-const LEAST_CLOSED: f64 = 1e-10;
-/// Returns from which the loop's size is taken: the first may have been computed with too large an
-/// error.
+/// Largest |P(u) - u| that counts as closed, in relative tolerances of the orbit's extent; and never less than [`LEAST_CLOSED`].
+pub(super) const CLOSED: f64 = 100.0;
+pub(super) const LEAST_CLOSED: f64 = 1e-10;
+/// Returns from which the loop's size is taken: the first may have been computed with too large an error.
 const SIZINGS: usize = 2;
 /// A search that has come to a rest to this share of its way has found the rest.
 const AT_REST: f64 = 1e-3;
 /// The map that is computed less accurately has so many times the error.
-const ROUGHLY: f64 = 10.0;
+pub(super) const ROUGHLY: f64 = 10.0;
 /// Newton iterations.
-const ITERATIONS: usize = 30;
+pub(super) const ITERATIONS: usize = 30;
 /// Most returns that are looked for in a settled motion.
 const MOST_RETURNS: usize = 32;
 /// Two crossings this near, in shares of their size, are taken for one when returns are counted:
@@ -202,19 +198,7 @@ impl Question for ClosedOrbit {
         if found.end == End::Interrupted {
             answer.stop = Stop::Interrupted;
         }
-        answer.tables.push(self.branch_table(&found.orbits));
-        let mut table = Table::new(
-            "bifurcations",
-            [
-                Column::words("change"),
-                Column::numbers(&along.parameter),
-                Column::numbers("uncertainty"),
-            ],
-        );
-        for b in &found.bifurcations {
-            table.push([b.change.word().into(), b.parameter.into(), b.uncertainty.into()]);
-        }
-        answer.tables.push(table);
+        answer.tables.extend(branch_tables(&along.parameter, &self.names(), &found));
         Ok(answer.with_fact("end", &found.end))
     }
 }
@@ -441,29 +425,32 @@ impl ClosedOrbit {
             .with_fact("iterations", &orbit.iterations)
             .with_fact("returns", &returns)
     }
+}
 
-    fn branch_table(&self, orbits: &[Orbit]) -> Table {
-        let parameter = self.along.as_ref().map_or("", |a| a.parameter.as_str());
-        let multipliers = orbits.iter().map(|o| o.multipliers.len()).max().unwrap_or(0);
-        let numbered = (1..=multipliers)
-            .flat_map(|k| [format!("multiplier{k}_re"), format!("multiplier{k}_im")]);
-        let columns =
-            [Column::numbers(parameter), Column::numbers("period"), Column::words("stability")]
-                .into_iter()
-                .chain(self.names().into_iter().map(|n| Column::numbers(&n)))
-                .chain(numbered.map(|n| Column::numbers(&n)));
-        let mut table = Table::new("branch", columns);
-        for o in orbits {
-            let mut row: Vec<Entry> =
-                vec![o.parameter.into(), o.period.into(), o.stability().word().into()];
-            row.extend(o.point.iter().map(|x| Entry::Number(*x)));
-            row.extend((0..multipliers).flat_map(|k| {
-                o.multipliers.get(k).map_or([f64::NAN; 2], |m| *m).map(Entry::Number)
-            }));
-            table.push(row);
-        }
-        table
+/// The tables `branch` and `bifurcations`.
+pub(super) fn branch_tables(parameter: &str, states: &[impl AsRef<str>], found: &Branch) -> [Table; 2] {
+    let orbits = &found.orbits;
+    let multipliers = orbits.iter().map(|o| o.multipliers.len()).max().unwrap_or(0);
+    let numbered = (1..=multipliers).flat_map(|k| [format!("multiplier{k}_re"), format!("multiplier{k}_im")]);
+    let columns = [Column::numbers(parameter), Column::numbers("period"), Column::words("stability")]
+        .into_iter()
+        .chain(states.iter().map(|n| Column::numbers(n.as_ref())))
+        .chain(numbered.map(|n| Column::numbers(&n)));
+    let mut branch = Table::new("branch", columns);
+    for o in orbits {
+        let mut row: Vec<Entry> = vec![o.parameter.into(), o.period.into(), o.stability().word().into()];
+        row.extend(o.point.iter().map(|x| Entry::Number(*x)));
+        row.extend(
+            (0..multipliers).flat_map(|k| o.multipliers.get(k).map_or([f64::NAN; 2], |m| *m).map(Entry::Number)),
+        );
+        branch.push(row);
     }
+    let columns = [Column::words("change"), Column::numbers(parameter), Column::numbers("uncertainty")];
+    let mut bifurcations = Table::new("bifurcations", columns);
+    for b in &found.bifurcations {
+        bifurcations.push([b.change.word().into(), b.parameter.into(), b.uncertainty.into()]);
+    }
+    [branch, bifurcations]
 }
 
 /// The return map of a question's system.

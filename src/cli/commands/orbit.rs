@@ -1,6 +1,7 @@
 //! `twofold orbit`: closed orbits and their stability.
 
 use std::fmt::Write as _;
+use std::path::Path;
 use std::sync::Arc;
 
 use serde_json::json;
@@ -16,7 +17,8 @@ use crate::cli::speak::{Delivery, deliver, is_standard_output, try_delivery};
 use crate::cli::{CliError, Exit};
 use crate::hybrid::motion::Record;
 use crate::hybrid::motion::tangent::Return;
-use crate::job::general::{GeneralOrbit, GeneralRun};
+use crate::job::general::GeneralRun;
+use crate::job::general_orbit::GeneralOrbit;
 use crate::job::orbit::Along;
 use crate::job::rest::{Rest, Stability as RestStability};
 use crate::job::spec::Observation;
@@ -33,10 +35,8 @@ use crate::job::{Answer, AnyQuestion, ClosedOrbit, Executor, JobError, Question,
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     twofold orbit --system relay-third-order --switch filippov --section q=0\n  \
-    twofold orbit --system buck --section s=0 --along supply=20..26 --format csv --out \
-    branch.csv\n  \
-    twofold orbit --reading reconstructed --section y=0 --start 0.8063,0,-0.0002 --settle 0 \
-    --format json")]
+    twofold orbit --system buck --period 4e-4 --settle 0.05 --along input=20..26 --format csv --out branch.csv\n  \
+    twofold orbit --reading reconstructed --section y=0 --start 0.8063,0,-0.0002 --settle 0 --format json")]
 pub struct Arguments {
     #[command(flatten)]
     flags: RunFlags,
@@ -142,7 +142,6 @@ impl Arguments {
     fn of_general(&self, mut run: GeneralRun) -> Result<GeneralOrbit, CliError> {
         let given = self.flags.given();
         let refused = [
-            ("--along", self.along.is_some()),
             ("--downward", self.downward),
             ("--chord", given.contains(&"--chord")),
             ("--every", given.contains(&"--every")),
@@ -150,10 +149,6 @@ impl Arguments {
         ];
         if let Some((flag, _)) = refused.iter().find(|(_, given)| *given) {
             let why = match *flag {
-                "--along" => {
-                    "branches are followed of systems with h, plus and minus; an attractor of this \
-                        one is followed by `twofold scan --follow`"
-                }
                 "--downward" => {
                     "a general system's orbit closes at rising crossings; for falling ones negate \
                         the section, such as --section \"-v=0\", and leave it out"
@@ -198,7 +193,18 @@ impl Arguments {
             return Err(CliError::Usage(format!("--settle is {settle}: give a time 0 or more")));
         }
         run.options.t_end = run.options.t_start + self.longest_return;
-        Ok(GeneralOrbit { run, settle, after })
+        let along = self.along.as_deref().map(along).transpose()?;
+        if let Some((along, text)) = along.as_ref().zip(self.along.as_deref())
+            && !run.model.definition().parameters().iter().any(|p| p.name == along.parameter)
+        {
+            let known: Vec<&str> = run.model.definition().parameters().iter().map(|p| p.name.as_str()).collect();
+            let known = if known.is_empty() { "none".into() } else { known.join(", ") };
+            return Err(CliError::Usage(format!(
+                "--along \"{text}\": the system has no parameter {}; it has {known}",
+                along.parameter
+            )));
+        }
+        Ok(GeneralOrbit { run, settle, after, along })
     }
 }
 
@@ -232,30 +238,15 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
             encode::json(&answer, &json!({ "kind": question.kind(), "question": question.json() }))
         }
     };
-    if answer.stop == Stop::Interrupted
-        && let Some(exit) = progress.asked_to_stop()
-    {
-        let part = out.filter(|f| !is_standard_output(f)).map(part_of);
-        deliver(part.as_deref(), &bytes)?;
-        let place = part.map_or("standard output".to_owned(), |p| p.display().to_string());
-        let rows = answer.table("branch").map_or(0, |t| t.len());
-        return Err(CliError::Stopped {
-            said: format!("interrupted: the {rows} orbits up to there are in {place}"),
-            exit,
-        });
-    }
-    deliver(out, &bytes)?;
-    Ok(Exit::Fine)
+    finish(&answer, &progress, out, &bytes)
 }
 
 /// A closed orbit of a general system, through a section or over its period.
 fn of_general(arguments: &Arguments, question: &GeneralOrbit) -> Result<Exit, CliError> {
     let out = arguments.delivery.out.as_deref();
     let format = ending::format(out, arguments.format, Format::Text)?;
-    if let Format::Csv = format {
-        return Err(CliError::Usage(
-            "--format csv: of a general system's orbit give text or json".into(),
-        ));
+    if let (Format::Csv, None) = (format, &question.along) {
+        return Err(CliError::Usage("--format csv: of one orbit of a general system give text or json".into()));
     }
     try_delivery(out)?;
     let progress = Progress::with_grace(arguments.delivery.quiet);
@@ -276,9 +267,12 @@ fn of_general(arguments: &Arguments, question: &GeneralOrbit) -> Result<Exit, Cl
         (answer.fact("period").map_err(fact)?, answer.fact("gap").map_err(fact)?);
     let largest = multipliers.first().map_or(0.0, |[re, im]| (re * re + im * im).sqrt());
     let names = question.run.model.coordinates();
-    let bytes = match format {
-        Format::Json => {
-            encode::json(&answer, &json!({ "kind": question.kind(), "question": question.json() }))
+    let about = json!({ "kind": question.kind(), "question": question.json() });
+    let bytes = match (format, answer.table("branch")) {
+        (Format::Json, _) => encode::json(&answer, &about),
+        (Format::Csv, Some(branch)) => {
+            let about = json!({ "kind": question.kind(), "question": question.json(), "facts": answer.facts });
+            encode::csv(branch, &about)
         }
         _ => {
             let mut text = String::new();
@@ -305,10 +299,30 @@ fn of_general(arguments: &Arguments, question: &GeneralOrbit) -> Result<Exit, Cl
             };
             line("stability", stability.into());
             line("closed to", format!("{gap:.1e} of the largest state"));
+            if let Some(along) = &question.along {
+                branch_lines(along, &answer, &mut line);
+            }
             text.into_bytes()
         }
     };
-    deliver(out, &bytes)?;
+    finish(&answer, &progress, out, &bytes)
+}
+
+/// Delivers an answer; of a branch that somebody stopped, as a part.
+fn finish(answer: &Answer, progress: &Progress, out: Option<&Path>, bytes: &[u8]) -> Result<Exit, CliError> {
+    if answer.stop == Stop::Interrupted
+        && let Some(exit) = progress.asked_to_stop()
+    {
+        let part = out.filter(|f| !is_standard_output(f)).map(part_of);
+        deliver(part.as_deref(), bytes)?;
+        let place = part.map_or("standard output".to_owned(), |p| p.display().to_string());
+        let rows = answer.table("branch").map_or(0, |t| t.len());
+        return Err(CliError::Stopped {
+            said: format!("interrupted: the {rows} orbits up to there are in {place}"),
+            exit,
+        });
+    }
+    deliver(out, bytes)?;
     Ok(Exit::Fine)
 }
 
@@ -402,28 +416,26 @@ fn text(question: &ClosedOrbit, answer: &Answer) -> Result<String, CliError> {
             ),
         },
     );
-    if let (Some(along), Some(branch)) = (&question.along, answer.table("branch")) {
-        let name = &along.parameter;
-        let values = branch.numbers(name);
-        line(
-            "branch",
-            format!(
-                "{} orbits, {name} = {} to {}",
-                values.len(),
-                along.from,
-                values.last().unwrap_or(&along.from)
-            ),
-        );
-        line("its end", ended(answer, name));
-        if let Some(table) = answer.table("bifurcations") {
-            for row in 0..table.len() {
-                let change = table.words("change").nth(row).unwrap_or_default().to_owned();
-                let (at, half) = (table.numbers(name)[row], table.numbers("uncertainty")[row]);
-                line(&change, format!("at {name} = {at} +- {half:.1e}"));
-            }
-        }
+    if let Some(along) = &question.along {
+        branch_lines(along, answer, &mut line);
     }
     Ok(out)
+}
+
+/// The branch for people.
+fn branch_lines(along: &Along, answer: &Answer, line: &mut dyn FnMut(&str, String)) {
+    let (Some(branch), name) = (answer.table("branch"), &along.parameter) else { return };
+    let values = branch.numbers(name);
+    let last = values.last().unwrap_or(&along.from);
+    line("branch", format!("{} orbits, {name} = {} to {last}", values.len(), along.from));
+    line("its end", ended(answer, name));
+    if let Some(table) = answer.table("bifurcations") {
+        for row in 0..table.len() {
+            let change = table.words("change").nth(row).unwrap_or_default().to_owned();
+            let (at, half) = (table.numbers(name)[row], table.numbers("uncertainty")[row]);
+            line(&change, format!("at {name} = {at} +- {half:.1e}"));
+        }
+    }
 }
 
 fn complex(numbers: &[[f64; 2]]) -> String {

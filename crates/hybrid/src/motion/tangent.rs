@@ -32,6 +32,8 @@ pub(super) struct Tangents {
     pub vectors: Vec<Vec<f64>>,
     /// Derivative of the last reset by the state, row by row, and by the time.
     pub reset: Option<(Vec<f64>, Vec<f64>)>,
+    /// The least and the largest value of each state at the ends of steps.
+    pub bounds: Vec<[f64; 2]>,
 }
 
 /// What stands before something is met.
@@ -48,6 +50,10 @@ impl Follower<'_> {
         let Some(mut tangents) = self.tangents.take() else { return 0.0 };
         let n = self.n;
         let mut worst = 0.0_f64;
+        tangents.bounds.resize(n, [f64::INFINITY, f64::NEG_INFINITY]);
+        for (bounds, ends) in tangents.bounds.iter_mut().zip(step.x.iter().zip(&step.y)) {
+            *bounds = [bounds[0].min(*ends.0).min(*ends.1), bounds[1].max(*ends.0).max(*ends.1)];
+        }
         for y in &mut tangents.vectors {
             let mut k: Vec<Vec<f64>> = Vec::with_capacity(7);
             let mut end = Vec::new();
@@ -224,7 +230,7 @@ impl Follower<'_> {
                 }
             }
         }
-        self.tangents = Some(Tangents { vectors, reset: None });
+        self.tangents = Some(Tangents { vectors, ..Tangents::default() });
         Ok(())
     }
 
@@ -640,6 +646,8 @@ pub enum Return {
 pub struct ClosedOrbit {
     /// A state on it.
     pub x: Vec<f64>,
+    /// The mode there.
+    pub mode: usize,
     /// Its period.
     pub period: f64,
     /// Its Floquet multipliers, largest first (real and imaginary parts); of an autonomous system
@@ -674,21 +682,11 @@ pub fn closed_orbit(
     let mut best: Option<ClosedOrbit> = None;
     let gap_of = |best: &Option<ClosedOrbit>| best.as_ref().map_or(f64::INFINITY, |b| b.gap);
     for _ in 0..30 {
-        let Turn { time, end, mode, mut matrix, section, size } =
-            turn(model, &options, after, &x, true)?;
+        let Turn { time, end, mode, matrix, size, .. } = turn(model, &options, after, &x, true)?;
         // The same state in another mode is another point.
         if mode != options.mode {
             (x, options.mode) = (end, mode);
             continue;
-        }
-        // On a section neighbours come back at other times: what is along the field goes.
-        if let Some((gradient, field)) = &section {
-            let speed: f64 = gradient.iter().zip(field).map(|(g, f)| g * f).sum();
-            for j in 0..n {
-                let late: f64 =
-                    (0..n).map(|i| gradient[i] * matrix[i * n + j]).sum::<f64>() / speed;
-                (0..n).for_each(|i| matrix[i * n + j] -= field[i] * late);
-            }
         }
         let gap: Vec<f64> = end.iter().zip(&x).map(|(e, x)| e - x).collect();
         let off = gap.iter().fold(0.0_f64, |a, v| a.max(v.abs())) / size.max(f64::MIN_POSITIVE);
@@ -702,14 +700,12 @@ pub fn closed_orbit(
         }
         if off < gap_of(&best) {
             let mut multipliers = eigenvalues(&matrix, n).unwrap_or_default();
-            multipliers.sort_by(|a, b| {
-                (b[0] * b[0] + b[1] * b[1]).total_cmp(&(a[0] * a[0] + a[1] * a[1]))
-            });
-            if section.is_some() {
+            multipliers.sort_by(|a, b| (b[0] * b[0] + b[1] * b[1]).total_cmp(&(a[0] * a[0] + a[1] * a[1])));
+            if let Return::Crossings(_) = after {
                 // The return map has an eigenvalue 0 along the field, which is none of the orbit's.
                 multipliers.pop();
             }
-            let found = ClosedOrbit { x: x.clone(), period: time, multipliers, gap: off };
+            let found = ClosedOrbit { x: x.clone(), mode, period: time, multipliers, gap: off };
             if off <= 1e-11 {
                 return Ok(found);
             }
@@ -732,16 +728,45 @@ pub fn closed_orbit(
 }
 
 /// Once around.
-struct Turn {
-    time: f64,
-    end: Vec<f64>,
-    mode: usize,
-    /// Derivative of the end by the start, row by row.
-    matrix: Vec<f64>,
-    /// Of a section its gradient and the field there.
-    section: Option<(Vec<f64>, Vec<f64>)>,
+#[derive(Clone, Debug)]
+pub struct Turn {
+    /// The time it took.
+    pub time: f64,
+    /// The state then.
+    pub end: Vec<f64>,
+    /// The mode then.
+    pub mode: usize,
+    /// The derivative of the return map, row by row. Of a section it has an eigenvalue 0 along the field.
+    pub matrix: Vec<f64>,
     /// The largest size of a state on the way.
-    size: f64,
+    pub size: f64,
+    /// The diagonal of the box around the way.
+    pub extent: f64,
+    /// Switches and events on the way.
+    pub changes: u64,
+}
+
+/// Follows motion from `x` until it is back; of a section from the point on it that is next to `x` along its gradient.
+///
+/// # Errors
+/// As [`follow`](super::follow); also if there is no return.
+pub fn once_around(model: &Model, options: &Options, after: &Return, x: &[f64]) -> Result<Turn, HybridError> {
+    explicit(options)?;
+    let (n, mut x) = (x.len(), x.to_vec());
+    let Return::Crossings(_) = after else { return turn(model, options, after, &x, true) };
+    let settings = Options { start: Some(x.clone()), ..options.clone() };
+    let mut follower = Follower::new(model, &settings)?;
+    let off = follower.watched_values();
+    let place = off.len() - 1;
+    let gradient = follower.gradient(options.t_start, place);
+    let square: f64 = gradient.iter().map(|g| g * g).sum();
+    x.iter_mut().zip(&gradient).for_each(|(x, g)| *x -= off[place] * g / square);
+    let mut turn = turn(model, options, after, &x, true)?;
+    for row in turn.matrix.chunks_mut(n) {
+        let along: f64 = row.iter().zip(&gradient).map(|(m, g)| m * g).sum::<f64>() / square;
+        row.iter_mut().zip(&gradient).for_each(|(m, g)| *m -= along * g);
+    }
+    Ok(turn)
 }
 
 /// `on_section`: the start is on the section, whatever rounding says.
@@ -794,29 +819,32 @@ fn turn(
         );
         return Err(HybridError::NoOrbit(why));
     }
-    let vectors = follower.tangents.take().map(|t| t.vectors).unwrap_or_default();
+    let Tangents { vectors, bounds, .. } = follower.tangents.take().unwrap_or_default();
     let mut matrix = vec![0.0; n * n];
     for (j, column) in vectors.iter().enumerate() {
         for i in 0..n {
             matrix[i * n + j] = column[i];
         }
     }
-    let section = match after {
-        Return::Period(_) => None,
-        Return::Crossings(_) => {
-            let section = follower.equation.watched.len() - 1;
-            follower.tangents = Some(Tangents::default());
-            let before = follower.before(&[Sought::Watched(section)])?;
-            before.map(|b| (b.gradient, b.field))
+    if let Return::Crossings(_) = after {
+        let section = follower.equation.watched.len() - 1;
+        follower.tangents = Some(Tangents::default());
+        // Neighbours come back at other times: what is along the field goes.
+        if let Some(Before { gradient, field, .. }) = follower.before(&[Sought::Watched(section)])? {
+            let speed: f64 = gradient.iter().zip(&field).map(|(g, f)| g * f).sum();
+            for j in 0..n {
+                let late: f64 = (0..n).map(|i| gradient[i] * matrix[i * n + j]).sum::<f64>() / speed;
+                (0..n).for_each(|i| matrix[i * n + j] -= field[i] * late);
+            }
         }
-    };
-    let size = follower.size.iter().fold(0.0_f64, |most, s| most.max(*s));
+    }
     Ok(Turn {
         time: outcome.t - settings.t_start,
         end: outcome.x,
         mode: outcome.mode,
         matrix,
-        section,
-        size,
+        size: follower.size.iter().fold(0.0_f64, |most, s| most.max(*s)),
+        extent: bounds.iter().map(|[low, high]| (high - low) * (high - low)).sum::<f64>().sqrt(),
+        changes: outcome.switches + outcome.events,
     })
 }

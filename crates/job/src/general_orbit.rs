@@ -1,0 +1,277 @@
+//! Closed orbits of general systems, and how they change with a parameter.
+
+use serde_json::{Value, json};
+use twofold_analyse::branch::{self, BranchOptions, End, Newton, Orbit, ReturnMap, Trouble};
+use twofold_analyse::floquet::Returned;
+use twofold_hybrid::motion::Record;
+use twofold_hybrid::motion::tangent::{Return, closed_orbit, once_around};
+use twofold_hybrid::rests::rests;
+use twofold_hybrid::{Ending, HybridError, Model, Options, follow};
+use twofold_integrate::Watch;
+
+use super::answer::{Answer, Stop};
+use super::executor::Executor;
+use super::general::GeneralRun;
+use super::orbit::{Along, CLOSED, ITERATIONS, LEAST_CLOSED, ROUGHLY, branch_tables};
+use super::question::{JobError, Question};
+
+/// A closed orbit of a general system, by Newton's method once the motion has settled, and its branch along a parameter if one is named.
+#[derive(Clone, Debug)]
+pub struct GeneralOrbit {
+    /// System, start and method; `options.t_end` is the longest time of a return.
+    pub run: GeneralRun,
+    /// Time in which the motion settles first; whole periods of a drive.
+    pub settle: f64,
+    /// Where or when an orbit closes.
+    pub after: Return,
+    /// The parameter to follow it along.
+    pub along: Option<Along>,
+}
+
+impl Question for GeneralOrbit {
+    fn kind(&self) -> &'static str {
+        "general-orbit"
+    }
+
+    fn json(&self) -> Value {
+        let mut json = self.run.json();
+        json["settle"] = self.settle.into();
+        json["closes"] = match self.after {
+            Return::Period(period) => json!({ "period": period }),
+            Return::Crossings(count) => json!({ "crossings": count }),
+        };
+        if let Some(along) = &self.along {
+            json["along"] = json!(along);
+        }
+        json
+    }
+
+    fn extent(&self) -> f64 {
+        self.run.options.t_start + self.settle
+    }
+
+    fn cost(&self) -> f64 {
+        self.settle
+    }
+
+    /// Facts: `states` (their names), `point`, `period`, `multipliers` (real and imaginary parts, the largest first) and `gap` (how far the orbit is from closed,
+    /// relative to its largest state). Of a branch also the tables `branch` and `bifurcations` and the fact `end`, as of [`ClosedOrbit`](super::ClosedOrbit).
+    fn compute(&self, _: &Executor<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
+        let model = match &self.along {
+            Some(along) => at(&self.run.model, along, along.from)?,
+            None => self.run.model.clone(),
+        };
+        let mut options = self.run.options.clone();
+        // The phase of a drive is kept: whole periods.
+        let settle = match self.after {
+            Return::Period(period) => (self.settle / period).ceil() * period,
+            Return::Crossings(_) => self.settle,
+        };
+        if settle > 0.0 {
+            let t_end = options.t_start + settle;
+            let settling = Options { t_end, record: Record::Times { every: f64::INFINITY }, ..options.clone() };
+            let end = follow(&model, &settling, &mut |point| watch.reached(point.t))?;
+            if end.ending == Ending::Interrupted {
+                return Err(JobError::Interrupted);
+            }
+            (options.start, options.mode) = (Some(end.x), end.mode);
+        }
+        let found = closed_orbit(&model, &options, &self.after)?;
+        let mut answer = Answer::of_tables(Vec::new())
+            .with_fact("states", &model.coordinates())
+            .with_fact("point", &found.x)
+            .with_fact("period", &found.period)
+            .with_fact("multipliers", &found.multipliers)
+            .with_fact("gap", &found.gap);
+        let Some(along) = &self.along else { return Ok(answer) };
+        at(&model, along, along.to)?;
+        options.mode = found.mode;
+        let map = Map { model: &model, options, after: &self.after, along };
+        let rtol = self.run.options.rtol;
+        let newton = Newton {
+            closed: (CLOSED * rtol).max(LEAST_CLOSED),
+            atol: self.run.options.atol.unwrap_or(0.0),
+            rtol,
+            iterations: ITERATIONS,
+        };
+        let guess: Vec<f64> = found.x.into_iter().chain([0.0]).collect();
+        let first = branch::closed_orbit(&map, &guess, along.from, newton)
+            .map_err(|trouble| HybridError::NoOrbit(trouble.said))?;
+        let width = (along.to - along.from).abs();
+        let branch_options = BranchOptions {
+            from: along.from,
+            to: along.to,
+            longest: 1.0 / along.steps as f64,
+            most: along.most,
+            newton,
+        };
+        let mut go_on = |orbit: &Orbit| watch.reached(((orbit.parameter - along.from) / width).abs().min(1.0));
+        let mut found = branch::follow(&map, first, &branch_options, &mut go_on);
+        if found.end == End::Interrupted {
+            answer.stop = Stop::Interrupted;
+        }
+        for orbit in &mut found.orbits {
+            orbit.point.pop();
+            if let Return::Crossings(_) = self.after {
+                // The one along the field is none of the orbit's.
+                orbit.multipliers.pop();
+            }
+        }
+        answer.tables.extend(branch_tables(&along.parameter, &model.coordinates(), &found));
+        Ok(answer.with_fact("end", &found.end))
+    }
+}
+
+/// The system at a value of the parameter.
+fn at(model: &Model, along: &Along, value: f64) -> Result<Model, HybridError> {
+    let model = model.clone().with(&along.parameter, value).and_then(|model| model.values().map(|_| model));
+    model.map_err(|error| HybridError::Bad(format!("--along {}: {error}", along.parameter)))
+}
+
+/// The return map. A section need be no plane of one state, and the period of a drive has none: the plane that the search keeps to is that of one more state,
+/// which is zero.
+struct Map<'a> {
+    model: &'a Model,
+    options: Options,
+    after: &'a Return,
+    along: &'a Along,
+}
+
+impl Map<'_> {
+    fn tried(&self, u: &[f64], p: f64, options: &Options) -> Result<Returned, HybridError> {
+        let n = u.len() - 1;
+        let turn = once_around(&at(self.model, self.along, p)?, options, self.after, &u[..n])?;
+        if turn.mode != self.options.mode {
+            let mode = |mode: usize| &self.model.definition().modes()[mode].name;
+            let (from, to) = (mode(self.options.mode), mode(turn.mode));
+            return Err(HybridError::NoOrbit(format!("the motion comes back in the mode {to} and not in {from}")));
+        }
+        let mut derivative = vec![0.0; (n + 1) * (n + 1)];
+        for (i, row) in turn.matrix.chunks(n).enumerate() {
+            derivative[i * (n + 1)..i * (n + 1) + n].copy_from_slice(row);
+        }
+        let point: Vec<f64> = turn.end.into_iter().chain([0.0]).collect();
+        Ok(Returned {
+            same: vec![point.clone()],
+            point,
+            time: turn.time,
+            derivative,
+            opposite: Vec::new(),
+            extent: turn.extent,
+            passes: true,
+            derivative_error: 0.0,
+            events: usize::try_from(turn.changes).unwrap_or(usize::MAX),
+        })
+    }
+}
+
+impl ReturnMap for Map<'_> {
+    fn states(&self) -> usize {
+        self.model.coordinates().len() + 1
+    }
+
+    fn axis(&self) -> usize {
+        self.model.coordinates().len()
+    }
+
+    fn returned(&self, u: &[f64], p: f64, _: bool) -> Result<Returned, Trouble> {
+        self.tried(u, p, &self.options).map_err(|error| error.to_string().into())
+    }
+
+    fn roughly(&self, u: &[f64], p: f64) -> Result<Returned, Trouble> {
+        let Options { rtol, atol, .. } = self.options;
+        let options = Options { rtol: ROUGHLY * rtol, atol: atol.map(|atol| ROUGHLY * atol), ..self.options.clone() };
+        self.tried(u, p, &options).map_err(|error| error.to_string().into())
+    }
+
+    /// The nearest rest in a box around the point; the motion from it need not come back.
+    fn rest(&self, u: &[f64], p: f64) -> Option<(Vec<f64>, Vec<[f64; 2]>)> {
+        let model = at(self.model, self.along, p).ok()?;
+        let u = &u[..u.len() - 1];
+        let size = u.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+        let within: Vec<(f64, f64)> = u.iter().map(|x| (x - size, x + size)).collect();
+        let apart = |x: &[f64]| x.iter().zip(u).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
+        let found = rests(&model, &within).ok()?.into_iter().filter(|rest| rest.mode == self.options.mode);
+        let nearest = found.min_by(|a, b| apart(&a.x).total_cmp(&apart(&b.x)))?;
+        Some((nearest.x.into_iter().chain([0.0]).collect(), nearest.eigenvalues))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::general::expression;
+    use twofold_hybrid::Definition;
+
+    fn run(text: &str, t_end: f64) -> GeneralRun {
+        let model = Model::new(Definition::from_toml(text, "f").unwrap());
+        GeneralRun { model, options: Options { t_end, ..Options::default() } }
+    }
+
+    const DRIVEN: &str = "states = ['x']\nstart = [0]\nf = ['-x + 4*if(mod(t, 1) < 0.5, 1, 0)']";
+
+    /// x' = -x + 4 in the first half of each period of 1, -x in the other: the multiplier is 1/e, and from x at the period's start it is
+    /// x/e + 4 (1 - e^(-1/2)) e^(-1/2) at its end.
+    #[test]
+    fn a_driven_orbit_closes_as_its_formula_says() {
+        let question = GeneralOrbit { run: run(DRIVEN, 10.0), settle: 0.5, after: Return::Period(1.0), along: None };
+        let answer = Executor::quiet().ask(&question).unwrap();
+        let point: Vec<f64> = answer.fact("point").unwrap();
+        let multipliers: Vec<[f64; 2]> = answer.fact("multipliers").unwrap();
+        let half = (-0.5_f64).exp();
+        let expected = 4.0 * (1.0 - half) * half / (1.0 - half * half);
+        assert!((point[0] - expected).abs() < 1e-9, "{point:?} {expected}");
+        assert!((multipliers[0][0] - half * half).abs() < 1e-8, "{multipliers:?}");
+    }
+
+    /// Settling ends in the second mode, from which the first one would not come back.
+    #[test]
+    fn an_orbit_is_searched_in_the_mode_in_which_settling_ends() {
+        let text = "states = ['x']\nstart = [0]\n[modes.a]\nf = ['1']\n[modes.b]\nf = ['1']\n\
+            [[event]]\nfrom = 'a'\nwhen = 'x - 1'\ndirection = 'up'\nmode = 'b'\n\
+            [[event]]\nfrom = 'b'\nwhen = 'x - 2'\ndirection = 'up'\nmode = 'a'\nset = { x = 0 }";
+        let mut run = run(text, 10.0);
+        run.options.record = Record::Section(expression("x - 0.5", &run.model).unwrap());
+        let question = GeneralOrbit { run, settle: 1.5, after: Return::Crossings(1), along: None };
+        let period: f64 = Executor::quiet().ask(&question).unwrap().fact("period").unwrap();
+        assert!((period - 2.0).abs() < 1e-9, "{period}");
+    }
+
+    fn along(parameter: &str, from: f64, to: f64) -> Option<Along> {
+        Some(Along { parameter: parameter.into(), from, to, steps: 10, most: 200 })
+    }
+
+    /// x halves in each period, then a kick makes of x/2 c x - x^3: of this map the fixed point sqrt(c - 1) has the multiplier 3 - 2 c, which is -1 at c = 2.
+    #[test]
+    fn a_kicked_orbit_doubles_its_period_where_its_map_does() {
+        let text = "states = ['x']\nstart = [0.7]\nf = ['-0.6931471805599453*x']\n[parameters]\nc = 1.5\n\
+            [[event]]\nevery = 1\nset = { x = '2*c*x - 8*x^3' }";
+        let question =
+            GeneralOrbit { run: run(text, 10.0), settle: 0.0, after: Return::Period(1.0), along: along("c", 1.4, 2.2) };
+        let answer = Executor::quiet().ask(&question).unwrap();
+        let (branch, changes) = (answer.table("branch").unwrap(), answer.table("bifurcations").unwrap());
+        for ((c, x), m) in branch.numbers("c").iter().zip(branch.numbers("x")).zip(branch.numbers("multiplier1_re")) {
+            assert!((x - (c - 1.0).sqrt()).abs() < 1e-9 && (m - 3.0 + 2.0 * c).abs() < 1e-8, "{c} {x} {m}");
+        }
+        assert_eq!(changes.words("change").collect::<Vec<_>>(), ["period-doubling"]);
+        assert!((changes.numbers("c")[0] - 2.0).abs() < 1e-6, "{:?}", changes.numbers("c"));
+    }
+
+    /// Hopf's normal form with amplitude r^2 (b - r^2) + mu = 0 has a fold of cycles at mu = -b^2/4, passed on a section that is no plane.
+    #[test]
+    fn a_branch_goes_through_a_fold() {
+        let text = "states = ['x', 'y']\nstart = [0, 1]\nf = ['x*g - y', 'y*g + x']\n[parameters]\nmu = 0.3\n\
+            [let]\nq = 'x^2 + y^2'\ng = 'mu + q - q^2'";
+        let mut run = run(text, 100.0);
+        run.options.record = Record::Section(expression("sinh(x) + x^3", &run.model).unwrap());
+        let question = GeneralOrbit { run, settle: 60.0, after: Return::Crossings(1), along: along("mu", 0.3, -0.6) };
+        let answer = Executor::quiet().ask(&question).unwrap();
+        let (branch, changes) = (answer.table("branch").unwrap(), answer.table("bifurcations").unwrap());
+        for (mu, y) in branch.numbers("mu").iter().zip(branch.numbers("y")) {
+            let q = y * y;
+            assert!((mu + q - q * q).abs() < 1e-7, "{mu} {y}");
+        }
+        assert_eq!(changes.words("change").collect::<Vec<_>>(), ["fold", "hopf"]);
+        assert!((changes.numbers("mu")[0] + 0.25).abs() < 1e-5, "{:?}", changes.numbers("mu"));
+    }
+}
