@@ -24,7 +24,6 @@ filippov="--switch filippov --exit at-once:plus"
     plot friction-pair $filippov --t-end 40 --kind series --axes x1,x2,v1
     plot relay-third-order $filippov --t-end 40
     plot chua --t-end 120 --camera -60,15
-    plot buck --set supply=33 --t-end 120
     plot gene-switch $filippov --t-end 12
     plot fused-focus $filippov --set mu=-0.01 --t-end 120
     plot relay-square $filippov --t-end 6
@@ -34,7 +33,7 @@ filippov="--switch filippov --exit at-once:plus"
     plot relay-hysteresis --t-end 40
     plot three-blocks --t-end 40 --kind series --axes x1,x2,v1
     plot sliding-mode-control --t-end 6
-    plot buck-ramp --set input=33 --t-end 0.02
+    plot buck --set input=33 --t-end 0.02
     plot cuk-converter --t-end 0.02
     plot rimless-wheel --t-end 20
     plot driven-by-data --t-end 160

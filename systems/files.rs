@@ -2,7 +2,7 @@
 #![forbid(unsafe_code)]
 
 /// Name and text of every system.
-pub const FILES: [(&str, &str); 16] = [
+pub const FILES: [(&str, &str); 15] = [
     ("caricature", include_str!("caricature.toml")),
     ("caricature-as-printed", include_str!("caricature-as-printed.toml")),
     ("two-fold", include_str!("two-fold.toml")),
@@ -14,7 +14,6 @@ pub const FILES: [(&str, &str); 16] = [
     ("friction-pair", include_str!("friction-pair.toml")),
     ("relay-third-order", include_str!("relay-third-order.toml")),
     ("chua", include_str!("chua.toml")),
-    ("buck", include_str!("buck.toml")),
     ("gene-switch", include_str!("gene-switch.toml")),
     ("fused-focus", include_str!("fused-focus.toml")),
     ("relay-square", include_str!("relay-square.toml")),
@@ -28,7 +27,7 @@ pub const GENERAL: [(&str, &str); 9] = [
     ("relay-hysteresis", include_str!("general/relay-hysteresis.toml")),
     ("three-blocks", include_str!("general/three-blocks.toml")),
     ("sliding-mode-control", include_str!("general/sliding-mode-control.toml")),
-    ("buck-ramp", include_str!("general/buck-ramp.toml")),
+    ("buck", include_str!("general/buck.toml")),
     ("cuk-converter", include_str!("general/cuk-converter.toml")),
     ("rimless-wheel", include_str!("general/rimless-wheel.toml")),
     ("driven-by-data", include_str!("general/driven-by-data.toml")),

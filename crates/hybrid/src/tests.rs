@@ -50,7 +50,7 @@ fn every_general_system_that_ships_is_read_and_followed() {
                 && !model.definition().document().references.is_empty()
         );
         let t_end = match name {
-            "buck-ramp" => 0.01,
+            "buck" => 0.01,
             "cuk-converter" => 0.001,
             _ => 5.0,
         };
@@ -563,7 +563,7 @@ fn tangent_vectors_pass_switches_by_saltation_matrices() {
     assert_eq!(found.values[1], f64::NEG_INFINITY);
     // Giaouris, Maity, Banerjee, Pickert & Zahawi (2008), sec. V: -0.8211 +- 0.0708i at 24 V.
     let options = Options { start: Some(vec![12.0222, 0.6065]), ..Options::default() };
-    let orbit = closed_orbit(&shipped("buck-ramp"), &options, &Return::Period(400e-6)).unwrap();
+    let orbit = closed_orbit(&shipped("buck"), &options, &Return::Period(400e-6)).unwrap();
     near(orbit.multipliers[0][0], -0.8211, 5e-5);
     near(orbit.multipliers[0][1].abs(), 0.0708, 5e-5);
     // A forced oscillator's multipliers over one period are exp of its eigenvalues times the
@@ -1512,7 +1512,7 @@ fn series_agree_with_dormand_and_prince_on_all_that_ships() {
     for name in twofold_system::library::general_names() {
         let model = shipped(name);
         let t_end = match name {
-            "buck-ramp" => 0.01,
+            "buck" => 0.01,
             "cuk-converter" => 0.000_99,
             "driven-by-data" => 160.0,
             // Before its impacts accumulate.
