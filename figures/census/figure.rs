@@ -95,7 +95,7 @@ pub fn found_in(
     for (file, name, _) in SHORTER {
         for reading in Reading::ALL {
             let rows = rows_of(&read(&format!("{file}-{}.csv", reading.word()))?)?;
-            shorter.push(Shorter { name, end: rows.sweep().run().t_end, table: rows.table() });
+            shorter.push(Shorter { name, end: rows.sweep().t_end(), table: rows.table() });
         }
     }
     let data = Data {

@@ -13,7 +13,7 @@ use crate::hybrid::{Definition, HybridError, Model, Options};
 use crate::integrate::StepCap;
 use crate::integrate::filippov::{self, ExitRule};
 use crate::job::JobError;
-use crate::job::general::{GeneralRun, model_of};
+use crate::job::general::{GeneralRun, expression, model_of};
 use crate::job::spec::SwitchSpec;
 use crate::record::files::read_text;
 use crate::system::diagnostic::nearest;
@@ -224,6 +224,40 @@ pub fn run_of(flags: &RunFlags) -> Result<Option<GeneralRun>, CliError> {
     Ok(Some(GeneralRun { model, options }))
 }
 
+/// The same for runs of which the ends are compared: --section or `period` says where they are looked at.
+///
+/// # Errors
+/// If a flag has no effect on it, or a value is wrong.
+pub fn looked_at(flags: &RunFlags, period: Option<f64>) -> Result<Option<GeneralRun>, CliError> {
+    let Some(mut run) = run_of(flags)? else {
+        if period.is_some() {
+            let why = "equations with h, plus and minus do not see the time; leave it out, and give --section";
+            return Err(CliError::no_effect("--period", why));
+        }
+        return Ok(None);
+    };
+    for flag in ["--chord", "--every"] {
+        if flags.given().contains(&flag) {
+            return Err(CliError::no_effect(flag, "no paths are recorded here; leave it out"));
+        }
+    }
+    let options = &mut run.options;
+    match (period, &options.record) {
+        (Some(_), Record::Section(_)) => {
+            return Err(CliError::no_effect("--period", "--section says where to look; leave one of the two out"));
+        }
+        (Some(period), _) if period.is_finite() && period > 0.0 => {
+            // Whole periods, so that the next run can begin at the same phase.
+            options.t_end = options.t_start + ((options.t_end - options.t_start) / period).ceil() * period;
+            options.record = Record::Times { every: period };
+        }
+        (Some(period), _) => return Err(usage(format!("--period is {period}: give a time above 0"))),
+        (None, Record::Section(_)) => {}
+        (None, _) => options.record = Record::Times { every: f64::INFINITY },
+    }
+    Ok(Some(run))
+}
+
 /// The method that the flag names.
 fn method(named: Option<Named>) -> Result<Method, CliError> {
     let (name, why) = match named {
@@ -309,19 +343,6 @@ fn intersection(text: &str, model: &Model) -> Result<Rule, CliError> {
         return Err(wrong("a bracket is not closed".into()));
     }
     Ok(Rule::Order(order))
-}
-
-/// Reads an expression of a system's states, parameters, terms and tables.
-fn expression(text: &str, model: &Model) -> Result<Expression, String> {
-    let definition = model.definition();
-    let terms = definition.document().terms.0.iter().map(|(n, _)| n.as_str());
-    let tables = definition.tables().iter().map(|(n, _)| n.as_str());
-    let parameters = definition.parameters().iter().map(|p| p.name.as_str());
-    let names: Vec<&str> =
-        model.coordinates().into_iter().chain(parameters).chain(terms).chain(tables).collect();
-    Expression::parse_general(text, &names).map_err(|e| {
-        format!("{}{}", e.message, e.help.map_or(String::new(), |h| format!(" ({h})")))
-    })
 }
 
 /// Reads "x - y = 0".

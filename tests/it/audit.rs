@@ -6,7 +6,7 @@ use std::fs;
 use assert_cmd::Command;
 use serde_json::Value;
 use twofold::job::spec::RunSpec;
-use twofold::job::sweep::{Rows, Sweep};
+use twofold::job::sweep::{Base, Rows, Sweep};
 
 /// Exit code, standard output, standard error.
 fn audit(arguments: &[&str]) -> (Option<i32>, String, String) {
@@ -63,7 +63,8 @@ fn rows_of_sweeps_are_recomputed() {
     assert_eq!(code, Some(1), "{out}{err}");
     assert_eq!(out.matches("DIFFERS: row ").count(), 2, "{out}");
     // A file, sound as such, whose rows answer another question than it says.
-    let run = RunSpec { t_end: 61.0, ..rows.sweep().run().clone() };
+    let Base::Surfaces(run) = rows.sweep().run() else { panic!("of a system with h, plus and minus") };
+    let run = RunSpec { t_end: 61.0, ..(**run).clone() };
     let mut others = Rows::of(Sweep::new(run, rows.sweep().axes().to_vec(), None).unwrap());
     rows.iter().for_each(|row| others.insert(row).unwrap());
     fs::write(&file, others.csv()).unwrap();

@@ -66,7 +66,7 @@ const SHIPPED: [(&str, &str, &[&str]); 9] = [
     ("relay-hysteresis", "20", &["t", "T", "mode", "event"]),
     ("three-blocks", "2", &["t", "x1", "x2", "x3", "v1", "v2", "v3", "signs"]),
     ("sliding-mode-control", "2", &["t", "x", "v", "signs"]),
-    ("buck-ramp", "0.002", &["t", "v", "i", "signs"]),
+    ("buck", "0.002", &["t", "v", "i", "signs"]),
     ("cuk-converter", "0.0002", &["t", "i1", "v1", "i2", "v2", "signs"]),
     ("rimless-wheel", "2", &["t", "a", "w", "event"]),
     ("driven-by-data", "50", &["t", "height", "signs"]),
@@ -246,8 +246,7 @@ fn three_blocks_stick_until_one_is_pulled_off() {
 #[test]
 fn a_buck_converter_takes_its_ramps_period() {
     let folder = tempfile::tempdir().unwrap();
-    let buck =
-        run(folder.path(), &["--system", "buck-ramp", "--t-end", "0.2", "--every", "0.0004"]);
+    let buck = run(folder.path(), &["--system", "buck", "--t-end", "0.2", "--every", "0.0004"]);
     let v = buck.numbers("v");
     near(v[v.len() - 1], v[v.len() - 2], 1e-9);
 }
@@ -433,19 +432,20 @@ fn wrong_files_and_flags_are_refused() {
     ball(&["--section", "x > v = 0"], 2, &["a condition is no number"]);
     ball(&["--section", "x = 0", "--every", "1"], 2, &["--every has no effect"]);
     ball(&["--t-start", "5", "--t-end", "1"], 2, &["--t-end, --t-start"]);
-    let sweep = ["sweep", "--over", "params.r=0.5,0.6", "--quiet", "--system", "bouncing-ball"];
-    refused(
-        at,
-        &sweep,
-        2,
-        &["--system bouncing-ball: a general system", "`twofold run`", "`scan`"],
-    );
-    refused(
-        at,
-        &["run", "--system", "bouncing-bal"],
-        2,
-        &["did you mean bouncing-ball?", "driven-by-data"],
-    );
+    let along = ["orbit", "--along", "q=0.5..0.6", "--quiet", "--system", "rimless-wheel", "--section", "a=0"];
+    refused(at, &along, 2, &["--along \"q=0.5..0.6\": the system has no parameter q; it has"]);
+    for (axis, words) in [
+        ("eps=1,2", "eps belongs to systems with h, plus and minus; of a general system vary params.NAME"),
+        ("params.q=1,2", "no parameter `q`"),
+        ("start.z=1,2", "no state z; it has x, v"),
+    ] {
+        refused(at, &["sweep", "--quiet", "--system", "bouncing-ball", "--over", axis], 2, &[words]);
+    }
+    let sweep = ["sweep", "--quiet", "--system", "bouncing-ball"];
+    refused(at, &[&sweep[..], &["--every", "1"]].concat(), 2, &["--every has no effect", "no paths are recorded"]);
+    refused(at, &[&sweep[..], &["--period", "-1"]].concat(), 2, &["--period is -1"]);
+    refused(at, &["sweep", "--quiet", "--period", "1"], 2, &["--period has no effect"]);
+    refused(at, &["run", "--system", "bouncing-bal"], 2, &["did you mean bouncing-ball?", "driven-by-data"]);
     // A system with one switch still says what it lacks, and who has it.
     fs::write(at.join("f.toml"), "states = ['x']\nh = 'x'\nplus = ['max(x, 1)']\nminus = ['1']")
         .unwrap();
@@ -455,6 +455,82 @@ fn wrong_files_and_flags_are_refused() {
         2,
         &["f.toml:3:10", "(a + b + abs(a - b))/2", "f = [...] has max"],
     );
+}
+
+/// Falls from heights that parameters give, to the ground at 0: sqrt(2 h/g) each, however the rows are computed.
+#[test]
+fn a_sweep_has_a_row_a_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let drop = "name = 'drop'\nstates = ['x', 'v']\nstart = ['2*half', 0]\n[parameters]\nhalf = 1\ng = { value = 10, above = 0 }\n\
+        [modes.up]\nf = ['v', '-g']\n[modes.down]\nf = ['v', '-g']\n\
+        [[event]]\nname = 'sinks'\nfrom = 'up'\nwhen = 'v + 1'\ndirection = 'down'\nmode = 'down'\n\
+        [[event]]\nname = 'lands'\nwhen = 'x'\ndirection = 'down'\nstop = true";
+    fs::write(at.join("drop.toml"), drop).unwrap();
+    let sweep = |more: &[&str]| {
+        let over =
+            ["sweep", "--quiet", "--system", "drop.toml", "--over", "params.half=0.5,2", "--over", "params.g=5,-1,20"];
+        let (found, _, err) = twofold_in(at, &[&over[..], more].concat());
+        assert_eq!(found, 3, "{err}");
+    };
+    sweep(&["--t-end", "3", "--out", "whole.csv"]);
+    let whole = fs::read(at.join("whole.csv")).unwrap();
+    let table = from_csv(&whole).unwrap().1;
+    let words = |name: &str| table.words(name).map(str::to_owned).collect::<Vec<_>>();
+    assert_eq!(words("outcome"), ["stopped", "failed", "stopped", "stopped", "failed", "stopped"]);
+    assert_eq!(words("event")[..3], ["lands", "", "lands"]);
+    assert_eq!(words("mode")[..3], ["down", "", "down"]);
+    assert!(words("reason")[1].contains("above 0"), "{:?}", words("reason"));
+    assert_eq!(table.integers("events"), [2, 0, 2, 2, 0, 2]);
+    for (row, (half, g)) in
+        [(0.5, 5.0), (0.5, -1.0), (0.5, 20.0), (2.0, 5.0), (2.0, -1.0), (2.0, 20.0_f64)].iter().enumerate()
+    {
+        if *g > 0.0 {
+            near(table.numbers("end")[row], (4.0 * half / g).sqrt(), 1e-9);
+            near(table.numbers("end.v")[row], -(4.0 * half * g).sqrt(), 1e-8);
+        }
+    }
+    // In parts, through a journal, and again.
+    for (shard, file) in [("1/2", "a.csv"), ("2/2", "b.csv")] {
+        sweep(&["--t-end", "3", "--shard", shard, "--out", file]);
+    }
+    let (code, _, err) = twofold_in(at, &["sweep", "merge", "a.csv", "b.csv", "--quiet", "--out", "merged.csv"]);
+    assert_eq!(code, 3, "{err}");
+    assert_eq!(fs::read(at.join("merged.csv")).unwrap(), whole);
+    sweep(&["--t-end", "3", "--resume", "--out", "a.csv"]);
+    assert_eq!(fs::read(at.join("a.csv")).unwrap(), whole);
+    let (code, _, err) = twofold_in(at, &["audit", "whole.csv", "--rows", "6"]);
+    assert_eq!(code, 0, "{err}");
+}
+
+/// What is looked at by --section and --period: events are no multiples of the period.
+#[test]
+fn a_sweep_says_what_runs_settle_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let text =
+        "states = ['x']\nstart = [0.3]\nf = ['1']\n[parameters]\ntop = 1\n[[event]]\nwhen = 'x - top'\nset = { x = 0 }";
+    fs::write(at.join("saw.toml"), text).unwrap();
+    fs::write(
+        at.join("well.toml"),
+        "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', 'p*x - x^3 - v']\n[parameters]\np = 1",
+    )
+    .unwrap();
+    let outcomes = |flags: &[&str]| {
+        let table = from_csv(&good(at, &[&["sweep", "--quiet"], flags].concat())).unwrap().1;
+        (table.words("outcome").map(str::to_owned).collect::<Vec<_>>(), table.integers("crossings").to_vec())
+    };
+    let saw = ["--system", "saw.toml", "--t-end", "300", "--over", "params.top=1,1.5"];
+    let (found, seen) = outcomes(&[&saw[..], &["--period", "0.5"]].concat());
+    assert_eq!((found, seen), (vec!["period-2".into(), "period-3".into()], vec![601, 601]));
+    let (found, seen) = outcomes(&[&saw[..], &["--section", "x=0.5"]].concat());
+    assert_eq!((found, seen), (vec!["period-1".into(), "period-1".into()], vec![300, 200]));
+    assert_eq!(outcomes(&saw).0, ["moving", "moving"]);
+    assert_eq!(outcomes(&["--system", "well.toml", "--t-end", "100", "--over", "params.p=1,4"]).0, ["rest", "rest"]);
+    let scan =
+        ["scan", "--quiet", "--system", "saw.toml", "--t-end", "300", "--period", "0.5", "--over", "params.top=1"];
+    let table = from_csv(&good(at, &scan)).unwrap().1;
+    assert!(table.numbers("x").iter().all(|x| (x - 0.3).abs() < 1e-9 || (x - 0.8).abs() < 1e-9));
 }
 
 /// What is not decided, and the end of a domain: exit code 3, and the rows so far.
@@ -695,16 +771,7 @@ fn scans_follow_attractors_up_and_down() {
 #[test]
 fn a_scan_shows_a_period_doubling() {
     let folder = tempfile::tempdir().unwrap();
-    let scan = [
-        "--system",
-        "buck-ramp",
-        "--period",
-        "4e-4",
-        "--t-end",
-        "0.12",
-        "--over",
-        "params.input=24,25",
-    ];
+    let scan = ["--system", "buck", "--period", "4e-4", "--t-end", "0.12", "--over", "params.input=24,25"];
     let table = scanned(folder.path(), &scan);
     let points = |input: f64| -> Vec<f64> {
         let mut found: Vec<f64> = (0..table.len())

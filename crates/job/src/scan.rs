@@ -7,32 +7,21 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use twofold_analyse::attractor::{self, SectionPoint, Thresholds};
 use twofold_hybrid::motion::Record;
-use twofold_hybrid::{Ending as Outcome, HybridError, Options, follow_watched};
-use twofold_integrate::Monitor;
-use twofold_system::Expression;
+use twofold_hybrid::{Ending as Outcome, follow_watched};
+use twofold_integrate::Watch;
 
-use super::executor::{Executor, JobMonitor, Progress};
+use super::classification::Classification;
+use super::executor::{Executor, JobWatch, Progress};
 use super::general::GeneralRun;
 use super::question::JobError;
 use super::run::Run;
-use super::spec::SwitchSpec;
-use super::sweep::{self, Axis, Coordinate, Sweep};
+use super::spec::{RunSpec, SwitchSpec};
+use super::sweep::{Axis, Base, Coordinate, GeneralEnding, GeneralOutcome, OutcomeQuestion, Sweep};
 use super::table::{Column, Entry, Table};
 use super::{Answer, Stop};
 
-/// The settings that vary.
-#[derive(Clone, Debug)]
-pub enum Subject {
-    /// A system with h, plus and minus.
-    Surfaces(Box<Sweep>),
-    /// A general system; its record is a section, or its states at the multiples of a time.
-    General(Box<GeneralRun>, Vec<Axis>),
-}
-
-/// Each run begins where that of the neighbouring value ended, so that an attractor is followed for
-/// as long as it attracts.
+/// Each run begins where that of the neighbouring value ended, so that an attractor is followed for as long as it attracts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Follow {
@@ -47,7 +36,7 @@ pub enum Follow {
 /// A scan.
 #[derive(Clone, Debug)]
 pub struct Scan {
-    subject: Subject,
+    sweep: Sweep,
     follow: Option<Follow>,
     alike: f64,
 }
@@ -141,13 +130,12 @@ impl Landing {
 }
 
 impl Scan {
-    /// A scan over the axes of `subject`; `alike`: attractors this near, as a share of the largest
-    /// number in any start or attractor, are one.
+    /// A scan of `sweep`; `alike`: attractors this near, as a share of the largest number in any start or attractor, are one.
     ///
     /// # Errors
-    /// A message that names the settings that exclude each other.
-    pub fn new(subject: Subject, follow: Option<Follow>, alike: f64) -> Result<Self, String> {
-        let scan = Self { subject, follow, alike };
+    /// What does not go together, in words.
+    pub fn new(sweep: Sweep, follow: Option<Follow>, alike: f64) -> Result<Self, String> {
+        let scan = Self { sweep, follow, alike };
         let axes = scan.axes();
         if axes.iter().any(Axis::is_random) {
             return Err(
@@ -155,15 +143,6 @@ impl Scan {
                     FROM..TO:COUNT"
                     .into(),
             );
-        }
-        if let Subject::General(run, axes) = &scan.subject {
-            for (i, axis) in axes.iter().enumerate() {
-                axis.validate().map_err(|e| e.to_string())?;
-                if axes[..i].iter().any(|other| other.coordinate == axis.coordinate) {
-                    return Err(format!("{} is given twice", axis.coordinate));
-                }
-                apply(run, &axis.coordinate, &axis.value(0, 0.5)).map(drop)?;
-            }
         }
         if follow.is_some() {
             if axes.len() != 1 {
@@ -178,11 +157,8 @@ impl Scan {
             if !matches!(axes[0].value(0, 0.5), Entry::Number(_) | Entry::Integer(_)) {
                 return Err("an attractor is followed along numbers".into());
             }
-            if let Subject::Surfaces(sweep) = &scan.subject
-                && !matches!(
-                    sweep.run().switch,
-                    SwitchSpec::Smoothed { .. } | SwitchSpec::Filippov { .. }
-                )
+            if let Base::Surfaces(run) = scan.sweep.run()
+                && !matches!(run.switch, SwitchSpec::Smoothed { .. } | SwitchSpec::Filippov { .. })
             {
                 return Err(
                     "of a switch with a memory more than the coordinates would have to be handed \
@@ -200,10 +176,7 @@ impl Scan {
 
     /// The settings that vary.
     pub fn axes(&self) -> &[Axis] {
-        match &self.subject {
-            Subject::Surfaces(sweep) => sweep.axes(),
-            Subject::General(_, axes) => axes,
-        }
+        self.sweep.axes()
     }
 
     /// Over one setting, each value once.
@@ -228,17 +201,14 @@ impl Scan {
 
     /// The states' names.
     pub fn states(&self) -> Vec<&str> {
-        match &self.subject {
-            Subject::Surfaces(sweep) => sweep.run().system.coordinates(),
-            Subject::General(run, _) => run.model.coordinates(),
-        }
+        self.sweep.run().states()
     }
 
     /// The description of this scan in its files.
     pub fn about(&self) -> Value {
-        let run = match &self.subject {
-            Subject::Surfaces(sweep) => json!(sweep.run()),
-            Subject::General(run, _) => run.json(),
+        let run = match self.sweep.run() {
+            Base::Surfaces(run) => json!(run),
+            Base::General(run) => run.json(),
         };
         let mut about = json!({ "kind": "scan", "run": run, "over": self.axes(),
             "alike": self.is_map().then_some(self.alike) });
@@ -270,9 +240,7 @@ impl Scan {
                 .collect(),
             Some(follow) => {
                 let mut up: Vec<u64> = (0..self.cells()).collect();
-                up.sort_by(|a, b| {
-                    self.settings(*a)[0].value().total_cmp(&self.settings(*b)[0].value())
-                });
+                up.sort_by(|a, b| self.sweep.settings(*a)[0].value().total_cmp(&self.sweep.settings(*b)[0].value()));
                 let down: Vec<u64> = up.iter().rev().copied().collect();
                 let along = |rows: &[u64], word: &'static str| {
                     let mut before = None;
@@ -311,19 +279,13 @@ impl Scan {
         Scanned { table, basins, finished: finished.into_inner(), failed, first_error }
     }
 
-    fn settings(&self, row: u64) -> Vec<Entry> {
-        match &self.subject {
-            Subject::Surfaces(sweep) => sweep.settings(row),
-            Subject::General(_, axes) => sweep::grid(axes, row, &vec![0.0; axes.len()]),
-        }
-    }
-
     /// One run, or nothing if it was stopped.
     fn cell(&self, row: u64, from: Option<&(Vec<f64>, usize)>, asked: &Asked<'_>) -> Cell {
-        let settings = self.settings(row);
-        let found = match &self.subject {
-            Subject::Surfaces(sweep) => self.of_surfaces(sweep, row, from, asked),
-            Subject::General(run, axes) => self.of_general(run, axes, &settings, from, asked),
+        let settings = self.sweep.settings(row);
+        let found = match self.sweep.run_of(row).map_err(JobError::Other) {
+            Err(error) => Err(error),
+            Ok(Base::Surfaces(run)) => self.of_surfaces(*run, from, asked),
+            Ok(Base::General(run)) => self.of_general(*run, from, asked),
         };
         match found {
             Err(JobError::Interrupted) => None,
@@ -333,22 +295,16 @@ impl Scan {
 
     fn of_surfaces(
         &self,
-        sweep: &Sweep,
-        row: u64,
+        mut run: RunSpec,
         from: Option<&(Vec<f64>, usize)>,
         asked: &Asked<'_>,
     ) -> Result<Found, JobError> {
-        let mut question = sweep.question(row).map_err(JobError::Other)?;
         let none = Found { settings: Vec::new(), late: Vec::new(), landing: None, end: None };
         let executor = Executor::new(None, asked);
         if self.is_map() {
-            let ending = question.ending(&executor, asked)?;
-            return Ok(Found {
-                landing: Some(Landing { word: ending.outcome.word, place: ending.place }),
-                ..none
-            });
+            let ending = OutcomeQuestion(Classification::of(run)).ending(&executor, asked)?;
+            return Ok(Found { landing: Some(Landing { word: ending.outcome.word, place: ending.place }), ..none });
         }
-        let run = &mut question.0.run;
         if let Some((state, _)) = from {
             run.start.clone_from(state);
         }
@@ -364,60 +320,39 @@ impl Scan {
 
     fn of_general(
         &self,
-        run: &GeneralRun,
-        axes: &[Axis],
-        settings: &[Entry],
+        mut run: GeneralRun,
         from: Option<&(Vec<f64>, usize)>,
         asked: &Asked<'_>,
     ) -> Result<Found, JobError> {
-        let mut run = run.clone();
-        // A shift is added to a start, so it comes after it.
-        let is_shift = |axis: &Axis| matches!(axis.coordinate, Coordinate::Shift(_));
-        let pairs = || axes.iter().zip(settings);
-        for (axis, value) in
-            pairs().filter(|p| !is_shift(p.0)).chain(pairs().filter(|p| is_shift(p.0)))
-        {
-            run = apply(&run, &axis.coordinate, value).map_err(JobError::Other)?;
+        let none = Found { settings: Vec::new(), late: Vec::new(), landing: None, end: None };
+        if self.is_map() {
+            let GeneralEnding { outcome, event, place, .. } = GeneralOutcome(run).ending(asked)?;
+            let word = match &*outcome.word {
+                "stopped" => format!("stopped by {event}"),
+                "accumulates" => format!("{event} accumulates"),
+                _ => outcome.word,
+            };
+            return Ok(Found { landing: Some(Landing { word, place }), ..none });
         }
-        run.model.values().map_err(|e| JobError::Other(e.to_string()))?;
         if let Some((state, mode)) = from {
             (run.options.start, run.options.mode) = (Some(state.clone()), *mode);
         }
-        let options = &run.options;
-        let middle = 0.5 * (options.t_start + options.t_end);
-        let strobed = matches!(options.record, Record::Times { .. });
-        let plane = plane(&run);
-        let (mut late, mut section) = (Vec::new(), Vec::new());
+        let middle = 0.5 * (run.options.t_start + run.options.t_end);
+        let strobed = matches!(run.options.record, Record::Times { .. });
+        let mut late = Vec::new();
         let mut observe = |point: &twofold_hybrid::Point<'_>| {
-            let upward = strobed || point.direction > Some(0.0);
-            if self.is_map() {
-                let u = plane.map(|i| i.map_or(0.0, |i| point.x[i]));
-                section.push(SectionPoint { t: point.t, u, upward });
-            } else if upward && point.t > middle {
+            let counts = if strobed { point.event.is_none() } else { point.direction > Some(0.0) };
+            if counts && point.t > middle {
                 late.push((point.t, point.x.to_vec()));
             }
             true
         };
-        let outcome =
-            follow_watched(&run.model, options, &mut observe, &|t| asked.reached(t).is_continue())?;
+        let outcome = follow_watched(&run.model, &run.options, &mut observe, &|t| asked.reached(t))?;
         if outcome.ending == Outcome::Interrupted {
             return Err(JobError::Interrupted);
         }
-        let landing = match &outcome.ending {
-            _ if !self.is_map() => None,
-            Outcome::Stopped(event) => {
-                Some(Landing { word: format!("stopped by {event}"), place: Vec::new() })
-            }
-            Outcome::Zeno { event, .. } => {
-                Some(Landing { word: format!("{event} accumulates"), place: Vec::new() })
-            }
-            _ => Some(match rests_at(&run, &outcome.x, outcome.mode, asked)? {
-                Some(place) => Landing { word: "rest".into(), place: vec![place] },
-                None => settles_on(&section, options, strobed),
-            }),
-        };
         let end = (outcome.ending == Outcome::Finished).then_some((outcome.x, outcome.mode));
-        Ok(Found { settings: Vec::new(), late, landing, end })
+        Ok(Found { late, end, ..none })
     }
 
     /// Columns of the settings.
@@ -472,12 +407,8 @@ impl Scan {
             .flat_map(|c| self.axes().iter().zip(&c.0))
             .filter(|(axis, _)| matches!(axis.coordinate, Coordinate::Start(_)))
             .map(|(_, entry)| entry.value());
-        let start = match &self.subject {
-            Subject::Surfaces(sweep) => sweep.run().start.clone(),
-            Subject::General(run, _) => start_of(run).unwrap_or_default(),
-        };
-        let near = self.alike
-            * places.chain(start.into_iter().chain(given)).fold(0.0_f64, |a, x| a.max(x.abs()));
+        let start = self.sweep.run().start();
+        let near = self.alike * places.chain(start.into_iter().chain(given)).fold(0.0_f64, |a, x| a.max(x.abs()));
         let height = self.axes().get(1).map_or(1, Axis::count).max(1) as usize;
         for (row, cell) in cells.iter().enumerate() {
             let at = (row / height, row % height);
@@ -530,118 +461,4 @@ fn late(t_end: f64, states: &[&str], answer: &Answer) -> Option<Vec<(f64, Vec<f6
         .enumerate()
         .filter(|(row, w)| *w == "up" && t[*row] > 0.5 * t_end);
     Some(upward.map(|(row, _)| (t[row], columns.iter().map(|c| c[row]).collect())).collect())
-}
-
-/// Where a run begins.
-fn start_of(run: &GeneralRun) -> Result<Vec<f64>, String> {
-    let given =
-        run.options.start.clone().map_or_else(|| run.model.start(), |start| Ok(Some(start)));
-    given
-        .map_err(|e| e.to_string())?
-        .ok_or_else(|| "the file has no start; give --start".to_owned())
-}
-
-/// The run with this value, or why it would have no effect.
-fn apply(run: &GeneralRun, coordinate: &Coordinate, value: &Entry) -> Result<GeneralRun, String> {
-    let number = value.value();
-    let mut run = run.clone();
-    let states = run.model.coordinates();
-    let component = |name: &str| {
-        let place = states.iter().position(|s| *s == name);
-        place.ok_or_else(|| format!("the system has no state {name}; it has {}", states.join(", ")))
-    };
-    match coordinate {
-        Coordinate::Parameter(name) => {
-            run.model = run.model.with(name, number).map_err(|e| e.to_string())?
-        }
-        Coordinate::Start(name) | Coordinate::Shift(name) => {
-            let i = component(name)?;
-            let mut x = start_of(&run)?;
-            x[i] = if matches!(coordinate, Coordinate::Start(_)) { number } else { x[i] + number };
-            run.options.start = Some(x);
-        }
-        Coordinate::Rtol => run.options.rtol = number,
-        Coordinate::Atol => run.options.atol = Some(number),
-        Coordinate::Tolerance => (run.options.rtol, run.options.atol) = (number, Some(number)),
-        Coordinate::MaxStep => run.options.max_step = number,
-        Coordinate::TEnd => run.options.t_end = number,
-        other => {
-            return Err(format!(
-                "{other} belongs to systems with h, plus and minus; of a general system vary \
-                    params.NAME, start.NAME, shift.NAME, rtol, atol, tolerance, max-step or t-end"
-            ));
-        }
-    }
-    Ok(run)
-}
-
-/// The two states in which crossings are compared: the first that the section does not fix.
-fn plane(run: &GeneralRun) -> [Option<usize>; 2] {
-    let names = run.model.coordinates();
-    let fixed = match &run.options.record {
-        Record::Section(Expression::Sub(a, b)) => names.iter().position(|n| {
-            [(a, b), (b, a)].iter().any(|(one, other)| {
-                one.to_string() == *n && matches!(***other, Expression::Number(_))
-            })
-        }),
-        _ => None,
-    };
-    let mut free = (0..names.len()).filter(|i| Some(*i) != fixed);
-    [free.next(), free.next()]
-}
-
-/// The state at the end, if the motion rests there: over a further twentieth of the run it moves by
-/// less than 1e-6 of the size of its states.
-fn rests_at(
-    run: &GeneralRun,
-    x: &[f64],
-    mode: usize,
-    asked: &Asked<'_>,
-) -> Result<Option<Vec<f64>>, JobError> {
-    if run.model.depends_on_time() {
-        return Ok(None);
-    }
-    let Options { t_start, t_end, .. } = run.options;
-    let more = Options {
-        t_start: t_end,
-        t_end: t_end + 0.05 * (t_end - t_start),
-        start: Some(x.to_vec()),
-        mode,
-        record: Record::Times { every: f64::INFINITY },
-        ..run.options.clone()
-    };
-    let start = start_of(run).unwrap_or_default();
-    let size = start.iter().chain(x).fold(0.0_f64, |a, v| a.max(v.abs()));
-    let mut moved = 0.0_f64;
-    let mut observe = |point: &twofold_hybrid::Point<'_>| {
-        moved = point.x.iter().zip(x).fold(moved, |a, (p, q)| a.max((p - q).abs()));
-        true
-    };
-    match follow_watched(&run.model, &more, &mut observe, &|t| asked.reached(t).is_continue()) {
-        Ok(outcome) if outcome.ending == Outcome::Interrupted => Err(JobError::Interrupted),
-        Ok(outcome) => {
-            let moved = outcome.x.iter().zip(x).fold(moved, |a, (p, q)| a.max((p - q).abs()));
-            Ok((outcome.ending == Outcome::Finished && moved <= 1e-6 * size.max(f64::MIN_POSITIVE))
-                .then(|| x.to_vec()))
-        }
-        Err(HybridError::Equation(e)) => Err(HybridError::Equation(e).into()),
-        // Where motion cannot go on it does not rest.
-        Err(_) => Ok(None),
-    }
-}
-
-/// What the section of a run says.
-fn settles_on(section: &[SectionPoint], options: &Options, strobed: bool) -> Landing {
-    let question = attractor::Question {
-        t_end: (!strobed).then_some(options.t_end),
-        shown_from: 0.5 * (options.t_start + options.t_end),
-        ..attractor::Question::default()
-    };
-    let evidence = attractor::classify(section, &question, &Thresholds::default());
-    let word = sweep::word_of(&evidence.verdict);
-    let place = evidence
-        .verdict
-        .cycle()
-        .map_or(Vec::new(), |c| c.points.iter().take(c.period).map(|p| p.u.to_vec()).collect());
-    Landing { word, place }
 }

@@ -2,8 +2,6 @@
 
 use std::path::PathBuf;
 
-use serde_json::json;
-
 use crate::cli::ending;
 use crate::cli::exit::part_of;
 use crate::cli::flags::{RunFlags, Use};
@@ -13,10 +11,9 @@ use crate::cli::speak::{Delivery, complain, deliver, is_standard_output, try_del
 use crate::cli::{CliError, Exit, in_pool};
 use crate::draw::scan;
 use crate::hybrid::motion::Record;
-use crate::job::general::GeneralRun;
-use crate::job::scan::{Basin, Follow, Scan, Subject};
+use crate::job::scan::{Basin, Follow, Scan};
 use crate::job::spec::Observation;
-use crate::job::sweep::{Axis, Sweep, Values};
+use crate::job::sweep::{Axis, Base, Sweep, Values};
 use crate::job::table::{Entry, Table};
 use crate::job::{self, encode};
 use crate::record::Hash;
@@ -35,12 +32,8 @@ use super::plot::{Format, general_small_print, small_print, write};
 /// standard output, or beside --out under the name FILE.part.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
-    twofold scan --system buck --section s=0 --over params.supply=22..33:100 --t-end 200 --plot \
-    buck.png --out buck.csv\n  \
-    twofold scan --system buck-ramp --period 4e-4 --over params.input=20..32:60 --t-end 0.08 \
-    --follow both --plot buck.png --out buck.csv\n  \
-    twofold scan --system chua --section y=0 --over start.x=-3..3:40 --over start.z=-6..6:40 \
-    --t-end 200 --plot basins.png --out basins.csv")]
+    twofold scan --system buck --period 4e-4 --over params.input=20..32:60 --t-end 0.08 --follow both --plot buck.png --out buck.csv\n  \
+    twofold scan --system chua --section y=0 --over start.x=-3..3:40 --over start.z=-6..6:40 --t-end 200 --plot basins.png --out basins.csv")]
 pub struct Arguments {
     #[command(flatten)]
     flags: RunFlags,
@@ -144,40 +137,50 @@ impl Arguments {
             Direction::Down => Follow::Down,
             Direction::Both => Follow::Both,
         });
-        let (subject, mut drawn) = match general::run_of(&self.flags)? {
-            Some(run) => self.of_general(run)?,
+        let (base, title, small_print, fixed, method) = match general::looked_at(&self.flags, self.period)? {
+            Some(run) => {
+                let options = &run.options;
+                match options.record {
+                    Record::Section(_) if self.follow.is_some() && run.model.depends_on_time() => {
+                        return usage(
+                            "--follow: the equations depend on the time, and the next run begins at --t-start again: give their period (--period) instead of --section".into(),
+                        );
+                    }
+                    Record::Times { every } if every.is_infinite() => {
+                        return usage(format!(
+                            "a scan needs a place or time to look at: give --section, such as {}=0, or --period of equations that depend on the time",
+                            run.model.coordinates()[0]
+                        ));
+                    }
+                    _ => {}
+                }
+                let left = self.flags.section.as_deref().and_then(|text| text.split('=').next());
+                let fixed = run.model.coordinates().iter().position(|n| left.is_some_and(|s| s.trim() == *n));
+                let (title, print) = (run.model.definition().title().to_owned(), vec![general_small_print(&run)]);
+                let method = options.method.name();
+                (Base::from(run), title, print, fixed, method)
+            }
             None => {
-                if self.period.is_some() {
-                    let why = "equations with h, plus and minus do not see the time; leave it out, \
-                        and give --section";
-                    return Err(CliError::no_effect("--period", why));
-                }
                 let spec = self.flags.spec(Use::Crossings)?;
-                if self.over.iter().any(Axis::is_random) {
-                    return usage(
-                        "--over FROM..TO without a count is drawn at random, which `twofold sweep` \
-                            does; give FROM..TO:COUNT"
-                            .into(),
-                    );
-                }
                 let fixed = match spec.observe {
                     Observation::Section { coordinate, .. } => Some(coordinate),
                     _ => None,
                 };
-                let drawn = Drawn {
-                    title: spec.system.definition().title().to_owned(),
-                    shown: self.shown(&spec.system.coordinates(), fixed)?,
-                    footer: small_print(&spec),
-                    method: spec.method.name.name(),
-                    hash: Hash::of_json(&()),
-                };
-                let sweep =
-                    Sweep::new(spec, self.over.clone(), None).map_err(|e| over(e.to_string()))?;
-                let hash = sweep.hash();
-                (Subject::Surfaces(Box::new(sweep)), Drawn { hash, ..drawn })
+                let (title, method) = (spec.system.definition().title().to_owned(), spec.method.name.name());
+                let print = small_print(&spec);
+                (Base::from(spec), title, print, fixed, method)
             }
         };
-        let scan = Scan::new(subject, follow, alike).map_err(over)?;
+        if self.over.iter().any(Axis::is_random) {
+            return usage(
+                "--over FROM..TO without a count is drawn at random, which `twofold sweep` does; give FROM..TO:COUNT"
+                    .into(),
+            );
+        }
+        let shown = self.shown(&base.states(), fixed)?;
+        let sweep = Sweep::new(base, self.over.clone(), None).map_err(|e| over(e.to_string()))?;
+        let mut drawn = Drawn { title, shown, footer: small_print, method, hash: sweep.hash() };
+        let scan = Scan::new(sweep, follow, alike).map_err(over)?;
         if self.plot.is_some()
             && two
             && !scan
@@ -193,68 +196,6 @@ impl Arguments {
         drawn.footer = drawn.footer.iter().filter_map(|line| without(line, &varied)).collect();
         drawn.footer.insert(0, format!("over {}", names.join(", ")));
         Ok((scan, drawn))
-    }
-
-    /// A scan of a general system, at the crossings of --section or the multiples of --period.
-    fn of_general(&self, mut run: GeneralRun) -> Result<(Subject, Drawn), CliError> {
-        for flag in ["--chord", "--every"] {
-            if self.flags.given().contains(&flag) {
-                return Err(CliError::no_effect(
-                    flag,
-                    "a scan looks at --section or --period; leave it out",
-                ));
-            }
-        }
-        let options = &mut run.options;
-        match (self.period, &options.record) {
-            (Some(_), Record::Section(_)) => {
-                return Err(CliError::no_effect(
-                    "--period",
-                    "--section says where to look; leave one of the two out",
-                ));
-            }
-            (Some(period), _) if period.is_finite() && period > 0.0 => {
-                // Whole periods, so that the next run can begin at the same phase.
-                options.t_end =
-                    options.t_start + ((options.t_end - options.t_start) / period).ceil() * period;
-                options.record = Record::Times { every: period };
-            }
-            (Some(period), _) => {
-                return Err(CliError::Usage(format!("--period is {period}: give a time above 0")));
-            }
-            (None, Record::Section(_)) if self.follow.is_some() && run.model.depends_on_time() => {
-                return Err(CliError::Usage(
-                    "--follow: the equations depend on the time, and the next run begins at \
-                        --t-start again: give their period (--period) instead of --section"
-                        .into(),
-                ));
-            }
-            (None, Record::Section(_)) => {}
-            (None, _) => {
-                return Err(CliError::Usage(format!(
-                    "a scan needs a place or time to look at: give --section, such as {}=0, or \
-                        --period of equations that depend on the time",
-                    run.model.coordinates()[0]
-                )));
-            }
-        }
-        let fixed = match (&self.period, &self.flags.section) {
-            (None, Some(text)) => run
-                .model
-                .coordinates()
-                .iter()
-                .position(|n| text.split('=').next().is_some_and(|s| s.trim() == *n)),
-            _ => None,
-        };
-        let about = Hash::of_json(&json!({ "run": run.json(), "over": self.over }));
-        let drawn = Drawn {
-            title: run.model.definition().title().to_owned(),
-            shown: self.shown(&run.model.coordinates(), fixed)?,
-            footer: vec![general_small_print(&run)],
-            method: run.options.method.name(),
-            hash: about,
-        };
-        Ok((Subject::General(Box::new(run), self.over.clone()), drawn))
     }
 
     /// The state of the vertical axis; `fixed` is the section's.

@@ -7,12 +7,13 @@ use serde_json::{Value, json};
 
 use crate::cli::ending;
 use crate::cli::flags::{RunFlags, Use};
+use crate::cli::general;
 use crate::cli::progress::Progress;
 use crate::cli::rows::{Pending, compute, journal_of};
 use crate::cli::speak::{complain, deliver, is_standard_output, try_delivery};
 use crate::cli::{CliError, Exit};
 use crate::job::question;
-use crate::job::sweep::{Axis, Coordinate, Draws, Row, Rows, Shard, Sweep, Values};
+use crate::job::sweep::{Axis, Base, Coordinate, Draws, Row, Rows, Shard, Sweep, Values};
 use crate::job::table::Entry;
 use crate::record::Journal;
 use crate::record::files::read;
@@ -44,12 +45,10 @@ const DRAW_SEED: u64 = 2013;
     Values: a,b,c; FROM..TO:COUNT; FROM..TO:log:COUNT; STEP*COUNT; FROM..TO and FROM..TO:log drawn \
     at random; seed=FIRST..LAST.\n\n\
     Examples:\n  \
-    twofold sweep --alpha 0.1 --beta 1e-4 --restart 100 --t-end 1e5 --method dopri5 --out \
-    shifted.csv\n  \
-    twofold sweep --t-end 2e5 --over params.alpha=1e-3..1:log:13 --over interval=20,40,100 --out \
-    map.csv\n  \
-    twofold sweep --t-end 2e5 --over method=lsoda,dopri5 --over shift.x=-1e-9..1e-9 --random 100 \
-    --shard 2/8 --out part2.csv\n  \
+    twofold sweep --alpha 0.1 --beta 1e-4 --restart 100 --t-end 1e5 --method dopri5 --out shifted.csv\n  \
+    twofold sweep --t-end 2e5 --over params.alpha=1e-3..1:log:13 --over interval=20,40,100 --out map.csv\n  \
+    twofold sweep --t-end 2e5 --over method=lsoda,dopri5 --over shift.x=-1e-9..1e-9 --random 100 --shard 2/8 --out part2.csv\n  \
+    twofold sweep --system bouncing-ball --t-end 20 --over params.r=0.5..0.9:9 --out balls.csv\n  \
     twofold sweep merge part*.csv --out whole.csv"
 )]
 pub struct Arguments {
@@ -66,8 +65,10 @@ pub struct Arguments {
     /// Seed of those draws [default: 2013].
     #[arg(long, value_name = "SEED", allow_negative_numbers = true)]
     random_seed: Option<u64>,
-    /// Number of runs: short for --over shift.NAME=SHIFT*RUNS with the first component's name
-    /// [default: 40].
+    /// Period of a general system that depends on the time: its states at the multiples of it are compared, instead of those at a --section.
+    #[arg(long, value_name = "T", allow_hyphen_values = true)]
+    period: Option<f64>,
+    /// Number of runs: short for --over shift.NAME=SHIFT*RUNS with the first component's name [default: 40].
     #[arg(long, allow_negative_numbers = true)]
     runs: Option<u64>,
     /// With --runs: the first component of the start is shifted by this, twice this, three times
@@ -141,7 +142,10 @@ fn sweep(arguments: &Arguments) -> Result<Sweep, CliError> {
             format!("--over {axis} gives every row its own; leave one of the two out"),
         ));
     }
-    let spec = arguments.flags.spec(Use::Crossings)?;
+    let base = match general::looked_at(&arguments.flags, arguments.period)? {
+        Some(run) => Base::from(run),
+        None => Base::from(arguments.flags.spec(Use::Crossings)?),
+    };
     let mut over = arguments.over.clone();
     let given = [("--runs", arguments.runs.is_some()), ("--shift", arguments.shift.is_some())];
     if let (false, Some((flag, _))) = (over.is_empty(), given.iter().find(|(_, given)| *given)) {
@@ -161,11 +165,8 @@ fn sweep(arguments: &Arguments) -> Result<Sweep, CliError> {
         if !shift.is_finite() {
             return usage(format!("--shift is {shift}: give a finite number"));
         }
-        let first = spec.system.coordinates().first().map_or(String::new(), |s| (*s).to_owned());
-        over.push(Axis {
-            coordinate: Coordinate::Shift(first),
-            values: Values::Multiples { of: shift, count: runs },
-        });
+        let first = base.states().first().map_or(String::new(), |s| (*s).to_owned());
+        over.push(Axis { coordinate: Coordinate::Shift(first), values: Values::Multiples { of: shift, count: runs } });
     }
     if let (Some(_), None) = (arguments.random_seed, arguments.random) {
         return Err(CliError::no_effect(
@@ -173,10 +174,8 @@ fn sweep(arguments: &Arguments) -> Result<Sweep, CliError> {
             "no axis is drawn at random; leave it out, or give --random N",
         ));
     }
-    let random = arguments
-        .random
-        .map(|count| Draws { count, seed: arguments.random_seed.unwrap_or(DRAW_SEED) });
-    Sweep::new(spec, over, random).map_err(|e| match e {
+    let random = arguments.random.map(|count| Draws { count, seed: arguments.random_seed.unwrap_or(DRAW_SEED) });
+    Sweep::new(base, over, random).map_err(|e| match e {
         crate::job::sweep::SweepError::Spec(spec) => spec.into(),
         other => CliError::Usage(format!("--over: {other}")),
     })

@@ -39,21 +39,25 @@
 
 mod axis;
 mod far;
+mod general;
 mod lanes;
 mod outcome;
 mod rows;
 
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 
 pub use axis::{Axis, AxisError, Coordinate, FORMS, Values};
-pub(crate) use outcome::word_of;
+pub use general::{GeneralEnding, GeneralOutcome};
 pub use outcome::{Ending, Outcome, OutcomeQuestion};
 pub use rows::{Row, Rows, RowsError};
 
 use super::classification::Classification;
 use super::executor::{Executor, Progress};
+use super::general::GeneralRun;
 use super::question::{JobError, question_hash};
 use super::spec::{RunSpec, SpecError, SwitchSpec};
+use super::table::Column;
 use super::table::Entry;
 use crate::record::Hash;
 use twofold_analyse::attractor::Thresholds;
@@ -67,13 +71,85 @@ pub const MOST_ROWS: u64 = 1_000_000_000;
 /// of runs of the same seed.
 const DRAWS: u64 = 0x5377_6565_7000_0000;
 
+/// The run that is varied.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Value", into = "Value")]
+pub enum Base {
+    /// Of a system with h, plus and minus.
+    Surfaces(Box<RunSpec>),
+    /// Of a general system.
+    General(Box<GeneralRun>),
+}
+
+impl From<RunSpec> for Base {
+    fn from(run: RunSpec) -> Self {
+        Base::Surfaces(Box::new(run))
+    }
+}
+
+impl From<GeneralRun> for Base {
+    fn from(run: GeneralRun) -> Self {
+        Base::General(Box::new(run))
+    }
+}
+
+impl From<Base> for Value {
+    fn from(base: Base) -> Self {
+        match base {
+            Base::Surfaces(run) => json!(run),
+            Base::General(run) => {
+                let mut json = run.json();
+                // A start that the file gives may depend on what is varied.
+                json["start"] = json!(run.options.start);
+                json
+            }
+        }
+    }
+}
+
+impl TryFrom<Value> for Base {
+    type Error = String;
+    fn try_from(json: Value) -> Result<Self, String> {
+        // Only general systems see the time.
+        match json.get("t_start") {
+            Some(_) => GeneralRun::from_json(json).map(Base::from),
+            None => serde_json::from_value::<RunSpec>(json).map(Base::from).map_err(|e| e.to_string()),
+        }
+    }
+}
+
+impl Base {
+    /// The states' names.
+    pub fn states(&self) -> Vec<&str> {
+        match self {
+            Base::Surfaces(run) => run.system.coordinates(),
+            Base::General(run) => run.model.coordinates(),
+        }
+    }
+
+    /// Where runs begin, if that is given.
+    pub fn start(&self) -> Vec<f64> {
+        match self {
+            Base::Surfaces(run) => run.start.clone(),
+            Base::General(run) => general::start_of(run).unwrap_or_default(),
+        }
+    }
+
+    fn apply(&mut self, coordinate: &Coordinate, value: &Entry) -> Result<(), String> {
+        match self {
+            Base::Surfaces(run) => coordinate.apply(run, value),
+            Base::General(run) => coordinate.apply_to_general(run, value),
+        }
+    }
+}
+
 /// A run with some of its numbers varied.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sweep {
     /// What all cells have in common.
-    run: RunSpec,
-    /// The axes. The last listed axis runs fastest; draws run slowest.
+    run: Base,
+    /// What varies. The last listed axis runs fastest; draws run slowest.
     over: Vec<Axis>,
     /// How often random axes are drawn in each cell of the grid.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -182,11 +258,13 @@ impl Sweep {
     ///
     /// # Errors
     ///
-    /// If an axis would have no effect or gives what another gives, if random axes and draws do not
-    /// come together, or there are too many rows. A cell whose numbers are wrong is no error here
-    /// but a row.
-    pub fn new(run: RunSpec, over: Vec<Axis>, random: Option<Draws>) -> Result<Self, SweepError> {
-        run.validate()?;
+    /// If an axis would have no effect or gives what another gives, if random axes and draws do not come together, or there are too many
+    /// rows. A cell whose numbers are wrong is no error here but a row.
+    pub fn new(run: impl Into<Base>, over: Vec<Axis>, random: Option<Draws>) -> Result<Self, SweepError> {
+        let run = run.into();
+        if let Base::Surfaces(run) = &run {
+            run.validate()?;
+        }
         for (i, axis) in over.iter().enumerate() {
             axis.validate()?;
             for other in &over[..i] {
@@ -202,8 +280,8 @@ impl Sweep {
                 }
             }
             let mut tried = run.clone();
-            axis.coordinate
-                .apply(&mut tried, &axis.value(0, 0.5))
+            tried
+                .apply(&axis.coordinate, &axis.value(0, 0.5))
                 .map_err(|why| SweepError::NoEffect { axis: axis.coordinate.to_string(), why })?;
         }
         match (over.iter().any(Axis::is_random), random) {
@@ -229,11 +307,19 @@ impl Sweep {
     }
 
     /// The run that is varied.
-    pub fn run(&self) -> &RunSpec {
+    pub fn run(&self) -> &Base {
         &self.run
     }
 
-    /// The axes.
+    /// When the run ends that is varied.
+    pub fn t_end(&self) -> f64 {
+        match &self.run {
+            Base::Surfaces(run) => run.t_end,
+            Base::General(run) => run.options.t_end,
+        }
+    }
+
+    /// What varies.
     pub fn axes(&self) -> &[Axis] {
         &self.over
     }
@@ -278,17 +364,18 @@ impl Sweep {
         grid(&self.over, row, &draws)
     }
 
-    /// The question of a row.
+    /// The run of a row.
     ///
     /// # Errors
     ///
-    /// The reason why its settings make no valid question.
-    pub fn question(&self, row: u64) -> Result<OutcomeQuestion, String> {
-        let mut run = self.run.clone();
+    /// Why its settings make none.
+    pub fn run_of(&self, row: u64) -> Result<Base, String> {
+        let mut base = self.run.clone();
         let varied = |c: &Coordinate| self.over.iter().any(|axis| axis.coordinate == *c);
-        if !varied(&Coordinate::Stream) {
-            // Chance of its own in every row: the same kicks from neighbouring starts would not be
-            // independent runs.
+        if let Base::Surfaces(run) = &mut base
+            && !varied(&Coordinate::Stream)
+        {
+            // Chance of its own in every row: the same kicks from neighbouring starts would not be independent runs.
             if let Some(kick) = &mut run.schedule.kick {
                 kick.stream = kick.stream.wrapping_add(row);
             }
@@ -302,12 +389,38 @@ impl Sweep {
         // A shift is added to a start, so it comes after it.
         let is_shift = |axis: &&(&Axis, Entry)| matches!(axis.0.coordinate, Coordinate::Shift(_));
         let pairs: Vec<(&Axis, Entry)> = self.over.iter().zip(settings).collect();
-        for (axis, value) in
-            pairs.iter().filter(|p| !is_shift(p)).chain(pairs.iter().filter(is_shift))
-        {
-            axis.coordinate.apply(&mut run, value)?;
+        for (axis, value) in pairs.iter().filter(|p| !is_shift(p)).chain(pairs.iter().filter(is_shift)) {
+            base.apply(&axis.coordinate, value)?;
         }
-        Ok(OutcomeQuestion(Classification { run, thresholds: self.thresholds }))
+        Ok(base)
+    }
+
+    /// The question of a row of a system with h, plus and minus.
+    ///
+    /// # Errors
+    ///
+    /// Why its settings make none.
+    pub fn question(&self, row: u64) -> Result<OutcomeQuestion, String> {
+        match self.run_of(row)? {
+            Base::Surfaces(run) => Ok(OutcomeQuestion(Classification { run: *run, thresholds: self.thresholds })),
+            Base::General(_) => Err("the sweep is of a general system".into()),
+        }
+    }
+
+    /// The digest of a row's question, if its settings make one.
+    fn key(&self, row: u64) -> Option<Hash> {
+        match self.run_of(row).ok()? {
+            Base::Surfaces(_) => self.question(row).ok().map(|question| question_hash(&question)),
+            Base::General(run) => Some(question_hash(&GeneralOutcome(*run))),
+        }
+    }
+
+    /// Columns between those of the settings and those that every sweep has.
+    fn own_columns(&self) -> Vec<Column> {
+        match &self.run {
+            Base::Surfaces(_) => Vec::new(),
+            Base::General(run) => general::columns(run),
+        }
     }
 
     /// Computes a row.
@@ -316,19 +429,33 @@ impl Sweep {
     ///
     /// [`JobError::Interrupted`] if `progress` asked to stop; every other failure is a row.
     pub fn row(&self, row: u64, progress: &dyn Progress) -> Result<Row, JobError> {
-        let settings = self.settings(row);
-        let question = match self.question(row) {
-            Ok(question) => question,
-            Err(reason) => return Ok(Row::failed(row, settings, None, reason)),
+        let mut cells = self.settings(row);
+        // An executor of its own: what it has computed is forgotten with it, however many rows there are.
+        let executor = Executor::new(None, progress);
+        let key = self.key(row);
+        let found = match self.run_of(row) {
+            Err(reason) => Err(JobError::Other(reason)),
+            Ok(Base::General(run)) => executor
+                .ask(&GeneralOutcome(*run))
+                .and_then(|answer| Ok(answer.fact::<GeneralEnding>("ending")?))
+                .map(|ending| {
+                    cells.extend(ending.cells());
+                    ending.outcome
+                }),
+            Ok(Base::Surfaces(run)) => executor
+                .ask(&OutcomeQuestion(Classification { run: *run, thresholds: self.thresholds }))
+                .and_then(|answer| Ok(answer.fact::<Outcome>("outcome")?)),
         };
-        let key = question_hash(&question);
-        // An executor of its own: what it has computed is forgotten with it, however many rows
-        // there are.
-        let answer = Executor::new(None, progress).ask(&question);
-        match answer.and_then(|a| Ok(a.fact::<Outcome>("outcome")?)) {
-            Ok(outcome) => Ok(Row::found(row, settings, &key, outcome)),
-            Err(JobError::Interrupted) => Err(JobError::Interrupted),
-            Err(error) => Ok(Row::failed(row, settings, Some(&key), error.to_string())),
+        match (found, key) {
+            (Ok(outcome), Some(key)) => Ok(Row::found(row, cells, &key, outcome)),
+            (Err(JobError::Interrupted), _) => Err(JobError::Interrupted),
+            (found, key) => {
+                if let Base::General(run) = &self.run {
+                    cells.extend(general::blank(run));
+                }
+                let reason = found.err().map_or(String::new(), |error| error.to_string());
+                Ok(Row::failed(row, cells, key.as_ref(), reason))
+            }
         }
     }
 }

@@ -68,15 +68,18 @@ pub struct Ending {
 
 impl Ending {
     fn of(evidence: &Evidence, answer: &Answer) -> Result<Self, JobError> {
-        let cycle = evidence.verdict.cycle();
-        let place = cycle
-            .map_or(Vec::new(), |c| c.points.iter().take(c.period).map(|p| p.u.to_vec()).collect());
-        Ok(Self { outcome: Outcome::of(evidence, answer)?, place })
+        Ok(Self { outcome: Outcome::judged(evidence, answer.fact("t")?, steps(answer)), place: place_of(evidence) })
     }
 }
 
+/// The points of the closed orbit, if it is one.
+pub(super) fn place_of(evidence: &Evidence) -> Vec<Vec<f64>> {
+    let cycle = evidence.verdict.cycle();
+    cycle.map_or(Vec::new(), |c| c.points.iter().take(c.period).map(|p| p.u.to_vec()).collect())
+}
+
 /// A verdict as an outcome's word.
-pub(crate) fn word_of(verdict: &Verdict) -> String {
+pub(super) fn word_of(verdict: &Verdict) -> String {
     match verdict {
         Verdict::Spiralling(c) if c.approach.is_some_and(|r| r.per_time < 0.0) => {
             format!("leaving-period-{}", c.period)
@@ -91,13 +94,14 @@ pub(crate) fn word_of(verdict: &Verdict) -> String {
 
 impl Outcome {
     fn at_rest(rest: &Rest, answer: &Answer) -> Result<Self, JobError> {
-        Ok(Self { word: "rest".into(), captured_at: None, rate: rest.rate(), ..Self::far(answer)? })
+        let bare = Self::bare("rest", answer.rows() as u64, answer.fact("t")?, steps(answer));
+        Ok(Self { rate: rest.rate(), ..bare })
     }
 
-    fn of(evidence: &Evidence, answer: &Answer) -> Result<Self, JobError> {
+    pub(super) fn judged(evidence: &Evidence, end: f64, steps: u64) -> Self {
         let cycle = evidence.verdict.cycle();
         let approach = cycle.and_then(|c| c.approach);
-        Ok(Self {
+        Self {
             word: word_of(&evidence.verdict),
             period: cycle.map_or(0, |c| c.period as u64),
             captured_at: cycle.map(|c| c.captured_at),
@@ -109,17 +113,22 @@ impl Outcome {
             exponent: evidence.lyapunov.map(|l| l.value),
             exponent_error: evidence.lyapunov.map(|l| l.standard_error),
             crossings: evidence.crossings as u64,
-            end: answer.fact("t")?,
-            steps: steps(answer),
-        })
+            end,
+            steps,
+        }
     }
 
     fn far(answer: &Answer) -> Result<Self, JobError> {
         let end: f64 = answer.fact("t")?;
-        Ok(Self {
-            word: "far".into(),
+        Ok(Self { captured_at: Some(end), ..Self::bare("far", answer.rows() as u64, end, steps(answer)) })
+    }
+
+    /// A word, and nothing of an orbit.
+    pub(super) fn bare(word: &str, crossings: u64, end: f64, steps: u64) -> Self {
+        Self {
+            word: word.into(),
             period: 0,
-            captured_at: Some(end),
+            captured_at: None,
             settled_at: None,
             radius: None,
             rate: None,
@@ -127,10 +136,10 @@ impl Outcome {
             turn: None,
             exponent: None,
             exponent_error: None,
-            crossings: answer.rows() as u64,
+            crossings,
             end,
-            steps: steps(answer),
-        })
+            steps,
+        }
     }
 }
 
@@ -271,7 +280,6 @@ mod tests {
     use crate::cases;
     use crate::spec::Observation;
     use twofold_analyse::attractor::{Cycle, Rate};
-    use twofold_integrate::Statistics;
 
     /// Each verdict's word, and where its numbers go.
     #[test]
@@ -280,8 +288,6 @@ mod tests {
         let section = Observation::Section { coordinate: 0, value: 0.0 };
         let run = cases::run(system, SwitchSpec::tanh(1e-2), 20.0, section);
         let evidence = Classification::of(run).ask(&Executor::quiet()).unwrap();
-        let statistics = Some(Statistics { steps: 77, ..Statistics::default() });
-        let answer = Answer { statistics, ..Answer::of_tables(Vec::new()) }.with_fact("t", &20.0);
         let cycle = |per_time: Option<f64>| Cycle {
             period: 3,
             points: Vec::new(),
@@ -313,13 +319,9 @@ mod tests {
         ] {
             let cycle = verdict.cycle().cloned();
             let evidence = Evidence { verdict, lyapunov, crossings: 6, ..evidence.clone() };
-            let found = Outcome::of(&evidence, &answer).unwrap();
-            assert_eq!(
-                (found.word.as_str(), found.crossings, found.end, found.steps),
-                (word, 6, 20.0, 77)
-            );
-            let (captured, settled) =
-                (cycle.as_ref().map(|_| 100.0), cycle.as_ref().map(|_| 200.0));
+            let found = Outcome::judged(&evidence, 20.0, 77);
+            assert_eq!((found.word.as_str(), found.crossings, found.end, found.steps), (word, 6, 20.0, 77));
+            let (captured, settled) = (cycle.as_ref().map(|_| 100.0), cycle.as_ref().map(|_| 200.0));
             assert_eq!((found.captured_at, found.settled_at), (captured, settled));
             assert_eq!(
                 (found.radius, found.turn),

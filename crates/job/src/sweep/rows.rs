@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::{Outcome, Shard, Sweep};
 use crate::encode::{self, Heading, Malformed};
-use crate::question::{NUMERICS, question_hash};
+use crate::question::NUMERICS;
 use crate::record::Hash;
 use crate::record::hash::canonical_json;
 use crate::table::{Column, ColumnKind, Entry, Table};
@@ -162,7 +162,7 @@ impl Row {
             return wrong("has other values of what is varied than its number says");
         }
         // A cell whose settings make no question has no key.
-        let key = sweep.question(self.number).ok().map(|question| question_hash(&question));
+        let key = sweep.key(self.number);
         if *self.cell_from_last(16) != key_entry(key.as_ref()) {
             return wrong("has the key of another question");
         }
@@ -380,11 +380,12 @@ impl Rows {
     }
 
     fn columns(&self) -> Vec<Column> {
-        self.sweep.over.iter().map(super::Axis::column).chain(found_columns()).collect()
+        let settings = self.sweep.over.iter().map(super::Axis::column);
+        settings.chain(self.sweep.own_columns()).chain(found_columns()).collect()
     }
 
-    /// The rows as a table, in order: a column for each axis, then what was found. Blank where
-    /// there is nothing to say; `key` holds the leading 60 bits of the question's digest.
+    /// The rows as a table, in order: a column for each axis, of a general system the state at the end and what happened, then what was found. Blank where there is nothing to say; `key` holds the
+    /// leading 60 bits of the question's digest.
     pub fn table(&self) -> Table {
         let mut table = Table::new("sweep", self.columns());
         for row in self.iter() {
@@ -516,6 +517,7 @@ impl Rows {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::question::question_hash;
     use crate::spec::*;
     use twofold_system::Caricature;
 

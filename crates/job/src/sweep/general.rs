@@ -1,0 +1,225 @@
+//! What becomes of one cell of a sweep of a general system.
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use twofold_analyse::attractor::{self, SectionPoint, Thresholds};
+use twofold_hybrid::motion::{Method, Record, follow_to_rest};
+use twofold_hybrid::{Ending, Options};
+use twofold_integrate::Watch;
+use twofold_system::Expression;
+
+use super::outcome::place_of;
+use super::{Coordinate, Outcome};
+use crate::answer::Answer;
+use crate::executor::Executor;
+use crate::general::GeneralRun;
+use crate::question::{JobError, Question};
+use crate::table::{Column, Entry};
+
+/// A motion rests that stays where it is for this share of its run longer, within so much of the size of its states.
+const LONGER: f64 = 0.05;
+const STILL: f64 = 1e-6;
+
+/// What a run of a general system ends on. Fact: `ending` ([`GeneralEnding`]).
+#[derive(Clone, Debug, PartialEq)]
+pub struct GeneralOutcome(pub GeneralRun);
+
+/// Where a run of a general system ends.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GeneralEnding {
+    /// The outcome: of a run that looks at a section or at multiples of a time what [`attractor::classify`] says, of others `moving`; `rest`; `stopped` by an
+    /// event, or where one `accumulates`.
+    pub outcome: Outcome,
+    /// The points of a closed orbit in two of the states, or the state at rest; else nothing.
+    pub place: Vec<Vec<f64>>,
+    /// The state at the end.
+    pub state: Vec<f64>,
+    /// The mode's name then.
+    pub mode: String,
+    /// The event that stopped the run, or accumulates; else nothing.
+    pub event: String,
+    /// Events that happened.
+    pub events: u64,
+    /// Switches met.
+    pub switches: u64,
+}
+
+impl Question for GeneralOutcome {
+    fn kind(&self) -> &'static str {
+        "general-outcome"
+    }
+
+    fn json(&self) -> Value {
+        GeneralRun::json(&self.0)
+    }
+
+    fn label(&self) -> String {
+        Question::label(&self.0)
+    }
+
+    fn extent(&self) -> f64 {
+        self.0.extent()
+    }
+
+    fn cost(&self) -> f64 {
+        self.0.cost()
+    }
+
+    fn compute(&self, _: &Executor<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
+        Ok(Answer::of_tables(Vec::new()).with_fact("ending", &self.ending(watch)?))
+    }
+}
+
+impl GeneralOutcome {
+    /// Follows the run, and says where it ends.
+    ///
+    /// # Errors
+    /// Whatever the computation met.
+    pub fn ending(&self, watch: &dyn Watch) -> Result<GeneralEnding, JobError> {
+        let GeneralRun { model, options } = &self.0;
+        let strobed = matches!(options.record, Record::Times { .. });
+        let plane = plane(&self.0);
+        let mut section = Vec::new();
+        let mut observe = |point: &twofold_hybrid::Point<'_>| {
+            if point.event.is_none() && (strobed || point.direction.is_some()) {
+                let u = plane.map(|i| i.map_or(0.0, |i| point.x[i]));
+                section.push(SectionPoint { t: point.t, u, upward: strobed || point.direction > Some(0.0) });
+            }
+            true
+        };
+        let longer = LONGER * (options.t_end - options.t_start);
+        let (found, rests) = follow_to_rest(model, options, &mut observe, &|t| watch.reached(t), longer, STILL)?;
+        let looks = is_looked_at(options);
+        let crossings = if looks { section.len() as u64 } else { 0 };
+        let bare = |word: &str| Outcome::bare(word, crossings, found.t, found.steps);
+        let (mut place, mut event) = (Vec::new(), String::new());
+        let outcome = match &found.ending {
+            Ending::Interrupted => return Err(JobError::Interrupted),
+            Ending::Stopped(by) => {
+                event.clone_from(by);
+                bare("stopped")
+            }
+            Ending::Zeno { event: by, .. } => {
+                event.clone_from(by);
+                bare("accumulates")
+            }
+            Ending::Finished if rests => {
+                place.push(found.x.clone());
+                bare("rest")
+            }
+            Ending::Finished if looks => {
+                let question = attractor::Question {
+                    t_end: (!strobed).then_some(options.t_end),
+                    shown_from: 0.5 * (options.t_start + options.t_end),
+                    ..attractor::Question::default()
+                };
+                let evidence = attractor::classify(&section, &question, &Thresholds::default());
+                place = place_of(&evidence);
+                Outcome { crossings, ..Outcome::judged(&evidence, found.t, found.steps) }
+            }
+            Ending::Finished => bare("moving"),
+        };
+        Ok(GeneralEnding {
+            outcome,
+            place,
+            mode: model.definition().modes()[found.mode].name.clone(),
+            state: found.x,
+            event,
+            events: found.events,
+            switches: found.switches,
+        })
+    }
+}
+
+impl GeneralEnding {
+    /// What a row says beside the outcome, in the order of [`columns`].
+    pub(super) fn cells(&self) -> Vec<Entry> {
+        let whole = |v: u64| Entry::Integer(i64::try_from(v).unwrap_or(i64::MAX));
+        let state = self.state.iter().map(|v| Entry::Number(*v));
+        let words = [&self.mode, &self.event].map(|word| Entry::Word(word.clone()));
+        state.chain(words).chain([whole(self.events), whole(self.switches)]).collect()
+    }
+}
+
+/// Empty columns of what a row says beside the outcome.
+pub(super) fn columns(run: &GeneralRun) -> Vec<Column> {
+    let states = run.model.coordinates().into_iter().map(|name| Column::numbers(&format!("end.{name}")));
+    let more =
+        [Column::words("mode"), Column::words("event"), Column::integers("events"), Column::integers("switches")];
+    states.chain(more).collect()
+}
+
+/// The cells of a row without an ending.
+pub(super) fn blank(run: &GeneralRun) -> Vec<Entry> {
+    let number = Entry::Number(f64::NAN);
+    let words = [Entry::Word(String::new()), Entry::Word(String::new()), Entry::Integer(0), Entry::Integer(0)];
+    std::iter::repeat_n(number, run.model.coordinates().len()).chain(words).collect()
+}
+
+/// Whether a run records crossings of a section, or multiples of a time.
+fn is_looked_at(options: &Options) -> bool {
+    match options.record {
+        Record::Section(_) => true,
+        Record::Times { every } => every.is_finite(),
+        Record::Path { .. } => false,
+    }
+}
+
+/// Where a run begins.
+pub(crate) fn start_of(run: &GeneralRun) -> Result<Vec<f64>, String> {
+    let given = run.options.start.clone().map_or_else(|| run.model.start(), |start| Ok(Some(start)));
+    given.map_err(|e| e.to_string())?.ok_or_else(|| "the file has no start; give --start".to_owned())
+}
+
+impl Coordinate {
+    /// Gives a run of a general system this value; an error says why it would have no effect.
+    pub(super) fn apply_to_general(&self, run: &mut GeneralRun, value: &Entry) -> Result<(), String> {
+        let number = value.value();
+        match self {
+            Coordinate::Parameter(name) => {
+                run.model = run.model.clone().with(name, number).map_err(|e| e.to_string())?
+            }
+            Coordinate::Start(name) | Coordinate::Shift(name) => {
+                let states = run.model.coordinates();
+                let i = states
+                    .iter()
+                    .position(|s| s == name)
+                    .ok_or_else(|| format!("the system has no state {name}; it has {}", states.join(", ")))?;
+                let mut x = start_of(run)?;
+                x[i] = if matches!(self, Coordinate::Start(_)) { number } else { x[i] + number };
+                run.options.start = Some(x);
+            }
+            Coordinate::Rtol => run.options.rtol = number,
+            Coordinate::Atol => run.options.atol = Some(number),
+            Coordinate::Tolerance => (run.options.rtol, run.options.atol) = (number, Some(number)),
+            Coordinate::MaxStep => run.options.max_step = number,
+            Coordinate::TEnd => run.options.t_end = number,
+            Coordinate::Method => {
+                run.options.method = Method::named(value.word()).ok_or_else(|| {
+                    format!("general systems are followed by dopri5, radau5 or taylor, not {}", value.word())
+                })?;
+            }
+            other => {
+                return Err(format!(
+                    "{other} belongs to systems with h, plus and minus; of a general system vary params.NAME, start.NAME, shift.NAME, rtol, atol, tolerance, max-step, t-end or method"
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The two states in which crossings are compared: the first that the section does not fix, or the only one.
+fn plane(run: &GeneralRun) -> [Option<usize>; 2] {
+    let names = run.model.coordinates();
+    let fixed = match &run.options.record {
+        Record::Section(Expression::Sub(a, b)) => names.iter().position(|n| {
+            [(a, b), (b, a)]
+                .iter()
+                .any(|(one, other)| one.to_string() == *n && matches!(***other, Expression::Number(_)))
+        }),
+        _ => None,
+    };
+    let mut free = (0..names.len()).filter(|i| Some(*i) != fixed || names.len() == 1);
+    [free.next(), free.next()]
+}
