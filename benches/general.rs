@@ -66,9 +66,18 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let oscillator =
         "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-x - 0.2*x^3 + 0.1*cos(1.3*x)']";
     let plain = measure(oscillator, 5_000.0)?;
-    let event = measure(&format!("{oscillator}\n[[event]]\nwhen = 'x - 3'\nset = {{ v = '-v' }}"), 5_000.0)?;
-    let curved = measure(&format!("{oscillator}\n[[event]]\nwhen = 'x^2 + x*v - 25'\nset = {{ v = '-v' }}"), 5_000.0)?;
-    let waves = measure(&format!("{oscillator}\n[[event]]\nwhen = 'sin(x) + v - 25'\nset = {{ v = '-v' }}"), 5_000.0)?;
+    let event = measure(
+        &format!("{oscillator}\n[[event]]\nwhen = 'x - 3'\nset = {{ v = '-v' }}"),
+        5_000.0,
+    )?;
+    let curved = measure(
+        &format!("{oscillator}\n[[event]]\nwhen = 'x^2 + x*v - 25'\nset = {{ v = '-v' }}"),
+        5_000.0,
+    )?;
+    let waves = measure(
+        &format!("{oscillator}\n[[event]]\nwhen = 'sin(x) + v - 25'\nset = {{ v = '-v' }}"),
+        5_000.0,
+    )?;
     let each = |work: &Work| 1e9 * work.seconds / work.steps as f64;
     println!(
         "oscillator: {:.0} ns a step; with the event x = 3 {:+.0} %; with the event x^2 + x v = 25 {:+.0} %; sin(x) + v = 25 {:+.0} %",

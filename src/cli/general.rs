@@ -244,14 +244,20 @@ pub fn looked_at(flags: &RunFlags, period: Option<f64>) -> Result<Option<General
     let options = &mut run.options;
     match (period, &options.record) {
         (Some(_), Record::Section(_)) => {
-            return Err(CliError::no_effect("--period", "--section says where to look; leave one of the two out"));
+            return Err(CliError::no_effect(
+                "--period",
+                "--section says where to look; leave one of the two out",
+            ));
         }
         (Some(period), _) if period.is_finite() && period > 0.0 => {
             // Whole periods, so that the next run can begin at the same phase.
-            options.t_end = options.t_start + ((options.t_end - options.t_start) / period).ceil() * period;
+            options.t_end =
+                options.t_start + ((options.t_end - options.t_start) / period).ceil() * period;
             options.record = Record::Times { every: period };
         }
-        (Some(period), _) => return Err(usage(format!("--period is {period}: give a time above 0"))),
+        (Some(period), _) => {
+            return Err(usage(format!("--period is {period}: give a time above 0")));
+        }
         (None, Record::Section(_)) => {}
         (None, _) => options.record = Record::Times { every: f64::INFINITY },
     }

@@ -63,7 +63,9 @@ fn rows_of_sweeps_are_recomputed() {
     assert_eq!(code, Some(1), "{out}{err}");
     assert_eq!(out.matches("DIFFERS: row ").count(), 2, "{out}");
     // A file, sound as such, whose rows answer another question than it says.
-    let Base::Surfaces(run) = rows.sweep().run() else { panic!("of a system with h, plus and minus") };
+    let Base::Surfaces(run) = rows.sweep().run() else {
+        panic!("of a system with h, plus and minus")
+    };
     let run = RunSpec { t_end: 61.0, ..(**run).clone() };
     let mut others = Rows::of(Sweep::new(run, rows.sweep().axes().to_vec(), None).unwrap());
     rows.iter().for_each(|row| others.insert(row).unwrap());

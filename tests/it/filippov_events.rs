@@ -283,12 +283,17 @@ const CLOCK: &str = "papers/giaouris-2008/systems/buck-clock.toml";
 
 /// A system's file in other units: its states times `unit`, its switching functions times `factor`.
 fn file_in_units(name: &str, unit: f64, factor: f64) -> String {
-    let text = || std::fs::read_to_string(std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(name)).unwrap();
-    let system = System::builtin(name)
-        .unwrap_or_else(|| System::new(twofold::system::Definition::from_toml(&text(), name).unwrap()));
+    let text = || {
+        std::fs::read_to_string(std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(name))
+            .unwrap()
+    };
+    let system = System::builtin(name).unwrap_or_else(|| {
+        System::new(twofold::system::Definition::from_toml(&text(), name).unwrap())
+    });
     let mut file: toml::Table = toml::from_str(&system.definition().to_toml()).unwrap();
     let states: Vec<String> = system.definition().states().iter().map(|s| s.name.clone()).collect();
-    let lets = file.entry("let").or_insert_with(|| toml::Table::new().into()).as_table_mut().unwrap();
+    let lets =
+        file.entry("let").or_insert_with(|| toml::Table::new().into()).as_table_mut().unwrap();
     for state in &states {
         lets.insert(state.clone(), format!("scaled_{state}/{unit:e}").into());
     }
@@ -321,8 +326,11 @@ fn units_change_nothing_of_two_surfaces_and_of_a_clock() {
     let end = |name: &str, unit: f64, factor: f64| -> Vec<f64> {
         std::fs::write(&file, file_in_units(name, unit, factor)).unwrap();
         let (eps, atol) = (format!("{:e}", 1e-2 * factor), format!("{:e}", 1e-10 * unit));
-        let switch: &[&str] =
-            if name == CLOCK { &["--eps", &eps, "--t-end", "2"] } else { &["--switch", "filippov", "--t-end", "6"] };
+        let switch: &[&str] = if name == CLOCK {
+            &["--eps", &eps, "--t-end", "2"]
+        } else {
+            &["--switch", "filippov", "--t-end", "6"]
+        };
         let run = std::process::Command::new(env!("CARGO_BIN_EXE_twofold"))
             .args([
                 "run", "--quiet", "--method", "dopri5", "--rtol", "1e-10", "--atol", &atol,

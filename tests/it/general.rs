@@ -432,20 +432,47 @@ fn wrong_files_and_flags_are_refused() {
     ball(&["--section", "x > v = 0"], 2, &["a condition is no number"]);
     ball(&["--section", "x = 0", "--every", "1"], 2, &["--every has no effect"]);
     ball(&["--t-start", "5", "--t-end", "1"], 2, &["--t-end, --t-start"]);
-    let along = ["orbit", "--along", "q=0.5..0.6", "--quiet", "--system", "rimless-wheel", "--section", "a=0"];
+    let along = [
+        "orbit",
+        "--along",
+        "q=0.5..0.6",
+        "--quiet",
+        "--system",
+        "rimless-wheel",
+        "--section",
+        "a=0",
+    ];
     refused(at, &along, 2, &["--along \"q=0.5..0.6\": the system has no parameter q; it has"]);
     for (axis, words) in [
-        ("eps=1,2", "eps belongs to systems with h, plus and minus; of a general system vary params.NAME"),
+        (
+            "eps=1,2",
+            "eps belongs to systems with h, plus and minus; of a general system vary params.NAME",
+        ),
         ("params.q=1,2", "no parameter `q`"),
         ("start.z=1,2", "no state z; it has x, v"),
     ] {
-        refused(at, &["sweep", "--quiet", "--system", "bouncing-ball", "--over", axis], 2, &[words]);
+        refused(
+            at,
+            &["sweep", "--quiet", "--system", "bouncing-ball", "--over", axis],
+            2,
+            &[words],
+        );
     }
     let sweep = ["sweep", "--quiet", "--system", "bouncing-ball"];
-    refused(at, &[&sweep[..], &["--every", "1"]].concat(), 2, &["--every has no effect", "no paths are recorded"]);
+    refused(
+        at,
+        &[&sweep[..], &["--every", "1"]].concat(),
+        2,
+        &["--every has no effect", "no paths are recorded"],
+    );
     refused(at, &[&sweep[..], &["--period", "-1"]].concat(), 2, &["--period is -1"]);
     refused(at, &["sweep", "--quiet", "--period", "1"], 2, &["--period has no effect"]);
-    refused(at, &["run", "--system", "bouncing-bal"], 2, &["did you mean bouncing-ball?", "driven-by-data"]);
+    refused(
+        at,
+        &["run", "--system", "bouncing-bal"],
+        2,
+        &["did you mean bouncing-ball?", "driven-by-data"],
+    );
     // A system with one switch still says what it lacks, and who has it.
     fs::write(at.join("f.toml"), "states = ['x']\nh = 'x'\nplus = ['max(x, 1)']\nminus = ['1']")
         .unwrap();
@@ -468,8 +495,16 @@ fn a_sweep_has_a_row_a_run() {
         [[event]]\nname = 'lands'\nwhen = 'x'\ndirection = 'down'\nstop = true";
     fs::write(at.join("drop.toml"), drop).unwrap();
     let sweep = |more: &[&str]| {
-        let over =
-            ["sweep", "--quiet", "--system", "drop.toml", "--over", "params.half=0.5,2", "--over", "params.g=5,-1,20"];
+        let over = [
+            "sweep",
+            "--quiet",
+            "--system",
+            "drop.toml",
+            "--over",
+            "params.half=0.5,2",
+            "--over",
+            "params.g=5,-1,20",
+        ];
         let (found, _, err) = twofold_in(at, &[&over[..], more].concat());
         assert_eq!(found, 3, "{err}");
     };
@@ -483,7 +518,9 @@ fn a_sweep_has_a_row_a_run() {
     assert!(words("reason")[1].contains("above 0"), "{:?}", words("reason"));
     assert_eq!(table.integers("events"), [2, 0, 2, 2, 0, 2]);
     for (row, (half, g)) in
-        [(0.5, 5.0), (0.5, -1.0), (0.5, 20.0), (2.0, 5.0), (2.0, -1.0), (2.0, 20.0_f64)].iter().enumerate()
+        [(0.5, 5.0), (0.5, -1.0), (0.5, 20.0), (2.0, 5.0), (2.0, -1.0), (2.0, 20.0_f64)]
+            .iter()
+            .enumerate()
     {
         if *g > 0.0 {
             near(table.numbers("end")[row], (4.0 * half / g).sqrt(), 1e-9);
@@ -494,7 +531,8 @@ fn a_sweep_has_a_row_a_run() {
     for (shard, file) in [("1/2", "a.csv"), ("2/2", "b.csv")] {
         sweep(&["--t-end", "3", "--shard", shard, "--out", file]);
     }
-    let (code, _, err) = twofold_in(at, &["sweep", "merge", "a.csv", "b.csv", "--quiet", "--out", "merged.csv"]);
+    let (code, _, err) =
+        twofold_in(at, &["sweep", "merge", "a.csv", "b.csv", "--quiet", "--out", "merged.csv"]);
     assert_eq!(code, 3, "{err}");
     assert_eq!(fs::read(at.join("merged.csv")).unwrap(), whole);
     sweep(&["--t-end", "3", "--resume", "--out", "a.csv"]);
@@ -508,8 +546,7 @@ fn a_sweep_has_a_row_a_run() {
 fn a_sweep_says_what_runs_settle_on() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let text =
-        "states = ['x']\nstart = [0.3]\nf = ['1']\n[parameters]\ntop = 1\n[[event]]\nwhen = 'x - top'\nset = { x = 0 }";
+    let text = "states = ['x']\nstart = [0.3]\nf = ['1']\n[parameters]\ntop = 1\n[[event]]\nwhen = 'x - top'\nset = { x = 0 }";
     fs::write(at.join("saw.toml"), text).unwrap();
     fs::write(
         at.join("well.toml"),
@@ -518,7 +555,10 @@ fn a_sweep_says_what_runs_settle_on() {
     .unwrap();
     let outcomes = |flags: &[&str]| {
         let table = from_csv(&good(at, &[&["sweep", "--quiet"], flags].concat())).unwrap().1;
-        (table.words("outcome").map(str::to_owned).collect::<Vec<_>>(), table.integers("crossings").to_vec())
+        (
+            table.words("outcome").map(str::to_owned).collect::<Vec<_>>(),
+            table.integers("crossings").to_vec(),
+        )
     };
     let saw = ["--system", "saw.toml", "--t-end", "300", "--over", "params.top=1,1.5"];
     let (found, seen) = outcomes(&[&saw[..], &["--period", "0.5"]].concat());
@@ -526,9 +566,22 @@ fn a_sweep_says_what_runs_settle_on() {
     let (found, seen) = outcomes(&[&saw[..], &["--section", "x=0.5"]].concat());
     assert_eq!((found, seen), (vec!["period-1".into(), "period-1".into()], vec![300, 200]));
     assert_eq!(outcomes(&saw).0, ["moving", "moving"]);
-    assert_eq!(outcomes(&["--system", "well.toml", "--t-end", "100", "--over", "params.p=1,4"]).0, ["rest", "rest"]);
-    let scan =
-        ["scan", "--quiet", "--system", "saw.toml", "--t-end", "300", "--period", "0.5", "--over", "params.top=1"];
+    assert_eq!(
+        outcomes(&["--system", "well.toml", "--t-end", "100", "--over", "params.p=1,4"]).0,
+        ["rest", "rest"]
+    );
+    let scan = [
+        "scan",
+        "--quiet",
+        "--system",
+        "saw.toml",
+        "--t-end",
+        "300",
+        "--period",
+        "0.5",
+        "--over",
+        "params.top=1",
+    ];
     let table = from_csv(&good(at, &scan)).unwrap().1;
     assert!(table.numbers("x").iter().all(|x| (x - 0.3).abs() < 1e-9 || (x - 0.8).abs() < 1e-9));
 }
@@ -771,7 +824,8 @@ fn scans_follow_attractors_up_and_down() {
 #[test]
 fn a_scan_shows_a_period_doubling() {
     let folder = tempfile::tempdir().unwrap();
-    let scan = ["--system", "buck", "--period", "4e-4", "--t-end", "0.12", "--over", "params.input=24,25"];
+    let scan =
+        ["--system", "buck", "--period", "4e-4", "--t-end", "0.12", "--over", "params.input=24,25"];
     let table = scanned(folder.path(), &scan);
     let points = |input: f64| -> Vec<f64> {
         let mut found: Vec<f64> = (0..table.len())

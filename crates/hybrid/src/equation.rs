@@ -505,7 +505,9 @@ impl Equation {
             field: Program::new(&tape.select(0..n)),
             watched: Program::new(&tape.select(n..outputs)),
             outputs: outputs - n,
-            place: (0..self.guards.len()).map(|guard| active.iter().position(|a| *a == guard)).collect(),
+            place: (0..self.guards.len())
+                .map(|guard| active.iter().position(|a| *a == guard))
+                .collect(),
             is_curved: affine.contains(&None),
             affine,
             colours: colours(&touches, n + 1),
@@ -555,13 +557,18 @@ impl Equation {
                 // The component that it spoils, and the expression that is written there.
                 let (fields, guards) = tape.outputs().split_at(n);
                 let spoilt = self.definition.modes.iter().flat_map(|m| m.field.iter().enumerate());
-                let place = spoilt.zip(fields.iter().cycle()).find(|(_, out)| !values[**out].is_finite());
-                let guard = || compiled.deciding.iter().zip(guards).find(|(_, out)| values[**out].is_nan());
+                let place =
+                    spoilt.zip(fields.iter().cycle()).find(|(_, out)| !values[**out].is_finite());
+                let guard =
+                    || compiled.deciding.iter().zip(guards).find(|(_, out)| values[**out].is_nan());
                 return Some(match place {
                     Some(((i, e), _)) => format!("{what}, in the equation of {}, `{e}`", names[i]),
                     None => match guard() {
                         Some((guard, _)) => {
-                            format!("{what}, in the switching function {}", self.guards[*guard].expression)
+                            format!(
+                                "{what}, in the switching function {}",
+                                self.guards[*guard].expression
+                            )
                         }
                         None => what.into(),
                     },
@@ -840,7 +847,8 @@ impl Writer<'_> {
     /// Writes all guards that were asked. One may ask others: until no new one is found.
     fn write_guards(&mut self) {
         loop {
-            let open: Vec<usize> = self.guards.iter().filter(|(_, g)| g.is_none()).map(|(i, _)| *i).collect();
+            let open: Vec<usize> =
+                self.guards.iter().filter(|(_, g)| g.is_none()).map(|(i, _)| *i).collect();
             if open.is_empty() {
                 break;
             }

@@ -180,7 +180,10 @@ impl Model {
         let mut tables = BTreeMap::new();
         for (name, entry) in document["tables"].as_object_mut().into_iter().flatten() {
             let data = entry.as_object_mut().and_then(|entry| entry.remove("data"));
-            tables.insert(name.clone(), serde_json::from_value(data.unwrap_or_default()).map_err(|e| e.to_string())?);
+            tables.insert(
+                name.clone(),
+                serde_json::from_value(data.unwrap_or_default()).map_err(|e| e.to_string())?,
+            );
         }
         let order = document.as_object_mut().and_then(|d| d.remove("order")).unwrap_or_default();
         let mut document: Document = serde_json::from_value(document).map_err(|e| e.to_string())?;

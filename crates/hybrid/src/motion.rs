@@ -79,7 +79,9 @@ pub enum Method {
 impl Method {
     /// The one of this name.
     pub fn named(name: &str) -> Option<Self> {
-        [Method::Dopri5, Method::Radau5, Method::Taylor].into_iter().find(|method| method.name() == name)
+        [Method::Dopri5, Method::Radau5, Method::Taylor]
+            .into_iter()
+            .find(|method| method.name() == name)
     }
 
     /// Its name.
@@ -846,7 +848,9 @@ impl<'a> Follower<'a> {
             };
             if !earliest.is_finite() && list.iter().zip(&last_values).any(ends) {
                 h = search::SHORTER * wanted;
-                if self.t + h == self.t || h <= f64::EPSILON * 1e-6 * (self.options.t_end - self.options.t_start) {
+                if self.t + h == self.t
+                    || h <= f64::EPSILON * 1e-6 * (self.options.t_end - self.options.t_start)
+                {
                     if self.land_at_an_edge()? {
                         h = 0.0;
                         continue;
@@ -931,7 +935,12 @@ impl<'a> Follower<'a> {
 
     /// Makes a step of at most this length that the tolerance allows and that has seen what there is, with the list of what is [sought](Self::sought) in
     /// it; none if none is short enough.
-    fn step_within(&mut self, step: &mut Step, longest: f64, list: &mut Vec<(Sought, f64)>) -> Option<Accepted> {
+    fn step_within(
+        &mut self,
+        step: &mut Step,
+        longest: f64,
+        list: &mut Vec<(Sought, f64)>,
+    ) -> Option<Accepted> {
         let mut scale = std::mem::take(&mut self.scale);
         let accepted = self.step_in_units(step, longest, &mut scale, list);
         self.scale = scale;
@@ -1005,7 +1014,10 @@ impl<'a> Follower<'a> {
         let (mut config, sliding) = (self.config.clone(), self.sliding.clone());
         config.pieces = self.equation.tables.iter().map(|table| table.piece(self.t)).collect();
         let values = self.watched_values();
-        let slid: Vec<f64> = sliding.iter().map(|g| self.compiled.place(*g).map_or(f64::NAN, |p| values[p])).collect();
+        let slid: Vec<f64> = sliding
+            .iter()
+            .map(|g| self.compiled.place(*g).map_or(f64::NAN, |p| values[p]))
+            .collect();
         self.adopt(config, sliding.clone());
         if !self.equation.tables.is_empty() {
             // A table's jump may carry switching functions over zero, or away from it.

@@ -17,13 +17,19 @@ const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 impl Range {
     fn new(middle: f64, radius: f64) -> Self {
-        Self { middle, radius: radius * (1.0 + ROUNDING) + ROUNDING * middle.abs() + f64::MIN_POSITIVE }
+        Self {
+            middle,
+            radius: radius * (1.0 + ROUNDING) + ROUNDING * middle.abs() + f64::MIN_POSITIVE,
+        }
     }
 
     /// What lies between Bernstein coefficients, which have the rounding of a few sums.
     pub fn between(b: &[f64; 5]) -> Self {
         let (low, high) = b.iter().fold((b[0], b[0]), |(low, high), b| (low.min(*b), high.max(*b)));
-        Self::new(0.5 * (low + high), 0.5 * (high - low) + 16.0 * ROUNDING * low.abs().max(high.abs()))
+        Self::new(
+            0.5 * (low + high),
+            0.5 * (high - low) + 16.0 * ROUNDING * low.abs().max(high.abs()),
+        )
     }
 
     /// Whether all numbers are on this side of `boundary`.
@@ -73,7 +79,8 @@ impl Mul for Range {
     type Output = Self;
     #[inline]
     fn mul(self, other: Self) -> Self {
-        let radius = self.middle.abs() * other.radius + self.radius * (other.middle.abs() + other.radius);
+        let radius =
+            self.middle.abs() * other.radius + self.radius * (other.middle.abs() + other.radius);
         Self::new(self.middle * other.middle, radius)
     }
 }
@@ -115,7 +122,11 @@ impl Elementary for Range {
     fn exp(self) -> Self {
         // e^r - 1 is at most r + r^2 up to r = 1.79.
         let e = Elementary::exp(self.middle);
-        let grows = if self.radius <= 1.0 { self.radius + self.radius * self.radius } else { f64::INFINITY };
+        let grows = if self.radius <= 1.0 {
+            self.radius + self.radius * self.radius
+        } else {
+            f64::INFINITY
+        };
         Self::new(e, e * grows)
     }
     fn sin(self) -> Self {
@@ -143,7 +154,10 @@ impl Elementary for Range {
     }
     fn sign(self) -> Self {
         let flat = self.middle.abs() > self.radius;
-        Self { middle: if flat { self.middle.signum() } else { 0.0 }, radius: if flat { 0.0 } else { 1.0 } }
+        Self {
+            middle: if flat { self.middle.signum() } else { 0.0 },
+            radius: if flat { 0.0 } else { 1.0 },
+        }
     }
 }
 
@@ -177,11 +191,15 @@ mod tests {
                 let ranges = functions(Range::between(&xs), Range::between(&ys));
                 for x in xs {
                     for y in ys {
-                        for (i, (value, range)) in functions(x, y).into_iter().zip(&ranges).enumerate() {
+                        for (i, (value, range)) in
+                            functions(x, y).into_iter().zip(&ranges).enumerate()
+                        {
                             let inside = (value - range.middle).abs() <= range.radius;
                             assert!(inside || !range.radius.is_finite(), "{i}: {value} {range:?}");
                             all += 1;
-                            tight += usize::from(range.radius <= 10.0 * width * (1.0 + value.abs()) + 1e-12);
+                            tight += usize::from(
+                                range.radius <= 10.0 * width * (1.0 + value.abs()) + 1e-12,
+                            );
                         }
                     }
                 }

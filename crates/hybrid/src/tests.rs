@@ -1714,15 +1714,16 @@ fn what_is_slid_upon_may_jump_away() {
         near(end(&from(f), t_end)[0], want, 1e-9);
     }
     // Two surfaces, of which one jumps.
-    let two =
-        "states = ['x', 'y', 'z']\nstart = [0.3, 0.2, 0]\nf = ['-sign(x - floor(z))', '-sign(y) + 0.5*sin(t)', '1']";
+    let two = "states = ['x', 'y', 'z']\nstart = [0.3, 0.2, 0]\nf = ['-sign(x - floor(z))', '-sign(y) + 0.5*sin(t)', '1']";
     let found = end(two, 1.5);
     near(found[0], 0.5, 1e-9);
     near(found[1], 0.0, 1e-9);
     let follows = |f: &str| {
         let data = "t,u\n0,-1\n1,0.5\n2,-0.25\n3.5,2\n5,0\n6,0\n";
-        let table = "[tables.u]\nfile = 'u.csv'\ntime = 't'\ncolumn = 'u'\ninterpolation = 'previous'";
-        let model = model(&format!("states = ['x']\nstart = [0.3]\nf = ['{f}']\n{table}")).with_table("u", data);
+        let table =
+            "[tables.u]\nfile = 'u.csv'\ntime = 't'\ncolumn = 'u'\ninterpolation = 'previous'";
+        let model = model(&format!("states = ['x']\nstart = [0.3]\nf = ['{f}']\n{table}"))
+            .with_table("u", data);
         run(&model.unwrap(), 6.0).1.unwrap().x[0]
     };
     near(follows("-sign(x - u)"), 0.25, 1e-9);

@@ -8,8 +8,10 @@ use twofold_hybrid::motion::tangent::exponents;
 use twofold_hybrid::motion::{Exit, Method, Record};
 use twofold_hybrid::rests::rests;
 use twofold_hybrid::selection::Intersection;
-use twofold_hybrid::{Definition, Ending, Equation, HybridError, Model, Options, Point, follow_watched};
-use twofold_integrate::Watch;
+use twofold_hybrid::{
+    Definition, Ending, Equation, HybridError, Model, Options, Point, follow_watched,
+};
+use twofold_integrate::Monitor;
 use twofold_system::{Expression, System};
 
 use super::answer::{Answer, Stop};
@@ -52,9 +54,11 @@ pub fn expression(text: &str, model: &Model) -> Result<Expression, String> {
     let terms = definition.document().terms.0.iter().map(|(n, _)| n.as_str());
     let tables = definition.tables().iter().map(|(n, _)| n.as_str());
     let parameters = definition.parameters().iter().map(|p| p.name.as_str());
-    let names: Vec<&str> = model.coordinates().into_iter().chain(parameters).chain(terms).chain(tables).collect();
-    Expression::parse_general(text, &names)
-        .map_err(|e| format!("{}{}", e.message, e.help.map_or(String::new(), |h| format!(" ({h})"))))
+    let names: Vec<&str> =
+        model.coordinates().into_iter().chain(parameters).chain(terms).chain(tables).collect();
+    Expression::parse_general(text, &names).map_err(|e| {
+        format!("{}{}", e.message, e.help.map_or(String::new(), |h| format!(" ({h})")))
+    })
 }
 
 /// Rows are handed on in parts of so many.
@@ -127,11 +131,19 @@ impl GeneralRun {
                 Some("at-once:minus") => Exit::Minus,
                 _ => Exit::Undecided,
             },
-            method: method["name"].as_str().and_then(Method::named).ok_or_else(|| wrong("the method"))?,
-            intersection: match (json["intersection"].as_str(), json["intersection"]["order"].as_array()) {
+            method: method["name"]
+                .as_str()
+                .and_then(Method::named)
+                .ok_or_else(|| wrong("the method"))?,
+            intersection: match (
+                json["intersection"].as_str(),
+                json["intersection"]["order"].as_array(),
+            ) {
                 (Some("bilinear"), _) => Intersection::Bilinear,
                 (Some("hull-least-norm"), _) => Intersection::HullLeastNorm,
-                (_, Some(named)) => Intersection::Order(named.iter().map(read).collect::<Result<_, _>>()?),
+                (_, Some(named)) => {
+                    Intersection::Order(named.iter().map(read).collect::<Result<_, _>>()?)
+                }
                 _ => Intersection::Undecided,
             },
         };
@@ -549,12 +561,17 @@ mod tests {
         let text = "states = ['x', 'v']\nstart = ['2*b', 0]\n[parameters]\nb = 0.1\na = '3*b'\n[let]\ns = 'x - a'\nc = 's^2'\n\
             [tables.w]\nfile = 'w.csv'\ntime = 't'\ncolumn = 'w'\n[modes.z]\nf = ['v', '-sign(s) + w']\n[modes.m]\nf = ['v', 'c']\n\
             [[event]]\nwhen = 'x + 1'\nmode = 'm'";
-        let model =
-            Model::new(Definition::from_toml(text, "f").unwrap()).with_table("w", "t,w\n0,0.1\n3,0.7\n20,0\n").unwrap();
+        let model = Model::new(Definition::from_toml(text, "f").unwrap())
+            .with_table("w", "t,w\n0,0.1\n3,0.7\n20,0\n")
+            .unwrap();
         let read = |text: &str| expression(text, &model).unwrap();
         for (record, intersection, method) in [
             (Record::Section(read("x - c*v/(1 + w)")), Intersection::Undecided, Method::Dopri5),
-            (Record::Times { every: f64::INFINITY }, Intersection::Order(vec![read("x - a")]), Method::Radau5),
+            (
+                Record::Times { every: f64::INFINITY },
+                Intersection::Order(vec![read("x - a")]),
+                Method::Radau5,
+            ),
             (Record::Times { every: 0.1 }, Intersection::Bilinear, Method::Taylor),
             (Record::Path { chord: 1e-3 }, Intersection::HullLeastNorm, Method::Dopri5),
         ] {
@@ -576,7 +593,12 @@ mod tests {
     #[test]
     fn the_order_of_modes_is_a_part_of_the_question() {
         let of = |first: &str, second: &str| {
-            run(&format!("states = ['x']\nstart = [0]\n[modes.{first}]\nf = ['1']\n[modes.{second}]\nf = ['1']"), 1.0)
+            run(
+                &format!(
+                    "states = ['x']\nstart = [0]\n[modes.{first}]\nf = ['1']\n[modes.{second}]\nf = ['1']"
+                ),
+                1.0,
+            )
         };
         assert_ne!(Question::json(&of("a", "b")), Question::json(&of("b", "a")));
     }

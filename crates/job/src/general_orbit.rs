@@ -7,7 +7,7 @@ use twofold_hybrid::motion::Record;
 use twofold_hybrid::motion::tangent::{Return, closed_orbit, once_around};
 use twofold_hybrid::rests::rests;
 use twofold_hybrid::{Ending, HybridError, Model, Options, follow};
-use twofold_integrate::Watch;
+use twofold_integrate::Monitor;
 
 use super::answer::{Answer, Stop};
 use super::executor::Executor;
@@ -56,7 +56,7 @@ impl Question for GeneralOrbit {
 
     /// Facts: `states` (their names), `point`, `period`, `multipliers` (real and imaginary parts, the largest first) and `gap` (how far the orbit is from closed,
     /// relative to its largest state). Of a branch also the tables `branch` and `bifurcations` and the fact `end`, as of [`ClosedOrbit`](super::ClosedOrbit).
-    fn compute(&self, _: &Executor<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
+    fn compute(&self, _: &Executor<'_>, monitor: &dyn Monitor) -> Result<Answer, JobError> {
         let model = match &self.along {
             Some(along) => at(&self.run.model, along, along.from)?,
             None => self.run.model.clone(),
@@ -69,8 +69,13 @@ impl Question for GeneralOrbit {
         };
         if settle > 0.0 {
             let t_end = options.t_start + settle;
-            let settling = Options { t_end, record: Record::Times { every: f64::INFINITY }, ..options.clone() };
-            let end = follow(&model, &settling, &mut |point| watch.reached(point.t))?;
+            let settling = Options {
+                t_end,
+                record: Record::Times { every: f64::INFINITY },
+                ..options.clone()
+            };
+            let end =
+                follow(&model, &settling, &mut |point| monitor.reached(point.t).is_continue())?;
             if end.ending == Ending::Interrupted {
                 return Err(JobError::Interrupted);
             }
@@ -105,7 +110,9 @@ impl Question for GeneralOrbit {
             most: along.most,
             newton,
         };
-        let mut go_on = |orbit: &Orbit| watch.reached(((orbit.parameter - along.from) / width).abs().min(1.0));
+        let mut go_on = |orbit: &Orbit| {
+            monitor.reached(((orbit.parameter - along.from) / width).abs().min(1.0)).is_continue()
+        };
         let mut found = branch::follow(&map, first, &branch_options, &mut go_on);
         if found.end == End::Interrupted {
             answer.stop = Stop::Interrupted;
@@ -124,7 +131,8 @@ impl Question for GeneralOrbit {
 
 /// The system at a value of the parameter.
 fn at(model: &Model, along: &Along, value: f64) -> Result<Model, HybridError> {
-    let model = model.clone().with(&along.parameter, value).and_then(|model| model.values().map(|_| model));
+    let model =
+        model.clone().with(&along.parameter, value).and_then(|model| model.values().map(|_| model));
     model.map_err(|error| HybridError::Bad(format!("--along {}: {error}", along.parameter)))
 }
 
@@ -144,7 +152,9 @@ impl Map<'_> {
         if turn.mode != self.options.mode {
             let mode = |mode: usize| &self.model.definition().modes()[mode].name;
             let (from, to) = (mode(self.options.mode), mode(turn.mode));
-            return Err(HybridError::NoOrbit(format!("the motion comes back in the mode {to} and not in {from}")));
+            return Err(HybridError::NoOrbit(format!(
+                "the motion comes back in the mode {to} and not in {from}"
+            )));
         }
         let mut derivative = vec![0.0; (n + 1) * (n + 1)];
         for (i, row) in turn.matrix.chunks(n).enumerate() {
@@ -180,7 +190,11 @@ impl ReturnMap for Map<'_> {
 
     fn roughly(&self, u: &[f64], p: f64) -> Result<Returned, Trouble> {
         let Options { rtol, atol, .. } = self.options;
-        let options = Options { rtol: ROUGHLY * rtol, atol: atol.map(|atol| ROUGHLY * atol), ..self.options.clone() };
+        let options = Options {
+            rtol: ROUGHLY * rtol,
+            atol: atol.map(|atol| ROUGHLY * atol),
+            ..self.options.clone()
+        };
         self.tried(u, p, &options).map_err(|error| error.to_string().into())
     }
 
@@ -191,7 +205,8 @@ impl ReturnMap for Map<'_> {
         let size = u.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
         let within: Vec<(f64, f64)> = u.iter().map(|x| (x - size, x + size)).collect();
         let apart = |x: &[f64]| x.iter().zip(u).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
-        let found = rests(&model, &within).ok()?.into_iter().filter(|rest| rest.mode == self.options.mode);
+        let found =
+            rests(&model, &within).ok()?.into_iter().filter(|rest| rest.mode == self.options.mode);
         let nearest = found.min_by(|a, b| apart(&a.x).total_cmp(&apart(&b.x)))?;
         Some((nearest.x.into_iter().chain([0.0]).collect(), nearest.eigenvalues))
     }
@@ -214,7 +229,12 @@ mod tests {
     /// x/e + 4 (1 - e^(-1/2)) e^(-1/2) at its end.
     #[test]
     fn a_driven_orbit_closes_as_its_formula_says() {
-        let question = GeneralOrbit { run: run(DRIVEN, 10.0), settle: 0.5, after: Return::Period(1.0), along: None };
+        let question = GeneralOrbit {
+            run: run(DRIVEN, 10.0),
+            settle: 0.5,
+            after: Return::Period(1.0),
+            along: None,
+        };
         let answer = Executor::quiet().ask(&question).unwrap();
         let point: Vec<f64> = answer.fact("point").unwrap();
         let multipliers: Vec<[f64; 2]> = answer.fact("multipliers").unwrap();
@@ -246,12 +266,25 @@ mod tests {
     fn a_kicked_orbit_doubles_its_period_where_its_map_does() {
         let text = "states = ['x']\nstart = [0.7]\nf = ['-0.6931471805599453*x']\n[parameters]\nc = 1.5\n\
             [[event]]\nevery = 1\nset = { x = '2*c*x - 8*x^3' }";
-        let question =
-            GeneralOrbit { run: run(text, 10.0), settle: 0.0, after: Return::Period(1.0), along: along("c", 1.4, 2.2) };
+        let question = GeneralOrbit {
+            run: run(text, 10.0),
+            settle: 0.0,
+            after: Return::Period(1.0),
+            along: along("c", 1.4, 2.2),
+        };
         let answer = Executor::quiet().ask(&question).unwrap();
-        let (branch, changes) = (answer.table("branch").unwrap(), answer.table("bifurcations").unwrap());
-        for ((c, x), m) in branch.numbers("c").iter().zip(branch.numbers("x")).zip(branch.numbers("multiplier1_re")) {
-            assert!((x - (c - 1.0).sqrt()).abs() < 1e-9 && (m - 3.0 + 2.0 * c).abs() < 1e-8, "{c} {x} {m}");
+        let (branch, changes) =
+            (answer.table("branch").unwrap(), answer.table("bifurcations").unwrap());
+        for ((c, x), m) in branch
+            .numbers("c")
+            .iter()
+            .zip(branch.numbers("x"))
+            .zip(branch.numbers("multiplier1_re"))
+        {
+            assert!(
+                (x - (c - 1.0).sqrt()).abs() < 1e-9 && (m - 3.0 + 2.0 * c).abs() < 1e-8,
+                "{c} {x} {m}"
+            );
         }
         assert_eq!(changes.words("change").collect::<Vec<_>>(), ["period-doubling"]);
         assert!((changes.numbers("c")[0] - 2.0).abs() < 1e-6, "{:?}", changes.numbers("c"));
@@ -264,9 +297,15 @@ mod tests {
             [let]\nq = 'x^2 + y^2'\ng = 'mu + q - q^2'";
         let mut run = run(text, 100.0);
         run.options.record = Record::Section(expression("sinh(x) + x^3", &run.model).unwrap());
-        let question = GeneralOrbit { run, settle: 60.0, after: Return::Crossings(1), along: along("mu", 0.3, -0.6) };
+        let question = GeneralOrbit {
+            run,
+            settle: 60.0,
+            after: Return::Crossings(1),
+            along: along("mu", 0.3, -0.6),
+        };
         let answer = Executor::quiet().ask(&question).unwrap();
-        let (branch, changes) = (answer.table("branch").unwrap(), answer.table("bifurcations").unwrap());
+        let (branch, changes) =
+            (answer.table("branch").unwrap(), answer.table("bifurcations").unwrap());
         for (mu, y) in branch.numbers("mu").iter().zip(branch.numbers("y")) {
             let q = y * y;
             assert!((mu + q - q * q).abs() < 1e-7, "{mu} {y}");

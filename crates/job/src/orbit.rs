@@ -13,7 +13,9 @@ use super::rest::{self, Rest};
 use super::run::Run;
 use super::spec::{Observation, RunSpec, SpecError, SwitchSpec};
 use super::table::{Column, Entry, Table};
-use twofold_analyse::branch::{self, Branch, BranchOptions, End, Newton, Obstacle, Orbit, ReturnMap, Trouble};
+use twofold_analyse::branch::{
+    self, Branch, BranchOptions, End, Newton, Obstacle, Orbit, ReturnMap, Trouble,
+};
 use twofold_analyse::filippov_return;
 use twofold_analyse::floquet::{self, ReturnPlane, Returned};
 use twofold_instances_switched::Motions;
@@ -428,24 +430,34 @@ impl ClosedOrbit {
 }
 
 /// The tables `branch` and `bifurcations`.
-pub(super) fn branch_tables(parameter: &str, states: &[impl AsRef<str>], found: &Branch) -> [Table; 2] {
+pub(super) fn branch_tables(
+    parameter: &str,
+    states: &[impl AsRef<str>],
+    found: &Branch,
+) -> [Table; 2] {
     let orbits = &found.orbits;
     let multipliers = orbits.iter().map(|o| o.multipliers.len()).max().unwrap_or(0);
-    let numbered = (1..=multipliers).flat_map(|k| [format!("multiplier{k}_re"), format!("multiplier{k}_im")]);
-    let columns = [Column::numbers(parameter), Column::numbers("period"), Column::words("stability")]
-        .into_iter()
-        .chain(states.iter().map(|n| Column::numbers(n.as_ref())))
-        .chain(numbered.map(|n| Column::numbers(&n)));
+    let numbered =
+        (1..=multipliers).flat_map(|k| [format!("multiplier{k}_re"), format!("multiplier{k}_im")]);
+    let columns =
+        [Column::numbers(parameter), Column::numbers("period"), Column::words("stability")]
+            .into_iter()
+            .chain(states.iter().map(|n| Column::numbers(n.as_ref())))
+            .chain(numbered.map(|n| Column::numbers(&n)));
     let mut branch = Table::new("branch", columns);
     for o in orbits {
-        let mut row: Vec<Entry> = vec![o.parameter.into(), o.period.into(), o.stability().word().into()];
+        let mut row: Vec<Entry> =
+            vec![o.parameter.into(), o.period.into(), o.stability().word().into()];
         row.extend(o.point.iter().map(|x| Entry::Number(*x)));
         row.extend(
-            (0..multipliers).flat_map(|k| o.multipliers.get(k).map_or([f64::NAN; 2], |m| *m).map(Entry::Number)),
+            (0..multipliers).flat_map(|k| {
+                o.multipliers.get(k).map_or([f64::NAN; 2], |m| *m).map(Entry::Number)
+            }),
         );
         branch.push(row);
     }
-    let columns = [Column::words("change"), Column::numbers(parameter), Column::numbers("uncertainty")];
+    let columns =
+        [Column::words("change"), Column::numbers(parameter), Column::numbers("uncertainty")];
     let mut bifurcations = Table::new("bifurcations", columns);
     for b in &found.bifurcations {
         bifurcations.push([b.change.word().into(), b.parameter.into(), b.uncertainty.into()]);

@@ -9,10 +9,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use twofold_hybrid::motion::Record;
 use twofold_hybrid::{Ending as Outcome, follow_watched};
-use twofold_integrate::Watch;
+use twofold_integrate::Monitor;
 
 use super::classification::Classification;
-use super::executor::{Executor, JobWatch, Progress};
+use super::executor::{Executor, JobMonitor, Progress};
 use super::general::GeneralRun;
 use super::question::JobError;
 use super::run::Run;
@@ -240,7 +240,11 @@ impl Scan {
                 .collect(),
             Some(follow) => {
                 let mut up: Vec<u64> = (0..self.cells()).collect();
-                up.sort_by(|a, b| self.sweep.settings(*a)[0].value().total_cmp(&self.sweep.settings(*b)[0].value()));
+                up.sort_by(|a, b| {
+                    self.sweep.settings(*a)[0]
+                        .value()
+                        .total_cmp(&self.sweep.settings(*b)[0].value())
+                });
                 let down: Vec<u64> = up.iter().rev().copied().collect();
                 let along = |rows: &[u64], word: &'static str| {
                     let mut before = None;
@@ -303,7 +307,10 @@ impl Scan {
         let executor = Executor::new(None, asked);
         if self.is_map() {
             let ending = OutcomeQuestion(Classification::of(run)).ending(&executor, asked)?;
-            return Ok(Found { landing: Some(Landing { word: ending.outcome.word, place: ending.place }), ..none });
+            return Ok(Found {
+                landing: Some(Landing { word: ending.outcome.word, place: ending.place }),
+                ..none
+            });
         }
         if let Some((state, _)) = from {
             run.start.clone_from(state);
@@ -347,7 +354,9 @@ impl Scan {
             }
             true
         };
-        let outcome = follow_watched(&run.model, &run.options, &mut observe, &|t| asked.reached(t))?;
+        let outcome = follow_watched(&run.model, &run.options, &mut observe, &|t| {
+            asked.reached(t).is_continue()
+        })?;
         if outcome.ending == Outcome::Interrupted {
             return Err(JobError::Interrupted);
         }
@@ -408,7 +417,8 @@ impl Scan {
             .filter(|(axis, _)| matches!(axis.coordinate, Coordinate::Start(_)))
             .map(|(_, entry)| entry.value());
         let start = self.sweep.run().start();
-        let near = self.alike * places.chain(start.into_iter().chain(given)).fold(0.0_f64, |a, x| a.max(x.abs()));
+        let near = self.alike
+            * places.chain(start.into_iter().chain(given)).fold(0.0_f64, |a, x| a.max(x.abs()));
         let height = self.axes().get(1).map_or(1, Axis::count).max(1) as usize;
         for (row, cell) in cells.iter().enumerate() {
             let at = (row / height, row % height);

@@ -197,7 +197,8 @@ impl Arguments {
         if let Some((along, text)) = along.as_ref().zip(self.along.as_deref())
             && !run.model.definition().parameters().iter().any(|p| p.name == along.parameter)
         {
-            let known: Vec<&str> = run.model.definition().parameters().iter().map(|p| p.name.as_str()).collect();
+            let known: Vec<&str> =
+                run.model.definition().parameters().iter().map(|p| p.name.as_str()).collect();
             let known = if known.is_empty() { "none".into() } else { known.join(", ") };
             return Err(CliError::Usage(format!(
                 "--along \"{text}\": the system has no parameter {}; it has {known}",
@@ -246,7 +247,9 @@ fn of_general(arguments: &Arguments, question: &GeneralOrbit) -> Result<Exit, Cl
     let out = arguments.delivery.out.as_deref();
     let format = ending::format(out, arguments.format, Format::Text)?;
     if let (Format::Csv, None) = (format, &question.along) {
-        return Err(CliError::Usage("--format csv: of one orbit of a general system give text or json".into()));
+        return Err(CliError::Usage(
+            "--format csv: of one orbit of a general system give text or json".into(),
+        ));
     }
     try_delivery(out)?;
     let progress = Progress::with_grace(arguments.delivery.quiet);
@@ -309,7 +312,12 @@ fn of_general(arguments: &Arguments, question: &GeneralOrbit) -> Result<Exit, Cl
 }
 
 /// Delivers an answer; of a branch that somebody stopped, as a part.
-fn finish(answer: &Answer, progress: &Progress, out: Option<&Path>, bytes: &[u8]) -> Result<Exit, CliError> {
+fn finish(
+    answer: &Answer,
+    progress: &Progress,
+    out: Option<&Path>,
+    bytes: &[u8],
+) -> Result<Exit, CliError> {
     if answer.stop == Stop::Interrupted
         && let Some(exit) = progress.asked_to_stop()
     {

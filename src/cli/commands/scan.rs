@@ -137,7 +137,10 @@ impl Arguments {
             Direction::Down => Follow::Down,
             Direction::Both => Follow::Both,
         });
-        let (base, title, small_print, fixed, method) = match general::looked_at(&self.flags, self.period)? {
+        let (base, title, small_print, fixed, method) = match general::looked_at(
+            &self.flags,
+            self.period,
+        )? {
             Some(run) => {
                 let options = &run.options;
                 match options.record {
@@ -155,8 +158,13 @@ impl Arguments {
                     _ => {}
                 }
                 let left = self.flags.section.as_deref().and_then(|text| text.split('=').next());
-                let fixed = run.model.coordinates().iter().position(|n| left.is_some_and(|s| s.trim() == *n));
-                let (title, print) = (run.model.definition().title().to_owned(), vec![general_small_print(&run)]);
+                let fixed = run
+                    .model
+                    .coordinates()
+                    .iter()
+                    .position(|n| left.is_some_and(|s| s.trim() == *n));
+                let (title, print) =
+                    (run.model.definition().title().to_owned(), vec![general_small_print(&run)]);
                 let method = options.method.name();
                 (Base::from(run), title, print, fixed, method)
             }
@@ -166,7 +174,8 @@ impl Arguments {
                     Observation::Section { coordinate, .. } => Some(coordinate),
                     _ => None,
                 };
-                let (title, method) = (spec.system.definition().title().to_owned(), spec.method.name.name());
+                let (title, method) =
+                    (spec.system.definition().title().to_owned(), spec.method.name.name());
                 let print = small_print(&spec);
                 (Base::from(spec), title, print, fixed, method)
             }

@@ -166,7 +166,10 @@ fn sweep(arguments: &Arguments) -> Result<Sweep, CliError> {
             return usage(format!("--shift is {shift}: give a finite number"));
         }
         let first = base.states().first().map_or(String::new(), |s| (*s).to_owned());
-        over.push(Axis { coordinate: Coordinate::Shift(first), values: Values::Multiples { of: shift, count: runs } });
+        over.push(Axis {
+            coordinate: Coordinate::Shift(first),
+            values: Values::Multiples { of: shift, count: runs },
+        });
     }
     if let (Some(_), None) = (arguments.random_seed, arguments.random) {
         return Err(CliError::no_effect(
@@ -174,7 +177,9 @@ fn sweep(arguments: &Arguments) -> Result<Sweep, CliError> {
             "no axis is drawn at random; leave it out, or give --random N",
         ));
     }
-    let random = arguments.random.map(|count| Draws { count, seed: arguments.random_seed.unwrap_or(DRAW_SEED) });
+    let random = arguments
+        .random
+        .map(|count| Draws { count, seed: arguments.random_seed.unwrap_or(DRAW_SEED) });
     Sweep::new(base, over, random).map_err(|e| match e {
         crate::job::sweep::SweepError::Spec(spec) => spec.into(),
         other => CliError::Usage(format!("--over: {other}")),

@@ -24,7 +24,13 @@ impl Follower<'_> {
             None => {
                 let open: Vec<bool> = ends.iter().map(Option::is_none).collect();
                 let whole = [(0.0, 1.0)];
-                self.find_by_values(step, list, &open, if parts.is_empty() { &whole } else { parts }, &mut found);
+                self.find_by_values(
+                    step,
+                    list,
+                    &open,
+                    if parts.is_empty() { &whole } else { parts },
+                    &mut found,
+                );
                 std::mem::swap(last, &mut self.samples[4]);
             }
         }
@@ -38,8 +44,12 @@ impl Follower<'_> {
         list: &[(Sought, f64)],
         found: &mut Vec<(f64, Sought)>,
     ) -> Vec<Option<f64>> {
-        let polynomial = |sought: Sought| self.polynomial_of(step, sought).filter(|b| b.iter().all(|b| b.is_finite()));
-        let Some(all) = list.iter().map(|(sought, _)| polynomial(*sought)).collect::<Option<Vec<_>>>() else {
+        let polynomial = |sought: Sought| {
+            self.polynomial_of(step, sought).filter(|b| b.iter().all(|b| b.is_finite()))
+        };
+        let Some(all) =
+            list.iter().map(|(sought, _)| polynomial(*sought)).collect::<Option<Vec<_>>>()
+        else {
             return vec![None; list.len()];
         };
         let end = |((sought, side), b): (&(Sought, f64), [f64; 5])| {
@@ -72,9 +82,11 @@ impl Follower<'_> {
             // Of the two ends of a whole part one is left.
             let far = matches!(sought, Sought::Guard { guard, .. } if self.equation.guards[*guard].whole && c[0] > 0.5);
             let begins = (self.is_fresh(*sought) && !far).then(|| {
-                let terms = self.place_of(*sought).and_then(|place| terms.get(place)).unwrap_or(&0.0);
+                let terms =
+                    self.place_of(*sought).and_then(|place| terms.get(place)).unwrap_or(&0.0);
                 // What leaves sliding is tangent to the surface.
-                let left = if let Sought::Guard { guard, .. } = sought { self.left[*guard] } else { 0.0 };
+                let left =
+                    if let Sought::Guard { guard, .. } = sought { self.left[*guard] } else { 0.0 };
                 SMALLEST_SLOPE * step.h * terms.max(left)
             });
             found.extend(first_of_series(&c, *side, begins).map(|theta| (theta, *sought)));

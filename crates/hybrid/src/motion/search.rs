@@ -33,17 +33,23 @@ impl Follower<'_> {
             }
             if self.equation.guards[*guard].whole {
                 for (upper, boundary, way) in [(false, side, 1.0), (true, side + 1.0, -1.0)] {
-                    if self.fresh_guard[*guard] || !self.stays_away(step, &ranges, place, boundary, way) {
+                    if self.fresh_guard[*guard]
+                        || !self.stays_away(step, &ranges, place, boundary, way)
+                    {
                         list.push((Sought::Guard { guard: *guard, upper }, 1.0));
                     }
                 }
-            } else if self.fresh_guard[*guard] || !self.stays_away(step, &ranges, place, 0.0, side) {
+            } else if self.fresh_guard[*guard] || !self.stays_away(step, &ranges, place, 0.0, side)
+            {
                 list.push((Sought::Guard { guard: *guard, upper: false }, side));
             }
         }
         for (i, side) in self.watch_side.iter().enumerate() {
             let place = compiled.active.len() + i;
-            if *side != 0.0 && !self.fresh_watch[i] && self.stays_away(step, &ranges, place, 0.0, *side) {
+            if *side != 0.0
+                && !self.fresh_watch[i]
+                && self.stays_away(step, &ranges, place, 0.0, *side)
+            {
                 continue;
             }
             if *side != 0.0 && !self.contacts.iter().any(|c| c.watched == i) {
@@ -79,7 +85,14 @@ impl Follower<'_> {
 
     /// Whether a watched value stays on its side of `boundary` in a step, as can be told without evaluating it at places of the step: a sum of states is a
     /// polynomial along the step's continuous extension, and lies between its Bernstein coefficients; others lie in their ranges.
-    fn stays_away(&self, step: &Step, ranges: &[Vec<Range>; 2], place: usize, boundary: f64, side: f64) -> bool {
+    fn stays_away(
+        &self,
+        step: &Step,
+        ranges: &[Vec<Range>; 2],
+        place: usize,
+        boundary: f64,
+        side: f64,
+    ) -> bool {
         if step.series.is_some() {
             return false;
         }
@@ -245,7 +258,11 @@ impl Follower<'_> {
     /// are too many to be searched.
     pub(super) fn parts(&mut self, step: &Step, list: &[(Sought, f64)]) -> Option<Vec<(f64, f64)>> {
         if step.series.is_none() {
-            return if list.is_empty() { Some(Vec::new()) } else { self.smooth_parts(step, 1, false) };
+            return if list.is_empty() {
+                Some(Vec::new())
+            } else {
+                self.smooth_parts(step, 1, false)
+            };
         }
         if !self.is_followed(step) {
             return None;

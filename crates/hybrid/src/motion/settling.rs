@@ -78,7 +78,8 @@ impl Follower<'_> {
         self.adopt(self.config.clone(), Vec::new());
         self.settle(&at_zero)?;
         let values = self.watched_values();
-        let has_none = |guard: &usize| self.compiled.place(*guard).is_some_and(|place| values[place].is_nan());
+        let has_none =
+            |guard: &usize| self.compiled.place(*guard).is_some_and(|place| values[place].is_nan());
         if self.compiled.deciding.iter().any(has_none) {
             return Err(self.left_domain(self.t, &self.x.clone()));
         }
@@ -147,7 +148,8 @@ impl Follower<'_> {
             return Ok(());
         }
         let values = self.watched_values();
-        let before: Vec<f64> = zero.iter().map(|g| self.compiled.place(*g).map_or(f64::NAN, |p| values[p])).collect();
+        let before: Vec<f64> =
+            zero.iter().map(|g| self.compiled.place(*g).map_or(f64::NAN, |p| values[p])).collect();
         let lows: Vec<f64> = zero.iter().map(|g| self.low(*g)).collect();
         let highs: Vec<f64> = zero.iter().map(|g| self.high(*g)).collect();
         let vertex = |follower: &mut Self, plus: &dyn Fn(usize) -> bool| {
@@ -431,8 +433,10 @@ impl Follower<'_> {
         self.adopt(config, sliding);
         let left = self.leave_by_jump(&zero, &before);
         if !left.is_empty() {
-            let (rest, none) =
-                (zero.into_iter().filter(|g| !left.contains(g)).collect::<Vec<_>>(), vec![false; self.slides.len()]);
+            let (rest, none) = (
+                zero.into_iter().filter(|g| !left.contains(g)).collect::<Vec<_>>(),
+                vec![false; self.slides.len()],
+            );
             self.decide(&rest, &none)?;
             return self.follow_jumps(&rest);
         }
@@ -539,7 +543,8 @@ impl Follower<'_> {
             }
             // By how much the function changes where states change by their sizes.
             let gradient = self.gradient(self.t, place);
-            let reach: f64 = gradient.iter().zip(&self.size).map(|(g, size)| (g * size).abs()).sum();
+            let reach: f64 =
+                gradient.iter().zip(&self.size).map(|(g, size)| (g * size).abs()).sum();
             let small = DRIFT * self.magnitude(&g.expression).max(reach);
             let off = if g.whole { value - value.round() } else { value };
             if (value - before).abs() > small && off.abs() > small {
@@ -601,8 +606,12 @@ impl Follower<'_> {
         let active = self.compiled.active.len();
         for i in 0..self.watch_side.len() {
             let (value, side) = (values[active + i], self.watch_side[i]);
-            let rests = self.contacts.iter().any(|c| c.watched == i) || passed.contains(&i) || side == 0.0;
-            if rests || !(value * side < 0.0) || value.abs() <= 1e-12 * self.magnitude(&self.equation.watched[i]) {
+            let rests =
+                self.contacts.iter().any(|c| c.watched == i) || passed.contains(&i) || side == 0.0;
+            if rests
+                || !(value * side < 0.0)
+                || value.abs() <= 1e-12 * self.magnitude(&self.equation.watched[i])
+            {
                 continue;
             }
             passed.push(i);

@@ -700,7 +700,9 @@ pub fn closed_orbit(
         }
         if off < gap_of(&best) {
             let mut multipliers = eigenvalues(&matrix, n).unwrap_or_default();
-            multipliers.sort_by(|a, b| (b[0] * b[0] + b[1] * b[1]).total_cmp(&(a[0] * a[0] + a[1] * a[1])));
+            multipliers.sort_by(|a, b| {
+                (b[0] * b[0] + b[1] * b[1]).total_cmp(&(a[0] * a[0] + a[1] * a[1]))
+            });
             if let Return::Crossings(_) = after {
                 // The return map has an eigenvalue 0 along the field, which is none of the orbit's.
                 multipliers.pop();
@@ -750,7 +752,12 @@ pub struct Turn {
 ///
 /// # Errors
 /// As [`follow`](super::follow); also if there is no return.
-pub fn once_around(model: &Model, options: &Options, after: &Return, x: &[f64]) -> Result<Turn, HybridError> {
+pub fn once_around(
+    model: &Model,
+    options: &Options,
+    after: &Return,
+    x: &[f64],
+) -> Result<Turn, HybridError> {
     explicit(options)?;
     let (n, mut x) = (x.len(), x.to_vec());
     let Return::Crossings(_) = after else { return turn(model, options, after, &x, true) };
@@ -830,10 +837,13 @@ fn turn(
         let section = follower.equation.watched.len() - 1;
         follower.tangents = Some(Tangents::default());
         // Neighbours come back at other times: what is along the field goes.
-        if let Some(Before { gradient, field, .. }) = follower.before(&[Sought::Watched(section)])? {
+        if let Some(Before { gradient, field, .. }) =
+            follower.before(&[Sought::Watched(section)])?
+        {
             let speed: f64 = gradient.iter().zip(&field).map(|(g, f)| g * f).sum();
             for j in 0..n {
-                let late: f64 = (0..n).map(|i| gradient[i] * matrix[i * n + j]).sum::<f64>() / speed;
+                let late: f64 =
+                    (0..n).map(|i| gradient[i] * matrix[i * n + j]).sum::<f64>() / speed;
                 (0..n).for_each(|i| matrix[i * n + j] -= field[i] * late);
             }
         }

@@ -5,7 +5,7 @@ use serde_json::Value;
 use twofold_analyse::attractor::{self, SectionPoint, Thresholds};
 use twofold_hybrid::motion::{Method, Record, follow_to_rest};
 use twofold_hybrid::{Ending, Options};
-use twofold_integrate::Watch;
+use twofold_integrate::Monitor;
 use twofold_system::Expression;
 
 use super::outcome::place_of;
@@ -65,8 +65,8 @@ impl Question for GeneralOutcome {
         self.0.cost()
     }
 
-    fn compute(&self, _: &Executor<'_>, watch: &dyn Watch) -> Result<Answer, JobError> {
-        Ok(Answer::of_tables(Vec::new()).with_fact("ending", &self.ending(watch)?))
+    fn compute(&self, _: &Executor<'_>, monitor: &dyn Monitor) -> Result<Answer, JobError> {
+        Ok(Answer::of_tables(Vec::new()).with_fact("ending", &self.ending(monitor)?))
     }
 }
 
@@ -75,7 +75,7 @@ impl GeneralOutcome {
     ///
     /// # Errors
     /// Whatever the computation met.
-    pub fn ending(&self, watch: &dyn Watch) -> Result<GeneralEnding, JobError> {
+    pub fn ending(&self, monitor: &dyn Monitor) -> Result<GeneralEnding, JobError> {
         let GeneralRun { model, options } = &self.0;
         let strobed = matches!(options.record, Record::Times { .. });
         let plane = plane(&self.0);
@@ -83,12 +83,23 @@ impl GeneralOutcome {
         let mut observe = |point: &twofold_hybrid::Point<'_>| {
             if point.event.is_none() && (strobed || point.direction.is_some()) {
                 let u = plane.map(|i| i.map_or(0.0, |i| point.x[i]));
-                section.push(SectionPoint { t: point.t, u, upward: strobed || point.direction > Some(0.0) });
+                section.push(SectionPoint {
+                    t: point.t,
+                    u,
+                    upward: strobed || point.direction > Some(0.0),
+                });
             }
             true
         };
         let longer = LONGER * (options.t_end - options.t_start);
-        let (found, rests) = follow_to_rest(model, options, &mut observe, &|t| watch.reached(t), longer, STILL)?;
+        let (found, rests) = follow_to_rest(
+            model,
+            options,
+            &mut observe,
+            &|t| monitor.reached(t).is_continue(),
+            longer,
+            STILL,
+        )?;
         let looks = is_looked_at(options);
         let crossings = if looks { section.len() as u64 } else { 0 };
         let bare = |word: &str| Outcome::bare(word, crossings, found.t, found.steps);
@@ -143,16 +154,26 @@ impl GeneralEnding {
 
 /// Empty columns of what a row says beside the outcome.
 pub(super) fn columns(run: &GeneralRun) -> Vec<Column> {
-    let states = run.model.coordinates().into_iter().map(|name| Column::numbers(&format!("end.{name}")));
-    let more =
-        [Column::words("mode"), Column::words("event"), Column::integers("events"), Column::integers("switches")];
+    let states =
+        run.model.coordinates().into_iter().map(|name| Column::numbers(&format!("end.{name}")));
+    let more = [
+        Column::words("mode"),
+        Column::words("event"),
+        Column::integers("events"),
+        Column::integers("switches"),
+    ];
     states.chain(more).collect()
 }
 
 /// The cells of a row without an ending.
 pub(super) fn blank(run: &GeneralRun) -> Vec<Entry> {
     let number = Entry::Number(f64::NAN);
-    let words = [Entry::Word(String::new()), Entry::Word(String::new()), Entry::Integer(0), Entry::Integer(0)];
+    let words = [
+        Entry::Word(String::new()),
+        Entry::Word(String::new()),
+        Entry::Integer(0),
+        Entry::Integer(0),
+    ];
     std::iter::repeat_n(number, run.model.coordinates().len()).chain(words).collect()
 }
 
@@ -167,13 +188,20 @@ fn is_looked_at(options: &Options) -> bool {
 
 /// Where a run begins.
 pub(crate) fn start_of(run: &GeneralRun) -> Result<Vec<f64>, String> {
-    let given = run.options.start.clone().map_or_else(|| run.model.start(), |start| Ok(Some(start)));
-    given.map_err(|e| e.to_string())?.ok_or_else(|| "the file has no start; give --start".to_owned())
+    let given =
+        run.options.start.clone().map_or_else(|| run.model.start(), |start| Ok(Some(start)));
+    given
+        .map_err(|e| e.to_string())?
+        .ok_or_else(|| "the file has no start; give --start".to_owned())
 }
 
 impl Coordinate {
     /// Gives a run of a general system this value; an error says why it would have no effect.
-    pub(super) fn apply_to_general(&self, run: &mut GeneralRun, value: &Entry) -> Result<(), String> {
+    pub(super) fn apply_to_general(
+        &self,
+        run: &mut GeneralRun,
+        value: &Entry,
+    ) -> Result<(), String> {
         let number = value.value();
         match self {
             Coordinate::Parameter(name) => {
@@ -181,10 +209,9 @@ impl Coordinate {
             }
             Coordinate::Start(name) | Coordinate::Shift(name) => {
                 let states = run.model.coordinates();
-                let i = states
-                    .iter()
-                    .position(|s| s == name)
-                    .ok_or_else(|| format!("the system has no state {name}; it has {}", states.join(", ")))?;
+                let i = states.iter().position(|s| s == name).ok_or_else(|| {
+                    format!("the system has no state {name}; it has {}", states.join(", "))
+                })?;
                 let mut x = start_of(run)?;
                 x[i] = if matches!(self, Coordinate::Start(_)) { number } else { x[i] + number };
                 run.options.start = Some(x);
@@ -196,7 +223,10 @@ impl Coordinate {
             Coordinate::TEnd => run.options.t_end = number,
             Coordinate::Method => {
                 run.options.method = Method::named(value.word()).ok_or_else(|| {
-                    format!("general systems are followed by dopri5, radau5 or taylor, not {}", value.word())
+                    format!(
+                        "general systems are followed by dopri5, radau5 or taylor, not {}",
+                        value.word()
+                    )
                 })?;
             }
             other => {
@@ -214,9 +244,9 @@ fn plane(run: &GeneralRun) -> [Option<usize>; 2] {
     let names = run.model.coordinates();
     let fixed = match &run.options.record {
         Record::Section(Expression::Sub(a, b)) => names.iter().position(|n| {
-            [(a, b), (b, a)]
-                .iter()
-                .any(|(one, other)| one.to_string() == *n && matches!(***other, Expression::Number(_)))
+            [(a, b), (b, a)].iter().any(|(one, other)| {
+                one.to_string() == *n && matches!(***other, Expression::Number(_))
+            })
         }),
         _ => None,
     };

@@ -113,7 +113,9 @@ impl TryFrom<Value> for Base {
         // Only general systems see the time.
         match json.get("t_start") {
             Some(_) => GeneralRun::from_json(json).map(Base::from),
-            None => serde_json::from_value::<RunSpec>(json).map(Base::from).map_err(|e| e.to_string()),
+            None => {
+                serde_json::from_value::<RunSpec>(json).map(Base::from).map_err(|e| e.to_string())
+            }
         }
     }
 }
@@ -260,7 +262,11 @@ impl Sweep {
     ///
     /// If an axis would have no effect or gives what another gives, if random axes and draws do not come together, or there are too many
     /// rows. A cell whose numbers are wrong is no error here but a row.
-    pub fn new(run: impl Into<Base>, over: Vec<Axis>, random: Option<Draws>) -> Result<Self, SweepError> {
+    pub fn new(
+        run: impl Into<Base>,
+        over: Vec<Axis>,
+        random: Option<Draws>,
+    ) -> Result<Self, SweepError> {
         let run = run.into();
         if let Base::Surfaces(run) = &run {
             run.validate()?;
@@ -389,7 +395,9 @@ impl Sweep {
         // A shift is added to a start, so it comes after it.
         let is_shift = |axis: &&(&Axis, Entry)| matches!(axis.0.coordinate, Coordinate::Shift(_));
         let pairs: Vec<(&Axis, Entry)> = self.over.iter().zip(settings).collect();
-        for (axis, value) in pairs.iter().filter(|p| !is_shift(p)).chain(pairs.iter().filter(is_shift)) {
+        for (axis, value) in
+            pairs.iter().filter(|p| !is_shift(p)).chain(pairs.iter().filter(is_shift))
+        {
             base.apply(&axis.coordinate, value)?;
         }
         Ok(base)
@@ -402,7 +410,9 @@ impl Sweep {
     /// Why its settings make none.
     pub fn question(&self, row: u64) -> Result<OutcomeQuestion, String> {
         match self.run_of(row)? {
-            Base::Surfaces(run) => Ok(OutcomeQuestion(Classification { run: *run, thresholds: self.thresholds })),
+            Base::Surfaces(run) => {
+                Ok(OutcomeQuestion(Classification { run: *run, thresholds: self.thresholds }))
+            }
             Base::General(_) => Err("the sweep is of a general system".into()),
         }
     }

@@ -68,7 +68,10 @@ pub struct Ending {
 
 impl Ending {
     fn of(evidence: &Evidence, answer: &Answer) -> Result<Self, JobError> {
-        Ok(Self { outcome: Outcome::judged(evidence, answer.fact("t")?, steps(answer)), place: place_of(evidence) })
+        Ok(Self {
+            outcome: Outcome::judged(evidence, answer.fact("t")?, steps(answer)),
+            place: place_of(evidence),
+        })
     }
 }
 
@@ -120,7 +123,10 @@ impl Outcome {
 
     fn far(answer: &Answer) -> Result<Self, JobError> {
         let end: f64 = answer.fact("t")?;
-        Ok(Self { captured_at: Some(end), ..Self::bare("far", answer.rows() as u64, end, steps(answer)) })
+        Ok(Self {
+            captured_at: Some(end),
+            ..Self::bare("far", answer.rows() as u64, end, steps(answer))
+        })
     }
 
     /// A word, and nothing of an orbit.
@@ -320,8 +326,12 @@ mod tests {
             let cycle = verdict.cycle().cloned();
             let evidence = Evidence { verdict, lyapunov, crossings: 6, ..evidence.clone() };
             let found = Outcome::judged(&evidence, 20.0, 77);
-            assert_eq!((found.word.as_str(), found.crossings, found.end, found.steps), (word, 6, 20.0, 77));
-            let (captured, settled) = (cycle.as_ref().map(|_| 100.0), cycle.as_ref().map(|_| 200.0));
+            assert_eq!(
+                (found.word.as_str(), found.crossings, found.end, found.steps),
+                (word, 6, 20.0, 77)
+            );
+            let (captured, settled) =
+                (cycle.as_ref().map(|_| 100.0), cycle.as_ref().map(|_| 200.0));
             assert_eq!((found.captured_at, found.settled_at), (captured, settled));
             assert_eq!(
                 (found.radius, found.turn),
