@@ -54,7 +54,8 @@ fn about_check(kind: &str) -> String {
     let variant = format!("{}{}", kind[..1].to_uppercase(), &kind[1..]);
     let lines: Vec<&str> = body.lines().collect();
     let at = lines.iter().position(|l| l.trim().starts_with(&variant)).unwrap();
-    lines[at - 1].trim().trim_start_matches("/// ").to_owned()
+    let docs = lines[..at].iter().rev().map_while(|line| line.trim().strip_prefix("/// "));
+    docs.collect::<Vec<&str>>().into_iter().rev().collect::<Vec<_>>().join(" ")
 }
 
 #[test]

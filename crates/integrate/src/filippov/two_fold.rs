@@ -298,8 +298,8 @@ impl<const N: usize> FusedFolds<N> {
     }
 }
 
-/// The series of the invariant curve along `direction`, order by order: (DF - k mu) W_k = -[F(W_0 +
-/// ... + W_(k-1))]_k.
+/// The series of the invariant curve along `direction`, order by order:
+/// (DF - k mu) W_k = -[F(W_0 + ... + W_(k-1))]_k.
 fn invariant_curve<P: PiecewiseSmooth<N>, const N: usize>(
     system: &P,
     point: &SVector<f64, N>,
