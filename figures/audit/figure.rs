@@ -45,7 +45,8 @@ const OTHERS: [(&str, &[u8]); 4] = [
 
 /// The committed content of a file.
 fn committed(name: &str) -> Result<Vec<u8>, JobError> {
-    let found = DATA.iter().chain(&OTHERS).find(|(n, _)| *n == name).map(|(_, bytes)| bytes.to_vec());
+    let found =
+        DATA.iter().chain(&OTHERS).find(|(n, _)| *n == name).map(|(_, bytes)| bytes.to_vec());
     found.ok_or_else(|| JobError::Other(format!("the audit has no {name}")))
 }
 
@@ -121,7 +122,8 @@ pub fn support(panel: &str, reading: Reading) -> Result<Support, JobError> {
 const READINGS: [[f64; 2]; 2] = [[1e-3, 1e-5], [1e-1, 1e-5]];
 
 fn tables() -> Result<Vec<Table>, JobError> {
-    let [fig7, fig8] = ["../capture/map7.csv", "../capture/map8.csv"].map(|name| table_of(&committed(name)?));
+    let [fig7, fig8] =
+        ["../capture/map7.csv", "../capture/map8.csv"].map(|name| table_of(&committed(name)?));
     let map = capture::map_table([&fig7?, &fig8?], &claims().rules);
     Ok(vec![map, audit::candidate_table(&candidates()?[0])])
 }
@@ -258,7 +260,8 @@ fn draw(tables: &[Table]) -> Sheet {
             ),
         ))
         .footer(format!(
-            "(a) Probability that one new run of each panel of figs 7 and 8 comes out as the paper says, from {runs} runs in each cell \
+            "(a) Probability that one new run of each panel of figs 7 and 8 comes out as the paper \
+                says, from {runs} runs in each cell \
              (LSODA at NDSolve's tolerance, *t* = 200000). Most likely: *α* = {}, *β* = {}.",
             number(alpha[best]),
             number(beta[best])
@@ -280,8 +283,10 @@ pub fn figure() -> Figure {
             name: "audit".into(),
             reading: None,
             title: "At which parameters the paper's outcomes are likely".into(),
-            caption: "(a) How likely the six outcomes that the paper reports in figs 7 and 8 are at each α and β, by LSODA, with the printed, the reconstructed and \
-                      the most likely pair. (b) How probable it is that one digit of an exponent was misprinted, under two priors: from these and 9(i)."
+            caption: "(a) How likely the six outcomes that the paper reports in figs 7 and 8 are \
+                at each α and β, by LSODA, with the printed, the reconstructed and \
+                      the most likely pair. (b) How probable it is that one digit of an exponent \
+                      was misprinted, under two priors: from these and 9(i)."
                 .into(),
             view: View::Study(Study { questions, draw: |answers| draw(&Study::tables(answers)) }),
             panels: Vec::new(),

@@ -6,7 +6,8 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Every crate below the command, with the crates that it may be built on and the libraries that only it may name.
+/// Every crate below the command, with the crates that it may be built on and the libraries that
+/// only it may name.
 const CRATES: [(&str, &[&str], &[&str]); 14] = [
     ("digest", &[], &["proc-macro2"]),
     // The only crate that names a math library or a random generator.
