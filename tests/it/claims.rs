@@ -87,7 +87,9 @@ fn every_quantity_is_read_by_the_test_that_claims_toml_names() {
         let attributes = before.rsplit_once("\n\n").map_or(before, |(_, a)| a);
         assert!(attributes.contains("#[test]"), "{test} is no test");
         assert!(!attributes.contains("#[ignore"), "{test} is not run");
-        let first = body.lines().next().unwrap().trim();
+        // One statement, which may be wrapped.
+        let first = body.split_inclusive(';').next().unwrap();
+        let first = first.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(
             first == format!("let mut reads = Reads::by(\"{test}\");"),
             "{test} begins with `{first}`: it must begin with the quantities that it reads"
