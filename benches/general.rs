@@ -80,7 +80,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     )?;
     let each = |work: &Work| 1e9 * work.seconds / work.steps as f64;
     println!(
-        "oscillator: {:.0} ns a step; with the event x = 3 {:+.0} %; with the event x^2 + x v = 25 {:+.0} %; sin(x) + v = 25 {:+.0} %",
+        "oscillator: {:.0} ns a step; with the event x = 3 {:+.0} %; with the event x^2 + x v = 25 \
+            {:+.0} %; sin(x) + v = 25 {:+.0} %",
         each(&plain),
         100.0 * (each(&event) / each(&plain) - 1.0),
         100.0 * (each(&curved) / each(&plain) - 1.0),

@@ -33,7 +33,8 @@ fn data(reading: Reading) -> &'static [u8] {
 }
 
 fn tables(reading: Reading) -> Result<Vec<Table>, JobError> {
-    let rows = Rows::from_csv(data(reading)).map_err(|e| JobError::Other(format!("the basin's data: {e}")))?;
+    let rows = Rows::from_csv(data(reading))
+        .map_err(|e| JobError::Other(format!("the basin's data: {e}")))?;
     let end = rows.sweep().t_end();
     let table = rows.table();
     let mut found = Table::new(

@@ -566,7 +566,9 @@ enum Misuse {
     )]
     Mode,
     #[error(
-        "--system {system}: a general system (f, events, modes or tables) is taken by `twofold run`, `plot`, `orbit`, `lyapunov`, `rests`, `scan`, `sweep` and `sensitivities`; this command needs one with h, plus and minus"
+        "--system {system}: a general system (f, events, modes or tables) is taken by `twofold \
+            run`, `plot`, `orbit`, `lyapunov`, `rests`, `scan`, `sweep` and `sensitivities`; this \
+            command needs one with h, plus and minus"
     )]
     General { system: String },
     #[error(

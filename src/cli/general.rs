@@ -224,14 +224,16 @@ pub fn run_of(flags: &RunFlags) -> Result<Option<GeneralRun>, CliError> {
     Ok(Some(GeneralRun { model, options }))
 }
 
-/// The same for runs of which the ends are compared: --section or `period` says where they are looked at.
+/// The same for runs of which the ends are compared: --section or `period` says where they are
+/// looked at.
 ///
 /// # Errors
 /// If a flag has no effect on it, or a value is wrong.
 pub fn looked_at(flags: &RunFlags, period: Option<f64>) -> Result<Option<GeneralRun>, CliError> {
     let Some(mut run) = run_of(flags)? else {
         if period.is_some() {
-            let why = "equations with h, plus and minus do not see the time; leave it out, and give --section";
+            let why = "equations with h, plus and minus do not see the time; leave it out, and \
+                give --section";
             return Err(CliError::no_effect("--period", why));
         }
         return Ok(None);

@@ -431,7 +431,8 @@ fn the_gallery_is_whole() {
 fn scans_show_what_changes_and_where_starts_end() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    // One passage a period at 20 V, two different ones at 28 V, after the doubling at 24.5 V. The way there is chaotic for some 170 periods.
+    // One passage a period at 20 V, two different ones at 28 V, after the doubling at 24.5 V. The
+    // way there is chaotic for some 170 periods.
     let scan = ["scan", "--quiet", "--system", "buck", "--period", "4e-4", "--t-end", "0.24"];
     let out = good(at, &[&scan[..], &["--over", "params.input=20,28", "--plot", "d.svg"]].concat());
     let (_, table) = twofold::job::encode::from_csv(&out).unwrap();

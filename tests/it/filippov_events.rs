@@ -318,7 +318,8 @@ fn file_in_units(name: &str, unit: f64, factor: f64) -> String {
     serde_json::to_string(&file).unwrap()
 }
 
-/// The systems with two surfaces, and a buck converter whose clock, two of its states, restarts, with a smoothed switch.
+/// The systems with two surfaces, and a buck converter whose clock, two of its states, restarts,
+/// with a smoothed switch.
 #[test]
 fn units_change_nothing_of_two_surfaces_and_of_a_clock() {
     let folder = tempfile::tempdir().unwrap();

@@ -484,12 +484,14 @@ fn wrong_files_and_flags_are_refused() {
     );
 }
 
-/// Falls from heights that parameters give, to the ground at 0: sqrt(2 h/g) each, however the rows are computed.
+/// Falls from heights that parameters give, to the ground at 0: sqrt(2 h/g) each, however the rows
+/// are computed.
 #[test]
 fn a_sweep_has_a_row_a_run() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let drop = "name = 'drop'\nstates = ['x', 'v']\nstart = ['2*half', 0]\n[parameters]\nhalf = 1\ng = { value = 10, above = 0 }\n\
+    let drop = "name = 'drop'\nstates = ['x', 'v']\nstart = ['2*half', 0]\n[parameters]\nhalf = \
+        1\ng = { value = 10, above = 0 }\n\
         [modes.up]\nf = ['v', '-g']\n[modes.down]\nf = ['v', '-g']\n\
         [[event]]\nname = 'sinks'\nfrom = 'up'\nwhen = 'v + 1'\ndirection = 'down'\nmode = 'down'\n\
         [[event]]\nname = 'lands'\nwhen = 'x'\ndirection = 'down'\nstop = true";
@@ -546,7 +548,8 @@ fn a_sweep_has_a_row_a_run() {
 fn a_sweep_says_what_runs_settle_on() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let text = "states = ['x']\nstart = [0.3]\nf = ['1']\n[parameters]\ntop = 1\n[[event]]\nwhen = 'x - top'\nset = { x = 0 }";
+    let text = "states = ['x']\nstart = [0.3]\nf = ['1']\n[parameters]\ntop = 1\n[[event]]\nwhen = \
+        'x - top'\nset = { x = 0 }";
     fs::write(at.join("saw.toml"), text).unwrap();
     fs::write(
         at.join("well.toml"),

@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::definition::{Interpolation, TableEntry};
 
-/// A table's values between its rows: on each piece a cubic in the time since the piece's beginning.
+/// A table's values between its rows: on each piece a cubic in the time since the piece's
+/// beginning.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Table {
     /// The times of the rows, increasing.

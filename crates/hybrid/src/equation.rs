@@ -50,7 +50,8 @@ pub struct Compiled {
     pub watched: Program,
     /// The guards that the equations ask in this structure.
     pub active: Vec<usize>,
-    /// Those among them that the field asks, by itself or through others; the rest are asked by events alone.
+    /// Those among them that the field asks, by itself or through others; the rest are asked by
+    /// events alone.
     pub deciding: Vec<usize>,
     /// Number of values of `watched`.
     pub outputs: usize,

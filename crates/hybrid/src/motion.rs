@@ -476,8 +476,9 @@ pub fn follow_watched(
     follower.run_whole(observe).map(|(outcome, _)| outcome)
 }
 
-/// [`follow_watched`], and whether the motion at a finished run's end rests: whether it goes on for a time `longer` than that without moving by more than
-/// `within` of the largest size of a state. Equations that see the time do not rest.
+/// [`follow_watched`], and whether the motion at a finished run's end rests: whether it goes on for
+/// a time `longer` than that without moving by more than `within` of the largest size of a state.
+/// Equations that see the time do not rest.
 ///
 /// # Errors
 /// As [`follow`].
@@ -841,10 +842,12 @@ impl<'a> Follower<'a> {
             };
             let found = self.find(&step, &list, &parts, &mut last_values);
             let earliest = found.iter().map(|(theta, _)| *theta).fold(f64::INFINITY, f64::min);
-            // The domain of what decides the field ends before anything is met: shorter steps come nearer to its end.
+            // The domain of what decides the field ends before anything is met: shorter steps come
+            // nearer to its end.
             let ends = |((sought, _), value): (&(Sought, f64), &f64)| {
                 value.is_nan()
-                    && matches!(sought, Sought::Guard { guard, .. } if self.compiled.deciding.contains(guard))
+                    && matches!(sought, Sought::Guard { guard,
+                        .. } if self.compiled.deciding.contains(guard))
             };
             if !earliest.is_finite() && list.iter().zip(&last_values).any(ends) {
                 h = search::SHORTER * wanted;
@@ -933,8 +936,8 @@ impl<'a> Follower<'a> {
         }
     }
 
-    /// Makes a step of at most this length that the tolerance allows and that has seen what there is, with the list of what is [sought](Self::sought) in
-    /// it; none if none is short enough.
+    /// Makes a step of at most this length that the tolerance allows and that has seen what there
+    /// is, with the list of what is [sought](Self::sought) in it; none if none is short enough.
     fn step_within(
         &mut self,
         step: &mut Step,

@@ -1,11 +1,12 @@
-//! Numbers with a bound on how far they may be from a middle: what an expression can be along a step, by one evaluation.
+//! Numbers with a bound on how far they may be from a middle: what an expression can be along a
+//! step, by one evaluation.
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 use twofold_num::{Arithmetic, Elementary};
 
-/// All numbers within `radius` of `middle`; rounding is in the radius, so that a value computed in `f64` is one of them, too. Where nothing is known the
-/// radius is infinite or not-a-number.
+/// All numbers within `radius` of `middle`; rounding is in the radius, so that a value computed in
+/// `f64` is one of them, too. Where nothing is known the radius is infinite or not-a-number.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Range {
     middle: f64,
@@ -37,7 +38,8 @@ impl Range {
         (self.middle - boundary) * side > self.radius + ROUNDING * boundary.abs()
     }
 
-    /// A function of this value in the middle, which is nowhere steeper than `slope`, and whose values lie within `most` of zero.
+    /// A function of this value in the middle, which is nowhere steeper than `slope`, and whose
+    /// values lie within `most` of zero.
     fn within(self, middle: f64, slope: f64, most: f64) -> Self {
         let radius = slope * self.radius;
         // Not-a-number stays.

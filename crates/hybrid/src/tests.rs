@@ -1697,7 +1697,8 @@ fn a_flat_zero_is_met_once() {
     near(last("states = ['x', 'y']\nstart = [-1, 0]\nf = ['1', 'sign(3*x^2)']", 2.0), 2.0, 1e-12);
 }
 
-/// What the motion slides on may jump away, by another switch or by a table: the state stays where it is, and moves on from there.
+/// What the motion slides on may jump away, by another switch or by a table: the state stays where
+/// it is, and moves on from there.
 #[test]
 fn what_is_slid_upon_may_jump_away() {
     let from = |f: &str| format!("states = ['x', 'y']\nstart = [0.3, 0]\nf = ['{f}', '1']");
@@ -1714,7 +1715,8 @@ fn what_is_slid_upon_may_jump_away() {
         near(end(&from(f), t_end)[0], want, 1e-9);
     }
     // Two surfaces, of which one jumps.
-    let two = "states = ['x', 'y', 'z']\nstart = [0.3, 0.2, 0]\nf = ['-sign(x - floor(z))', '-sign(y) + 0.5*sin(t)', '1']";
+    let two = "states = ['x', 'y', 'z']\nstart = [0.3, 0.2, 0]\nf = ['-sign(x - floor(z))', \
+        '-sign(y) + 0.5*sin(t)', '1']";
     let found = end(two, 1.5);
     near(found[0], 0.5, 1e-9);
     near(found[1], 0.0, 1e-9);
@@ -1731,8 +1733,8 @@ fn what_is_slid_upon_may_jump_away() {
     near(follows("-sign(x - u - 0.1*sin(t))"), -0.25 + 0.1 * 3.5_f64.sin() + 1.5 - 1.0, 1e-9);
 }
 
-/// The domain of what decides the field may end, though the field itself goes on: the run ends with the expression. What only events ask, and branches that
-/// are not taken, have none.
+/// The domain of what decides the field may end, though the field itself goes on: the run ends with
+/// the expression. What only events ask, and branches that are not taken, have none.
 #[test]
 fn the_domain_of_a_switching_function_ends() {
     let ends = |f: &str, start: f64| {
@@ -1767,7 +1769,8 @@ fn the_domain_of_a_switching_function_ends() {
         ("if(x > 0 and log(x) > -1, -1, -2)", 1.0, -4.0 - (-1.0_f64).exp()),
     ] {
         let text = format!(
-            "states = ['x']\nstart = [{start}]\nf = ['{f}']\n[[event]]\nwhen = 'sqrt(x) - 9'\nset = {{ x = 5 }}\n[[event]]\nwhen = 'log(x) > 4'\nset = {{ x = 5 }}"
+            "states = ['x']\nstart = [{start}]\nf = ['{f}']\n[[event]]\nwhen = 'sqrt(x) - 9'\nset \
+                = {{ x = 5 }}\n[[event]]\nwhen = 'log(x) > 4'\nset = {{ x = 5 }}"
         );
         near(end(&text, 3.0)[0], want, 1e-9);
     }

@@ -555,11 +555,14 @@ mod tests {
 
     const DRIVEN: &str = "states = ['x']\nstart = [0]\nf = ['-x + 4*if(mod(t, 1) < 0.5, 1, 0)']";
 
-    /// Names in no order of the alphabet, a table, expressions among the numbers: the run that is read is the one that was written.
+    /// Names in no order of the alphabet, a table, expressions among the numbers: the run that is
+    /// read is the one that was written.
     #[test]
     fn a_run_is_read_as_it_was_written() {
-        let text = "states = ['x', 'v']\nstart = ['2*b', 0]\n[parameters]\nb = 0.1\na = '3*b'\n[let]\ns = 'x - a'\nc = 's^2'\n\
-            [tables.w]\nfile = 'w.csv'\ntime = 't'\ncolumn = 'w'\n[modes.z]\nf = ['v', '-sign(s) + w']\n[modes.m]\nf = ['v', 'c']\n\
+        let text = "states = ['x', 'v']\nstart = ['2*b', 0]\n[parameters]\nb = 0.1\na = \
+            '3*b'\n[let]\ns = 'x - a'\nc = 's^2'\n\
+            [tables.w]\nfile = 'w.csv'\ntime = 't'\ncolumn = 'w'\n[modes.z]\nf = ['v', '-sign(s) + \
+            w']\n[modes.m]\nf = ['v', 'c']\n\
             [[event]]\nwhen = 'x + 1'\nmode = 'm'";
         let model = Model::new(Definition::from_toml(text, "f").unwrap())
             .with_table("w", "t,w\n0,0.1\n3,0.7\n20,0\n")
@@ -595,7 +598,8 @@ mod tests {
         let of = |first: &str, second: &str| {
             run(
                 &format!(
-                    "states = ['x']\nstart = [0]\n[modes.{first}]\nf = ['1']\n[modes.{second}]\nf = ['1']"
+                    "states = ['x']\nstart = [0]\n[modes.{first}]\nf = ['1']\n[modes.{second}]\nf \
+                        = ['1']"
                 ),
                 1.0,
             )

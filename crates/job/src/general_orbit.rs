@@ -15,7 +15,8 @@ use super::general::GeneralRun;
 use super::orbit::{Along, CLOSED, ITERATIONS, LEAST_CLOSED, ROUGHLY, branch_tables};
 use super::question::{JobError, Question};
 
-/// A closed orbit of a general system, by Newton's method once the motion has settled, and its branch along a parameter if one is named.
+/// A closed orbit of a general system, by Newton's method once the motion has settled, and its
+/// branch along a parameter if one is named.
 #[derive(Clone, Debug)]
 pub struct GeneralOrbit {
     /// System, start and method; `options.t_end` is the longest time of a return.
@@ -54,8 +55,10 @@ impl Question for GeneralOrbit {
         self.settle
     }
 
-    /// Facts: `states` (their names), `point`, `period`, `multipliers` (real and imaginary parts, the largest first) and `gap` (how far the orbit is from closed,
-    /// relative to its largest state). Of a branch also the tables `branch` and `bifurcations` and the fact `end`, as of [`ClosedOrbit`](super::ClosedOrbit).
+    /// Facts: `states` (their names), `point`, `period`, `multipliers` (real and imaginary parts,
+    /// the largest first) and `gap` (how far the orbit is from closed, relative to its largest
+    /// state). Of a branch also the tables `branch` and `bifurcations` and the fact `end`, as of
+    /// [`ClosedOrbit`](super::ClosedOrbit).
     fn compute(&self, _: &Executor<'_>, monitor: &dyn Monitor) -> Result<Answer, JobError> {
         let model = match &self.along {
             Some(along) => at(&self.run.model, along, along.from)?,
@@ -136,8 +139,8 @@ fn at(model: &Model, along: &Along, value: f64) -> Result<Model, HybridError> {
     model.map_err(|error| HybridError::Bad(format!("--along {}: {error}", along.parameter)))
 }
 
-/// The return map. A section need be no plane of one state, and the period of a drive has none: the plane that the search keeps to is that of one more state,
-/// which is zero.
+/// The return map. A section need be no plane of one state, and the period of a drive has none: the
+/// plane that the search keeps to is that of one more state, which is zero.
 struct Map<'a> {
     model: &'a Model,
     options: Options,
@@ -225,8 +228,8 @@ mod tests {
 
     const DRIVEN: &str = "states = ['x']\nstart = [0]\nf = ['-x + 4*if(mod(t, 1) < 0.5, 1, 0)']";
 
-    /// x' = -x + 4 in the first half of each period of 1, -x in the other: the multiplier is 1/e, and from x at the period's start it is
-    /// x/e + 4 (1 - e^(-1/2)) e^(-1/2) at its end.
+    /// x' = -x + 4 in the first half of each period of 1, -x in the other: the multiplier is 1/e,
+    /// and from x at the period's start it is x/e + 4 (1 - e^(-1/2)) e^(-1/2) at its end.
     #[test]
     fn a_driven_orbit_closes_as_its_formula_says() {
         let question = GeneralOrbit {
@@ -261,10 +264,12 @@ mod tests {
         Some(Along { parameter: parameter.into(), from, to, steps: 10, most: 200 })
     }
 
-    /// x halves in each period, then a kick makes of x/2 c x - x^3: of this map the fixed point sqrt(c - 1) has the multiplier 3 - 2 c, which is -1 at c = 2.
+    /// x halves in each period, then a kick makes of x/2 c x - x^3: of this map the fixed point
+    /// sqrt(c - 1) has the multiplier 3 - 2 c, which is -1 at c = 2.
     #[test]
     fn a_kicked_orbit_doubles_its_period_where_its_map_does() {
-        let text = "states = ['x']\nstart = [0.7]\nf = ['-0.6931471805599453*x']\n[parameters]\nc = 1.5\n\
+        let text = "states = ['x']\nstart = [0.7]\nf = ['-0.6931471805599453*x']\n[parameters]\nc \
+            = 1.5\n\
             [[event]]\nevery = 1\nset = { x = '2*c*x - 8*x^3' }";
         let question = GeneralOrbit {
             run: run(text, 10.0),
@@ -290,10 +295,12 @@ mod tests {
         assert!((changes.numbers("c")[0] - 2.0).abs() < 1e-6, "{:?}", changes.numbers("c"));
     }
 
-    /// Hopf's normal form with amplitude r^2 (b - r^2) + mu = 0 has a fold of cycles at mu = -b^2/4, passed on a section that is no plane.
+    /// Hopf's normal form with amplitude r^2 (b - r^2) + mu = 0 has a fold of cycles at mu =
+    /// -b^2/4, passed on a section that is no plane.
     #[test]
     fn a_branch_goes_through_a_fold() {
-        let text = "states = ['x', 'y']\nstart = [0, 1]\nf = ['x*g - y', 'y*g + x']\n[parameters]\nmu = 0.3\n\
+        let text = "states = ['x', 'y']\nstart = [0, 1]\nf = ['x*g - y', 'y*g + \
+            x']\n[parameters]\nmu = 0.3\n\
             [let]\nq = 'x^2 + y^2'\ng = 'mu + q - q^2'";
         let mut run = run(text, 100.0);
         run.options.record = Record::Section(expression("sinh(x) + x^3", &run.model).unwrap());

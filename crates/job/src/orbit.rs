@@ -112,10 +112,12 @@ pub struct Along {
     pub most: usize,
 }
 
-/// Largest |P(u) - u| that counts as closed, in relative tolerances of the orbit's extent; and never less than [`LEAST_CLOSED`].
+/// Largest |P(u) - u| that counts as closed, in relative tolerances of the orbit's extent; and
+/// never less than [`LEAST_CLOSED`].
 pub(super) const CLOSED: f64 = 100.0;
 pub(super) const LEAST_CLOSED: f64 = 1e-10;
-/// Returns from which the loop's size is taken: the first may have been computed with too large an error.
+/// Returns from which the loop's size is taken: the first may have been computed with too large an
+/// error.
 const SIZINGS: usize = 2;
 /// A search that has come to a rest to this share of its way has found the rest.
 const AT_REST: f64 = 1e-3;

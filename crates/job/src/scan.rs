@@ -21,7 +21,8 @@ use super::sweep::{Axis, Base, Coordinate, GeneralEnding, GeneralOutcome, Outcom
 use super::table::{Column, Entry, Table};
 use super::{Answer, Stop};
 
-/// Each run begins where that of the neighbouring value ended, so that an attractor is followed for as long as it attracts.
+/// Each run begins where that of the neighbouring value ended, so that an attractor is followed for
+/// as long as it attracts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Follow {
@@ -130,7 +131,8 @@ impl Landing {
 }
 
 impl Scan {
-    /// A scan of `sweep`; `alike`: attractors this near, as a share of the largest number in any start or attractor, are one.
+    /// A scan of `sweep`; `alike`: attractors this near, as a share of the largest number in any
+    /// start or attractor, are one.
     ///
     /// # Errors
     /// What does not go together, in words.

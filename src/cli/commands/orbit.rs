@@ -35,8 +35,10 @@ use crate::job::{Answer, AnyQuestion, ClosedOrbit, Executor, JobError, Question,
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     twofold orbit --system relay-third-order --switch filippov --section q=0\n  \
-    twofold orbit --system buck --period 4e-4 --settle 0.05 --along input=20..26 --format csv --out branch.csv\n  \
-    twofold orbit --reading reconstructed --section y=0 --start 0.8063,0,-0.0002 --settle 0 --format json")]
+    twofold orbit --system buck --period 4e-4 --settle 0.05 --along input=20..26 --format csv \
+    --out branch.csv\n  \
+    twofold orbit --reading reconstructed --section y=0 --start 0.8063,0,-0.0002 --settle 0 \
+    --format json")]
 pub struct Arguments {
     #[command(flatten)]
     flags: RunFlags,
@@ -274,7 +276,8 @@ fn of_general(arguments: &Arguments, question: &GeneralOrbit) -> Result<Exit, Cl
     let bytes = match (format, answer.table("branch")) {
         (Format::Json, _) => encode::json(&answer, &about),
         (Format::Csv, Some(branch)) => {
-            let about = json!({ "kind": question.kind(), "question": question.json(), "facts": answer.facts });
+            let about = json!({ "kind": question.kind(), "question": question.json(),
+                "facts": answer.facts });
             encode::csv(branch, &about)
         }
         _ => {
@@ -311,7 +314,7 @@ fn of_general(arguments: &Arguments, question: &GeneralOrbit) -> Result<Exit, Cl
     finish(&answer, &progress, out, &bytes)
 }
 
-/// Delivers an answer; of a branch that somebody stopped, as a part.
+/// Delivers an answer; of an interrupted branch, as a part.
 fn finish(
     answer: &Answer,
     progress: &Progress,

@@ -32,8 +32,10 @@ use super::plot::{Format, general_small_print, small_print, write};
 /// standard output, or beside --out under the name FILE.part.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
-    twofold scan --system buck --period 4e-4 --over params.input=20..32:60 --t-end 0.08 --follow both --plot buck.png --out buck.csv\n  \
-    twofold scan --system chua --section y=0 --over start.x=-3..3:40 --over start.z=-6..6:40 --t-end 200 --plot basins.png --out basins.csv")]
+    twofold scan --system buck --period 4e-4 --over params.input=20..32:60 --t-end 0.08 --follow \
+    both --plot buck.png --out buck.csv\n  \
+    twofold scan --system chua --section y=0 --over start.x=-3..3:40 --over start.z=-6..6:40 \
+    --t-end 200 --plot basins.png --out basins.csv")]
 pub struct Arguments {
     #[command(flatten)]
     flags: RunFlags,
@@ -137,52 +139,59 @@ impl Arguments {
             Direction::Down => Follow::Down,
             Direction::Both => Follow::Both,
         });
-        let (base, title, small_print, fixed, method) = match general::looked_at(
-            &self.flags,
-            self.period,
-        )? {
-            Some(run) => {
-                let options = &run.options;
-                match options.record {
-                    Record::Section(_) if self.follow.is_some() && run.model.depends_on_time() => {
-                        return usage(
-                            "--follow: the equations depend on the time, and the next run begins at --t-start again: give their period (--period) instead of --section".into(),
+        let (base, title, small_print, fixed, method) =
+            match general::looked_at(&self.flags, self.period)? {
+                Some(run) => {
+                    let options = &run.options;
+                    match options.record {
+                        Record::Section(_)
+                            if self.follow.is_some() && run.model.depends_on_time() =>
+                        {
+                            return usage(
+                            "--follow: the equations depend on the time, and the next run begins \
+                                at --t-start again: give their period (--period) instead of \
+                                --section".into(),
                         );
+                        }
+                        Record::Times { every } if every.is_infinite() => {
+                            return usage(format!(
+                                "a scan needs a place or time to look at: give --section, such as \
+                                {}=0, or --period of equations that depend on the time",
+                                run.model.coordinates()[0]
+                            ));
+                        }
+                        _ => {}
                     }
-                    Record::Times { every } if every.is_infinite() => {
-                        return usage(format!(
-                            "a scan needs a place or time to look at: give --section, such as {}=0, or --period of equations that depend on the time",
-                            run.model.coordinates()[0]
-                        ));
-                    }
-                    _ => {}
+                    let left =
+                        self.flags.section.as_deref().and_then(|text| text.split('=').next());
+                    let fixed = run
+                        .model
+                        .coordinates()
+                        .iter()
+                        .position(|n| left.is_some_and(|s| s.trim() == *n));
+                    let (title, print) = (
+                        run.model.definition().title().to_owned(),
+                        vec![general_small_print(&run)],
+                    );
+                    let method = options.method.name();
+                    (Base::from(run), title, print, fixed, method)
                 }
-                let left = self.flags.section.as_deref().and_then(|text| text.split('=').next());
-                let fixed = run
-                    .model
-                    .coordinates()
-                    .iter()
-                    .position(|n| left.is_some_and(|s| s.trim() == *n));
-                let (title, print) =
-                    (run.model.definition().title().to_owned(), vec![general_small_print(&run)]);
-                let method = options.method.name();
-                (Base::from(run), title, print, fixed, method)
-            }
-            None => {
-                let spec = self.flags.spec(Use::Crossings)?;
-                let fixed = match spec.observe {
-                    Observation::Section { coordinate, .. } => Some(coordinate),
-                    _ => None,
-                };
-                let (title, method) =
-                    (spec.system.definition().title().to_owned(), spec.method.name.name());
-                let print = small_print(&spec);
-                (Base::from(spec), title, print, fixed, method)
-            }
-        };
+                None => {
+                    let spec = self.flags.spec(Use::Crossings)?;
+                    let fixed = match spec.observe {
+                        Observation::Section { coordinate, .. } => Some(coordinate),
+                        _ => None,
+                    };
+                    let (title, method) =
+                        (spec.system.definition().title().to_owned(), spec.method.name.name());
+                    let print = small_print(&spec);
+                    (Base::from(spec), title, print, fixed, method)
+                }
+            };
         if self.over.iter().any(Axis::is_random) {
             return usage(
-                "--over FROM..TO without a count is drawn at random, which `twofold sweep` does; give FROM..TO:COUNT"
+                "--over FROM..TO without a count is drawn at random, which `twofold sweep` does; \
+                    give FROM..TO:COUNT"
                     .into(),
             );
         }

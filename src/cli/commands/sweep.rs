@@ -45,9 +45,12 @@ const DRAW_SEED: u64 = 2013;
     Values: a,b,c; FROM..TO:COUNT; FROM..TO:log:COUNT; STEP*COUNT; FROM..TO and FROM..TO:log drawn \
     at random; seed=FIRST..LAST.\n\n\
     Examples:\n  \
-    twofold sweep --alpha 0.1 --beta 1e-4 --restart 100 --t-end 1e5 --method dopri5 --out shifted.csv\n  \
-    twofold sweep --t-end 2e5 --over params.alpha=1e-3..1:log:13 --over interval=20,40,100 --out map.csv\n  \
-    twofold sweep --t-end 2e5 --over method=lsoda,dopri5 --over shift.x=-1e-9..1e-9 --random 100 --shard 2/8 --out part2.csv\n  \
+    twofold sweep --alpha 0.1 --beta 1e-4 --restart 100 --t-end 1e5 --method dopri5 --out \
+    shifted.csv\n  \
+    twofold sweep --t-end 2e5 --over params.alpha=1e-3..1:log:13 --over interval=20,40,100 --out \
+    map.csv\n  \
+    twofold sweep --t-end 2e5 --over method=lsoda,dopri5 --over shift.x=-1e-9..1e-9 --random 100 \
+    --shard 2/8 --out part2.csv\n  \
     twofold sweep --system bouncing-ball --t-end 20 --over params.r=0.5..0.9:9 --out balls.csv\n  \
     twofold sweep merge part*.csv --out whole.csv"
 )]
@@ -65,10 +68,12 @@ pub struct Arguments {
     /// Seed of those draws [default: 2013].
     #[arg(long, value_name = "SEED", allow_negative_numbers = true)]
     random_seed: Option<u64>,
-    /// Period of a general system that depends on the time: its states at the multiples of it are compared, instead of those at a --section.
+    /// Period of a general system that depends on the time: its states at the multiples of it are
+    /// compared, instead of those at a --section.
     #[arg(long, value_name = "T", allow_hyphen_values = true)]
     period: Option<f64>,
-    /// Number of runs: short for --over shift.NAME=SHIFT*RUNS with the first component's name [default: 40].
+    /// Number of runs: short for --over shift.NAME=SHIFT*RUNS with the first component's name
+    /// [default: 40].
     #[arg(long, allow_negative_numbers = true)]
     runs: Option<u64>,
     /// With --runs: the first component of the start is shifted by this, twice this, three times

@@ -3,7 +3,8 @@
 use super::*;
 
 impl Follower<'_> {
-    /// What is met first in a step, with its place and all else in the same part of the step; `last` takes the values where the search ends.
+    /// What is met first in a step, with its place and all else in the same part of the step;
+    /// `last` takes the values where the search ends.
     pub(super) fn find(
         &mut self,
         step: &Step,
@@ -37,7 +38,8 @@ impl Follower<'_> {
         found
     }
 
-    /// What is met first if sums of states are all that is sought: they are polynomials, which need no evaluation. Their values at the end; else none.
+    /// What is met first if sums of states are all that is sought: they are polynomials, which need
+    /// no evaluation. Their values at the end; else none.
     fn find_in_polynomials(
         &self,
         step: &Step,
@@ -64,7 +66,8 @@ impl Follower<'_> {
         list.iter().zip(all).map(end).collect()
     }
 
-    /// What is met first by the series of each function, with the values at the end where there is one.
+    /// What is met first by the series of each function, with the values at the end where there is
+    /// one.
     fn find_in_series(
         &mut self,
         step: &Step,
@@ -80,7 +83,8 @@ impl Follower<'_> {
             ends.push(series.as_ref().map(|c| c.iter().rev().sum()));
             let Some(c) = series else { continue };
             // Of the two ends of a whole part one is left.
-            let far = matches!(sought, Sought::Guard { guard, .. } if self.equation.guards[*guard].whole && c[0] > 0.5);
+            let far = matches!(sought, Sought::Guard { guard,
+                .. } if self.equation.guards[*guard].whole && c[0] > 0.5);
             let begins = (self.is_fresh(*sought) && !far).then(|| {
                 let terms =
                     self.place_of(*sought).and_then(|place| terms.get(place)).unwrap_or(&0.0);
@@ -94,8 +98,9 @@ impl Follower<'_> {
         ends
     }
 
-    /// What is met first of what is `open`, by values at five places of each part, and more where these do not tell; the values at the end of the last part
-    /// are left in the last sample, not-a-number where a function has no value on the way.
+    /// What is met first of what is `open`, by values at five places of each part, and more where
+    /// these do not tell; the values at the end of the last part are left in the last sample,
+    /// not-a-number where a function has no value on the way.
     fn find_by_values(
         &mut self,
         step: &Step,

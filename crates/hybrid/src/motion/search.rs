@@ -67,7 +67,8 @@ impl Follower<'_> {
         list.extend((0..self.contacts.len()).map(|place| (Sought::Release(place), 1.0)));
     }
 
-    /// What guards and watched expressions can be in a step, if one of them is no sum of states: their [`Range`]s for the states' ones.
+    /// What guards and watched expressions can be in a step, if one of them is no sum of states:
+    /// their [`Range`]s for the states' ones.
     fn bound(&mut self, step: &Step, ranges: &mut [Vec<Range>; 2]) {
         let [variables, values] = ranges;
         values.clear();
@@ -83,8 +84,10 @@ impl Follower<'_> {
         self.compiled.watched.evaluate(variables, values);
     }
 
-    /// Whether a watched value stays on its side of `boundary` in a step, as can be told without evaluating it at places of the step: a sum of states is a
-    /// polynomial along the step's continuous extension, and lies between its Bernstein coefficients; others lie in their ranges.
+    /// Whether a watched value stays on its side of `boundary` in a step, as can be told without
+    /// evaluating it at places of the step: a sum of states is a polynomial along the step's
+    /// continuous extension, and lies between its Bernstein coefficients; others lie in their
+    /// ranges.
     fn stays_away(
         &self,
         step: &Step,
@@ -254,8 +257,8 @@ impl Follower<'_> {
         out
     }
 
-    /// Parts of a step in each of which what is sought is smooth: no operation in it is flat at five places and steep between them. None if they
-    /// are too many to be searched.
+    /// Parts of a step in each of which what is sought is smooth: no operation in it is flat at
+    /// five places and steep between them. None if they are too many to be searched.
     pub(super) fn parts(&mut self, step: &Step, list: &[(Sought, f64)]) -> Option<Vec<(f64, f64)>> {
         if step.series.is_none() {
             return if list.is_empty() {

@@ -527,8 +527,9 @@ impl Follower<'_> {
         self.undecided(guards, &why)
     }
 
-    /// Functions that were zero with these values, and that a switch or a table has made jump away from it, are on the side where they arrive, and
-    /// nothing slides on them any more: which they are.
+    /// Functions that were zero with these values, and that a switch or a table has made jump away
+    /// from it, are on the side where they arrive, and nothing slides on them any more: which they
+    /// are.
     pub(super) fn leave_by_jump(&mut self, zero: &[usize], before: &[f64]) -> Vec<usize> {
         /// Smaller jumps, relative to a function's size, are drift.
         const DRIFT: f64 = 1e-9;

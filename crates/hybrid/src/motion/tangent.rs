@@ -738,7 +738,8 @@ pub struct Turn {
     pub end: Vec<f64>,
     /// The mode then.
     pub mode: usize,
-    /// The derivative of the return map, row by row. Of a section it has an eigenvalue 0 along the field.
+    /// The derivative of the return map, row by row. Of a section it has an eigenvalue 0 along the
+    /// field.
     pub matrix: Vec<f64>,
     /// The largest size of a state on the way.
     pub size: f64,
@@ -748,7 +749,8 @@ pub struct Turn {
     pub changes: u64,
 }
 
-/// Follows motion from `x` until it is back; of a section from the point on it that is next to `x` along its gradient.
+/// Follows motion from `x` until it is back; of a section from the point on it that is next to `x`
+/// along its gradient.
 ///
 /// # Errors
 /// As [`follow`](super::follow); also if there is no return.

@@ -1,4 +1,4 @@
-//! What becomes of one cell of a sweep of a general system.
+//! The outcome of one row of a sweep of a general system.
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -16,7 +16,8 @@ use crate::general::GeneralRun;
 use crate::question::{JobError, Question};
 use crate::table::{Column, Entry};
 
-/// A motion rests that stays where it is for this share of its run longer, within so much of the size of its states.
+/// A motion rests that stays where it is for this share of its run longer, within so much of the
+/// size of its states.
 const LONGER: f64 = 0.05;
 const STILL: f64 = 1e-6;
 
@@ -27,8 +28,9 @@ pub struct GeneralOutcome(pub GeneralRun);
 /// Where a run of a general system ends.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GeneralEnding {
-    /// The outcome: of a run that looks at a section or at multiples of a time what [`attractor::classify`] says, of others `moving`; `rest`; `stopped` by an
-    /// event, or where one `accumulates`.
+    /// The outcome: of a run that looks at a section or at multiples of a time what
+    /// [`attractor::classify`] says, of others `moving`; `rest`; `stopped` by an event, or where
+    /// one `accumulates`.
     pub outcome: Outcome,
     /// The points of a closed orbit in two of the states, or the state at rest; else nothing.
     pub place: Vec<Vec<f64>>,
@@ -231,7 +233,9 @@ impl Coordinate {
             }
             other => {
                 return Err(format!(
-                    "{other} belongs to systems with h, plus and minus; of a general system vary params.NAME, start.NAME, shift.NAME, rtol, atol, tolerance, max-step, t-end or method"
+                    "{other} belongs to systems with h, plus and minus; of a general system vary \
+                        params.NAME, start.NAME, shift.NAME, rtol, atol, tolerance, max-step, \
+                        t-end or method"
                 ));
             }
         }
@@ -239,7 +243,8 @@ impl Coordinate {
     }
 }
 
-/// The two states in which crossings are compared: the first that the section does not fix, or the only one.
+/// The two states in which crossings are compared: the first that the section does not fix, or the
+/// only one.
 fn plane(run: &GeneralRun) -> [Option<usize>; 2] {
     let names = run.model.coordinates();
     let fixed = match &run.options.record {

@@ -260,8 +260,9 @@ impl Sweep {
     ///
     /// # Errors
     ///
-    /// If an axis would have no effect or gives what another gives, if random axes and draws do not come together, or there are too many
-    /// rows. A cell whose numbers are wrong is no error here but a row.
+    /// If an axis would have no effect or gives what another gives, if random axes and draws do not
+    /// come together, or there are too many rows. A cell whose numbers are wrong is no error here
+    /// but a row.
     pub fn new(
         run: impl Into<Base>,
         over: Vec<Axis>,
@@ -381,7 +382,8 @@ impl Sweep {
         if let Base::Surfaces(run) = &mut base
             && !varied(&Coordinate::Stream)
         {
-            // Chance of its own in every row: the same kicks from neighbouring starts would not be independent runs.
+            // Chance of its own in every row: the same kicks from neighbouring starts would not be
+            // independent runs.
             if let Some(kick) = &mut run.schedule.kick {
                 kick.stream = kick.stream.wrapping_add(row);
             }
@@ -440,7 +442,8 @@ impl Sweep {
     /// [`JobError::Interrupted`] if `progress` asked to stop; every other failure is a row.
     pub fn row(&self, row: u64, progress: &dyn Progress) -> Result<Row, JobError> {
         let mut cells = self.settings(row);
-        // An executor of its own: what it has computed is forgotten with it, however many rows there are.
+        // An executor of its own: what it has computed is forgotten with it, however many rows
+        // there are.
         let executor = Executor::new(None, progress);
         let key = self.key(row);
         let found = match self.run_of(row) {

@@ -384,8 +384,9 @@ impl Rows {
         settings.chain(self.sweep.own_columns()).chain(found_columns()).collect()
     }
 
-    /// The rows as a table, in order: a column for each axis, of a general system the state at the end and what happened, then what was found. Blank where there is nothing to say; `key` holds the
-    /// leading 60 bits of the question's digest.
+    /// The rows as a table, in order: a column for each axis, of a general system the state at the
+    /// end and what happened, then what was found. Blank where there is nothing to say; `key` holds
+    /// the leading 60 bits of the question's digest.
     pub fn table(&self) -> Table {
         let mut table = Table::new("sweep", self.columns());
         for row in self.iter() {
