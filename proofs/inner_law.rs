@@ -41,8 +41,8 @@
 //! intervals that do not depend on the orbit, nor on S. With S in proportion to eps^(-1/2) these
 //! are the law: x^2 grows linearly in ln(1/eps), a disturbance along the layer by the power -(1/mu
 //! - 1)/2 of eps, and one across (whose unit is eps instead of sqrt(eps)) by -1/(2 mu). And two
-//! orbits that come in with different p leave O(1/x) apart: what is carried in shrinks in
-//! proportion to sqrt(eps).
+//!   orbits that come in with different p leave O(1/x) apart: what is carried in shrinks in
+//!   proportion to sqrt(eps).
 //!
 //! Not proved: that the full equation follows the inner problem (terms of relative size eps;
 //! matching at s of order eps^(-1/2)).

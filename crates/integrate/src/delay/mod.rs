@@ -6,8 +6,8 @@
 //! leaves it out. The relay is the sharp form of the hysteresis there (Tsypkin 1984).
 //!
 //! - The sharp rule: between switches the motion follows a smooth field. Zeros of h are located on
-//! dense output, and each causes a switch one delay later, so the only past that is kept is a queue
-//! of pending switches. Every switch ends a step.
+//!   dense output, and each causes a switch one delay later, so the only past that is kept is a
+//!   queue of pending switches. Every switch ends a step.
 //! - The relay: the same with passages of the band's far edge, each of which is a switch at once.
 //! - The smooth rule: the method of steps (Bellman 1961; Hairer, Norsett & Wanner 1993, sec. II.17;
 //!   Bellen & Zennaro 2003). No step is longer than the delay, so that its stages ask only for a

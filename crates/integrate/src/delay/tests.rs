@@ -481,8 +481,8 @@ fn a_history_on_the_flow_has_its_switches() {
 /// x' = -x(t - 1) from the constant 1: on [k - 1, k] a polynomial of degree k (Bellman 1961): sum
 /// over j of (-1)^j (t - j + 1)^j / j!, j <= k. As a switch: phi = (1 + x/9)/2 where h = x/sqrt(81
 /// - x^2) and phi(h) is the algebraic transition of width 1, f+- = -+9. A switch at rest inside its
-/// layer, r^2 = 1 and x = 0: what rounding makes of h there ends no steps. A step takes some part
-/// of a delay.
+///   layer, r^2 = 1 and x = 0: what rounding makes of h there ends no steps. A step takes some part
+///   of a delay.
 #[test]
 fn a_switch_at_rest_ends_no_steps() {
     let ring = system(
