@@ -533,11 +533,11 @@ const EXAMPLES: [(&str, &[&str]); 30] = [
 fn has_example(text: &str, item: &str) -> bool {
     let ends = |c: Option<char>| c.is_none_or(|c| !c.is_alphanumeric() && c != '_');
     let lines: Vec<&str> = text.lines().map(str::trim).collect();
-    let is = |line: &&str| {
+    let is = |line: &str| {
         let rest = line.strip_prefix("pub ").and_then(|l| l.strip_prefix(item));
         rest.is_some_and(|rest| ends(rest.chars().next()))
     };
-    let at = lines.iter().position(|line| is(&line)).unwrap_or_else(|| panic!("no pub {item}"));
+    let at = lines.iter().position(|line| is(line)).unwrap_or_else(|| panic!("no pub {item}"));
     let above = lines[..at].iter().rev().take_while(|l| l.starts_with("///") || !l.ends_with('}'));
     let docs = above.skip_while(|l| !l.starts_with("///")).take_while(|l| l.starts_with("///"));
     docs.filter(|l| l.starts_with("/// ```")).count() >= 2
