@@ -1318,7 +1318,9 @@ fn rests_on_curves_and_on_several_surfaces() {
     let block = find("states = ['x', 'v']\nf = ['v', '-x - 0.5*sign(v)']", 3.0, 2);
     let [stuck] = &block[..] else { panic!("{} rows", block.len()) };
     let [from, to] = stuck.family.as_ref().unwrap().ends.as_ref().unwrap();
-    (near(from[0], -0.5, 1e-9), near(to[0], 0.5, 1e-9), near(stuck.x[1], 0.0, 1e-15));
+    near(from[0], -0.5, 1e-9);
+    near(to[0], 0.5, 1e-9);
+    near(stuck.x[1], 0.0, 1e-15);
     assert_eq!(stuck.kind(), "stable: neighbours come to the set");
     // The line x + y = 1, from one side of the box to the other, and the origin.
     let line = find("states = ['x', 'y']\nf = ['-x*(1 - x - y)', '-y*(1 - x - y)']", 3.0, 2);
@@ -1326,7 +1328,9 @@ fn rests_on_curves_and_on_several_surfaces() {
         panic!("{} rows", line.len())
     };
     let [from, to] = set.family.as_ref().unwrap().ends.as_ref().unwrap();
-    (near(from[0], -2.0, 1e-9), near(to[0], 3.0, 1e-9), near(from[0] + from[1], 1.0, 1e-9));
+    near(from[0], -2.0, 1e-9);
+    near(to[0], 3.0, 1e-9);
+    near(from[0] + from[1], 1.0, 1e-9);
     assert_eq!(set.kind(), "unstable: neighbours leave the set");
     assert_eq!(line.len(), 2);
     // A circle of rests closes.
@@ -1338,7 +1342,8 @@ fn rests_on_curves_and_on_several_surfaces() {
     let corner =
         find("states = ['x', 'y']\nf = ['-sign(x) + 0.3', '-sign(y) - 0.2*sign(x)']", 3.0, 2);
     let [rest] = &corner[..] else { panic!("{} rows", corner.len()) };
-    (near(rest.on[0].weight, 0.65, 1e-12), near(rest.on[1].weight, 0.47, 1e-12));
+    near(rest.on[0].weight, 0.65, 1e-12);
+    near(rest.on[1].weight, 0.47, 1e-12);
     assert_eq!((rest.kind().as_str(), rest.attracting), ("stable", Some(true)));
     // Relays that work against each other: det W < 0 repels; of one that turns (W = [1, 4; -4, -2],
     // det > 0) the speeds decide.
@@ -1357,7 +1362,8 @@ fn rests_on_curves_and_on_several_surfaces() {
         3,
     );
     let [rest] = &edge[..] else { panic!("{} rows", edge.len()) };
-    (near(rest.x[2], -0.04 / 0.85, 1e-12), near(rest.eigenvalues[0][0], -0.85, 1e-9));
+    near(rest.x[2], -0.04 / 0.85, 1e-12);
+    near(rest.eigenvalues[0][0], -0.85, 1e-9);
     // Two blocks that friction holds: a set of two dimensions on both surfaces.
     let blocks = "states = ['x1', 'v1', 'x2', 'v2']\nf = ['v1', '-2*x1 + x2 - 0.5*sign(v1)', 'v2', \
         'x1 - 2*x2 - 0.5*sign(v2)']";

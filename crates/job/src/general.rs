@@ -209,7 +209,7 @@ impl GeneralRun {
     /// says whether more is wanted. The answer holds facts, and no rows.
     ///
     /// # Errors
-    /// As [`follow`].
+    /// As [`twofold_hybrid::follow`].
     pub fn stream(
         &self,
         rows: &mut dyn FnMut(&Table) -> bool,
