@@ -513,9 +513,9 @@ impl<S: Arithmetic + FromDecimal, const N: usize> FromDecimal for Dual<S, N> {
 
 /// A number that stands for a set of reals: what validated integration computes with.
 ///
-/// Two precisions: [`Interval`], and [`Ball`] with about 32 digits. Wide sets (remainders, errors,
-/// derivatives) are always held as [`Interval`]s; only the points that they surround need the
-/// precision.
+/// Two precisions: [`Interval`], and [`Ball`](crate::Ball) with about 32 digits. Wide sets
+/// (remainders, errors, derivatives) are always held as [`Interval`]s; only the points that they
+/// surround need the precision.
 pub trait Enclosure: Elementary + FromDecimal {
     /// The set of all numbers in an interval.
     fn from_interval(interval: Interval) -> Self;
