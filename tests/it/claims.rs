@@ -90,6 +90,7 @@ fn every_quantity_is_read_by_the_test_that_claims_toml_names() {
         // One statement, which may be wrapped.
         let first = body.split_inclusive(';').next().unwrap();
         let first = first.split_whitespace().collect::<Vec<_>>().join(" ");
+        let first = first.replace("( ", "(").replace(", )", ")");
         assert!(
             first == format!("let mut reads = Reads::by(\"{test}\");"),
             "{test} begins with `{first}`: it must begin with the quantities that it reads"
