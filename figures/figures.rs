@@ -56,3 +56,12 @@ pub fn data(id: &str) -> &'static [(&'static str, &'static [u8])] {
         _ => &[],
     }
 }
+
+/// Counts the committed runs of a study that repeat a panel.
+pub fn counts(study: &str) -> Option<twofold::paper::Count> {
+    match study {
+        "census" => Some(census::support),
+        "audit" => Some(audit::support),
+        _ => None,
+    }
+}

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 
 use super::CliError;
+use super::models::{known, named};
 use super::words::{History, Inside, KickLaw, Method, Reading, Relaxation, Transition};
 use crate::integrate;
 use crate::integrate::filippov::{ExitRule, Side, SlidingLaw};
@@ -721,7 +722,8 @@ impl RunFlags {
     }
 
     fn unchecked(&self, command: Use) -> Result<RunSpec, CliError> {
-        if super::general::model(self)?.is_some() {
+        let general = |name: &str| named(name, &self.set, false);
+        if self.system.as_deref().map_or(Ok(None), general)?.is_some() {
             return Err(Misuse::General { system: self.system_name().to_owned() }.into());
         }
         Ok(self.described(command)?)
@@ -934,7 +936,7 @@ fn from_file(name: &str) -> Result<System, Misuse> {
     // that is misspelt.
     let is_file = name.contains(['.', '/', '\\']) || path.is_file();
     if !is_file {
-        let (help, known) = super::general::known(name);
+        let (help, known) = known(name);
         return Err(Misuse::NoSuchSystem { name: name.into(), help, known });
     }
     let problem = |problem: String| Misuse::SystemFile { file: name.into(), problem };

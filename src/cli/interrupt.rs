@@ -5,6 +5,7 @@
 //! temporary files and ends the process. A command whose result grows row by row can ask for grace
 //! ([`Grace`]): it is told, and has a moment to keep the rows that it has.
 
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
 
 use super::Exit;
@@ -13,6 +14,15 @@ use super::Exit;
 static GRACES: AtomicUsize = AtomicUsize::new(0);
 /// The exit code of the signal that came; 0 before.
 static CAME: AtomicU8 = AtomicU8::new(0);
+
+/// Clears what stands on the terminal before the last words; set by the first progress display.
+#[cfg_attr(not(unix), allow(dead_code))]
+static CLEAR: OnceLock<fn()> = OnceLock::new();
+
+/// Lets a signal call `clear` before the process ends.
+pub fn clear_with(clear: fn()) {
+    let _ = CLEAR.set(clear);
+}
 
 /// While this value exists, a signal is first announced ([`Grace::asked_to_stop`]); the process
 /// ends at most [`GRACE_MS`] later.
@@ -62,8 +72,7 @@ mod unix {
     use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
     use signal_hook::iterator::Signals;
 
-    use super::{CAME, Exit, GRACE_MS, GRACES};
-    use crate::cli::progress;
+    use super::{CAME, CLEAR, Exit, GRACE_MS, GRACES};
     use crate::cli::speak::complain;
     use crate::record;
 
@@ -96,7 +105,9 @@ mod unix {
             }
         }
         record::files::abandon();
-        progress::clear();
+        if let Some(clear) = CLEAR.get() {
+            clear();
+        }
         complain(match exit {
             Exit::Terminated => "terminated: finished files are kept, unfinished ones are removed",
             _ => "interrupted: finished files are kept, unfinished ones are removed",

@@ -5,7 +5,7 @@
 //!   `twofold`.
 //! - [`flags`]: the flags that describe a run, and the table of which of them has an effect when.
 //!   [`words`]: values by name.
-//! - [`general`]: the same for general systems.
+//! - [`general`]: the same for general systems. [`models`]: these by name or file.
 //! - [`rows`]: rows of a sweep, kept as they finish. [`recompute`]: those that are committed beside
 //!   a figure, computed anew.
 //! - [`exit`]: exit codes and errors. [`speak`]: the two streams. [`progress`]: bars.
@@ -28,6 +28,7 @@ pub mod figure;
 pub mod flags;
 pub mod general;
 pub mod interrupt;
+pub mod models;
 pub mod progress;
 pub mod recompute;
 pub mod rows;

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::Exit;
-use super::interrupt::Grace;
+use super::interrupt::{self, Grace};
 use super::speak::{complain, harmless};
 use crate::integrate::Monitor;
 use crate::job;
@@ -18,7 +18,7 @@ static BARS: OnceLock<MultiProgress> = OnceLock::new();
 
 /// Takes bars off the screen.
 #[cfg(unix)]
-pub(super) fn clear() {
+fn clear() {
     if let Some(bars) = BARS.get() {
         // A terminal that went away shows none.
         let _ = bars.clear();
@@ -46,6 +46,7 @@ impl Progress {
         let style = if quiet {
             Style::Quiet
         } else if io::stderr().is_terminal() {
+            interrupt::clear_with(clear);
             let bars = BARS.get_or_init(|| {
                 MultiProgress::with_draw_target(ProgressDrawTarget::stderr_with_hz(8))
             });

@@ -4,33 +4,15 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::check::{Claim, Verdict};
+use super::check::Verdict;
+pub use super::made::{Made, Scored, outcome};
 use super::{Folder, FolderError, page};
 use crate::cli::{CliError, make};
 use crate::job::{AnyQuestion, Executor, JobError};
-use crate::paper::pipeline::{PictureRecord, questions};
-use crate::paper::verdict::PanelVerdict;
+use crate::paper::pipeline::questions;
 use crate::record::files::{read_text, try_folder};
 use crate::record::manifest::VERSION;
 use crate::record::{self, Manifest};
-
-/// The result of a claim: a verdict, or the reason why there is none.
-#[derive(Debug)]
-pub struct Scored<'a> {
-    /// The claim.
-    pub claim: &'a Claim,
-    /// Its verdict.
-    pub verdict: Result<Verdict, JobError>,
-}
-
-/// Everything that was made.
-#[derive(Debug)]
-pub struct Made<'a> {
-    /// The pictures' records, in the figures' order.
-    pub pictures: Vec<PictureRecord>,
-    /// The claims with their verdicts.
-    pub claims: Vec<Scored<'a>>,
-}
 
 /// The outcomes of claims, as they are kept in `expected/claims.json`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -313,28 +295,6 @@ impl Made<'_> {
             verdicts: self.claims.iter().filter_map(|s| s.verdict.as_ref().ok().cloned()).collect(),
         }
     }
-
-    /// The claims of panels (`says`), and whether they hold.
-    pub fn panels(&self) -> impl Iterator<Item = &PanelVerdict> {
-        self.pictures.iter().flat_map(|p| &p.verdicts)
-    }
-
-    /// Claims that hold, and all of them, those of panels among them.
-    pub fn score(&self) -> (usize, usize) {
-        let claims = self.claims.iter().map(|s| s.verdict.as_ref().is_ok_and(|v| v.agrees));
-        let all: Vec<bool> = claims.chain(self.panels().map(|v| v.agrees)).collect();
-        (all.iter().filter(|holds| **holds).count(), all.len())
-    }
-
-    /// The first claim that could not be scored.
-    pub fn failure(&self) -> Option<(&str, &JobError)> {
-        self.claims.iter().find_map(|s| Some((s.claim.id.as_str(), s.verdict.as_ref().err()?)))
-    }
-}
-
-/// The word for an outcome.
-pub fn outcome(agrees: bool) -> &'static str {
-    if agrees { "agrees" } else { "differs" }
 }
 
 impl From<FolderError> for CliError {

@@ -15,6 +15,7 @@
 //! key.
 
 pub mod check;
+mod made;
 pub mod make;
 mod page;
 pub mod words;
@@ -34,7 +35,7 @@ use crate::job::spec::RunSpec;
 use crate::paper::draw::plot::{self, Look, PictureKind};
 use crate::paper::plots::{Columns, Drawing, Plot, Plots, Points, Recorded};
 use crate::paper::verdict::Claim as PanelClaim;
-use crate::paper::{Camera, Figure, FigurePanel, Picture, Reading, Repeats, View, figures};
+use crate::paper::{Camera, Figure, FigurePanel, Picture, Reading, Repeats, View};
 use crate::record::FileError;
 use crate::record::files::read_text;
 use crate::record::manifest::is_plain_name;
@@ -665,7 +666,11 @@ impl Folder {
     ) -> Result<Repeats, FolderError> {
         let found = name.get_ref().split_once('/').and_then(|(study, panel)| {
             let reading = Reading::ALL.into_iter().find(|r| r.word() == reading)?;
-            Some(Repeats { panel: panel.to_owned(), reading, count: figures::counts(study)? })
+            Some(Repeats {
+                panel: panel.to_owned(),
+                reading,
+                count: twofold_jeffrey_2013::counts(study)?,
+            })
         });
         found.ok_or_else(|| {
             let why = format!("no committed runs are called `{}` in this reading", name.get_ref());

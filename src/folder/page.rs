@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use serde_json::{Value, json};
 
 use super::Folder;
-use super::make::{Made, Scored, outcome};
+use super::made::{Made, Scored, outcome};
 use crate::paper::pipeline::PictureRecord;
 use crate::paper::verdict::PanelVerdict;
 use crate::record::Hash;

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use crate::folder::{Embedded, Folder};
-use crate::paper::{Count, Figure};
+use crate::paper::Figure;
 use crate::record::{FileBytes, FileError, read_tree};
 
 pub use twofold_jeffrey_2013::{audit, census, data, delay, fig1, fig3, fig4};
@@ -89,15 +89,6 @@ pub fn references_in(expected: &Path) -> Result<Vec<FileBytes>, FileError> {
         }
     }
     Ok(files)
-}
-
-/// Counts the committed runs of a study that repeat a panel.
-pub fn counts(study: &str) -> Option<Count> {
-    match study {
-        "census" => Some(census::support),
-        "audit" => Some(audit::support),
-        _ => None,
-    }
 }
 
 #[cfg(test)]

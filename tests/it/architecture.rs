@@ -2,7 +2,7 @@
 //! name, which code may touch files or read a clock, and which words are one paper's own. What a
 //! crate may import follows from its manifest. See docs/architecture.md.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -109,6 +109,8 @@ struct Source {
     text: String,
     /// Its tokens without comments and tests.
     code: BTreeSet<String>,
+    /// The same in order.
+    tokens: Vec<String>,
 }
 
 /// Every source that is no test.
@@ -130,7 +132,8 @@ fn sources() -> Vec<Source> {
             .unwrap_or(stem)
             .to_owned();
         tests.extend(modules.iter().map(|m| format!("{base}/{m}.rs")));
-        found.push(Source { name, text, code: code.lines().map(str::to_owned).collect() });
+        let tokens: Vec<String> = code.lines().map(str::to_owned).collect();
+        found.push(Source { name, text, code: tokens.iter().cloned().collect(), tokens });
     }
     found.retain(|s| !tests.contains(&s.name) && !s.name.ends_with("/build.rs"));
     found
@@ -157,6 +160,152 @@ fn every_crate_names_only_crates_below_it() {
         }
     }
     assert!(found.is_empty(), "crates/{found:?}: say in CRATES what they may be built on");
+}
+
+/// Paths of a tree of imports (`a::{b, c::d}`) that begins at a token, below `base`.
+fn paths(tokens: &[String], mut at: usize, base: &[String], found: &mut Vec<Vec<String>>) -> usize {
+    let mut path = base.to_vec();
+    loop {
+        match tokens.get(at).map(String::as_str) {
+            Some("{") => {
+                at += 1;
+                while tokens.get(at).is_some_and(|t| t != "}") {
+                    at = paths(tokens, at, &path, found);
+                    at += usize::from(tokens.get(at).is_some_and(|t| t == ","));
+                }
+                return at + 1;
+            }
+            Some(name) if name.chars().all(|c| c.is_alphanumeric() || "_*".contains(c)) => {
+                path.push(name.to_owned());
+                at += 1;
+            }
+            _ => return at + 1,
+        }
+        let goes_on = tokens[at.min(tokens.len())..].iter().take(2).eq([":", ":"]);
+        if !goes_on {
+            // Up to the end of the item: `as` and a name.
+            while tokens.get(at).is_some_and(|t| t == "as" || t == "_") {
+                at += 2;
+            }
+            found.push(path);
+            return at;
+        }
+        at += 2;
+    }
+}
+
+/// Modules of a crate by their paths, with those that each imports; a module's own ancestors, which
+/// re-export it, are left out.
+fn imports(sources: &[Source], folder: &str) -> BTreeMap<String, BTreeSet<String>> {
+    let module = |name: &str| -> Option<String> {
+        let stem = name.strip_prefix(folder)?.strip_prefix('/')?.strip_suffix(".rs")?;
+        let stem = stem.strip_suffix("/mod").unwrap_or(stem);
+        Some(if ["lib", "main"].contains(&stem) { String::new() } else { stem.to_owned() })
+    };
+    let names: BTreeSet<String> = sources.iter().filter_map(|s| module(&s.name)).collect();
+    let mut found = BTreeMap::new();
+    for source in sources {
+        let Some(name) = module(&source.name) else { continue };
+        let own: Vec<String> =
+            name.split('/').filter(|p| !p.is_empty()).map(str::to_owned).collect();
+        let mut named = Vec::new();
+        for (at, token) in source.tokens.iter().enumerate() {
+            let starts = at == 0 || source.tokens[at - 1] != ":";
+            let above = match token.as_str() {
+                "crate" if starts => 0,
+                "super" if starts => own.len().saturating_sub(1),
+                _ => continue,
+            };
+            if source.tokens[at + 1..].iter().take(2).eq([":", ":"]) {
+                let mut base = own[..above].to_vec();
+                let mut next = at + 3;
+                while source.tokens.get(next).is_some_and(|t| t == "super") {
+                    base.pop();
+                    next += 3;
+                }
+                paths(&source.tokens, next, &base, &mut named);
+            }
+        }
+        let target = |path: &Vec<String>| {
+            (1..=path.len()).rev().map(|n| path[..n].join("/")).find(|p| names.contains(p))
+        };
+        let ancestor = |other: &String| {
+            name == *other || name.starts_with(&format!("{other}/")) || other.is_empty()
+        };
+        found.insert(
+            name.clone(),
+            named.iter().filter_map(target).filter(|o| !ancestor(o)).collect(),
+        );
+    }
+    found
+}
+
+/// Modules from which a way of imports leads back to themselves.
+fn circular(imports: &BTreeMap<String, BTreeSet<String>>) -> Vec<&String> {
+    let returns = |start: &&String| {
+        let (mut seen, mut open) = (BTreeSet::new(), vec![*start]);
+        while let Some(module) = open.pop() {
+            for next in imports.get(module).into_iter().flatten() {
+                if next == *start {
+                    return true;
+                }
+                if seen.insert(next) {
+                    open.push(next);
+                }
+            }
+        }
+        false
+    };
+    imports.keys().filter(returns).collect()
+}
+
+#[test]
+fn modules_of_a_crate_import_each_other_in_no_circle() {
+    let sources = sources();
+    let folders = CRATES.iter().map(|(name, _, _)| format!("crates/{name}/src"));
+    for folder in folders.chain(["src".to_owned()]) {
+        let imports = imports(&sources, &folder);
+        assert!(!imports.is_empty(), "{folder} has no modules");
+        let circles = circular(&imports);
+        assert!(circles.is_empty(), "{folder}: {circles:?} import each other");
+    }
+}
+
+/// The rule sees circles: written out, renamed, over several modules.
+#[test]
+fn circles_of_imports_are_seen() {
+    let source = |name: &str, text: &str| {
+        let tokens: Vec<String> =
+            twofold_digest::code(text).unwrap().0.lines().map(str::to_owned).collect();
+        Source {
+            name: format!("crates/x/src/{name}.rs"),
+            text: text.to_owned(),
+            code: tokens.iter().cloned().collect(),
+            tokens,
+        }
+    };
+    let seen = |files: &[(&str, &str)]| -> Vec<String> {
+        let sources: Vec<Source> = files.iter().map(|(name, text)| source(name, text)).collect();
+        circular(&imports(&sources, "crates/x/src")).into_iter().cloned().collect()
+    };
+    assert_eq!(seen(&[("a", "use super::b::B;"), ("b", "fn f() { crate::a::g() }")]), ["a", "b"]);
+    let three = [
+        ("a", "use crate::{b::{B as C, D}, e};"),
+        ("b", "use super::c::*;"),
+        ("c", "use crate::a;"),
+    ];
+    assert_eq!(seen(&three), ["a", "b", "c"]);
+    assert_eq!(seen(&[("a", "use super::b::B;"), ("b", "use std::a; // crate::a")]), [""; 0]);
+    assert_eq!(
+        seen(&[("a", "use super::b;"), ("b", "#[cfg(test)]\nmod tests { use crate::a; }")]),
+        [""; 0]
+    );
+    // A folder's module and what it re-exports.
+    assert_eq!(seen(&[("a/mod", "pub use b::B; mod b;"), ("a/b", "use super::C;")]), [""; 0]);
+    assert_eq!(
+        seen(&[("a/b", "use super::c::C;"), ("a/c", "use super::super::a::b;")]),
+        ["a/b", "a/c"]
+    );
 }
 
 #[test]

@@ -39,7 +39,9 @@ use serde::{Deserialize, Serialize};
 use twofold_num::Decimal;
 use twofold_system::diagnostic::{Diagnostic, nearest};
 use twofold_system::document::{About, Ordered, StateEntry};
-use twofold_system::expression::{ExpressionError, is_name, is_reserved_in_general};
+use twofold_system::expression::{
+    ExpressionError, Function, General, is_name, is_reserved_in_general,
+};
 use twofold_system::{Expression, definition::State};
 
 /// Most states of a general system.
@@ -852,4 +854,28 @@ fn in_order(mut terms: Vec<(String, Expression)>) -> Result<Vec<(String, Express
         }
     }
     Ok(done)
+}
+
+/// Whether an expression itself has a switching function.
+pub(crate) fn asks(e: &Expression) -> bool {
+    let itself = match e {
+        Expression::Greater(..) | Expression::Call(Function::Sign | Function::Abs, _) => true,
+        Expression::Apply(f, _) => {
+            use General::{Atan2, Clip, Floor, Heaviside, If, Max, Min, Mod};
+            matches!(f, Min | Max | If | Heaviside | Floor | Mod | Clip | Atan2)
+        }
+        _ => false,
+    };
+    itself || e.parts().into_iter().any(asks)
+}
+
+/// Whether any equation of a system has a switching function.
+pub(crate) fn has_switches(definition: &Definition) -> bool {
+    let fields = definition.modes.iter().flat_map(|m| &m.field);
+    let terms = definition.terms.iter().map(|(_, e)| e);
+    let events = definition.events.iter().filter_map(|e| match &e.when {
+        When::Zero(e, _) | When::Becomes(e) => Some(e),
+        _ => None,
+    });
+    fields.chain(terms).chain(events).any(asks)
 }

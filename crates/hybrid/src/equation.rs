@@ -15,7 +15,7 @@ use twofold_system::Expression;
 use twofold_system::expression::{Function, General};
 
 use crate::data::Table;
-use crate::definition::{Definition, When};
+use crate::definition::{Definition, When, asks};
 use crate::model::{Model, ModelError, power, smooth};
 
 /// A switching function.
@@ -796,30 +796,6 @@ fn with_outputs(tape: &Tape, nodes: Vec<usize>) -> Tape {
         values.extend(nodes.into_iter().map(|node| replay.operation(node)));
         values
     })
-}
-
-/// Whether an expression itself has a switching function.
-fn asks(e: &Expression) -> bool {
-    let itself = match e {
-        Expression::Greater(..) | Expression::Call(Function::Sign | Function::Abs, _) => true,
-        Expression::Apply(f, _) => {
-            use General::{Atan2, Clip, Floor, Heaviside, If, Max, Min, Mod};
-            matches!(f, Min | Max | If | Heaviside | Floor | Mod | Clip | Atan2)
-        }
-        _ => false,
-    };
-    itself || e.parts().into_iter().any(asks)
-}
-
-/// Whether any equation of a system has a switching function.
-pub(crate) fn has_switches(definition: &Definition) -> bool {
-    let fields = definition.modes.iter().flat_map(|m| &m.field);
-    let terms = definition.terms.iter().map(|(_, e)| e);
-    let events = definition.events.iter().filter_map(|e| match &e.when {
-        When::Zero(e, _) | When::Becomes(e) => Some(e),
-        _ => None,
-    });
-    fields.chain(terms).chain(events).any(asks)
 }
 
 fn quotient(list: &[Expression]) -> Expression {

@@ -141,7 +141,7 @@ impl Model {
 
     /// Whether its equations have switching functions.
     pub fn has_switches(&self) -> bool {
-        crate::equation::has_switches(&self.definition)
+        crate::definition::has_switches(&self.definition)
     }
 
     /// Whether its fields depend on the time, by themselves or through a table.

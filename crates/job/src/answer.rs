@@ -4,7 +4,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use super::table::Table;
+use super::table::{Cells, ColumnKind, Table};
 use crate::record::Hash;
 use crate::record::hash::canonical_json;
 use twofold_integrate::{Statistics, StopReason};
@@ -116,9 +116,51 @@ impl Answer {
 
     /// The hash of what was found: tables, facts and stop reason, but not the work that it took.
     pub fn hash(&self) -> Hash {
-        let mut bytes = super::encode::bits(&self.tables);
+        let mut bytes = bits(&self.tables);
         bytes.extend_from_slice(&canonical_json(&self.facts));
         bytes.extend_from_slice(self.stop.word().as_bytes());
         Hash::of(&bytes)
     }
+}
+
+/// The bytes that are hashed: table by table, column by column, little-endian. Names and units are
+/// part of them; all not-a-numbers are one.
+pub fn bits(tables: &[Table]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let text = |bytes: &mut Vec<u8>, text: &str| {
+        bytes.extend_from_slice(&(text.len() as u64).to_le_bytes());
+        bytes.extend_from_slice(text.as_bytes());
+    };
+    bytes.extend_from_slice(&(tables.len() as u64).to_le_bytes());
+    for table in tables {
+        text(&mut bytes, &table.name);
+        bytes.extend_from_slice(&(table.columns.len() as u64).to_le_bytes());
+        for column in &table.columns {
+            text(&mut bytes, &column.name);
+            text(&mut bytes, &column.unit);
+            bytes.push(match column.kind() {
+                ColumnKind::Number => b'n',
+                ColumnKind::Integer => b'i',
+                ColumnKind::Word => b'w',
+            });
+            bytes.extend_from_slice(&(column.len() as u64).to_le_bytes());
+            match &column.cells {
+                Cells::Numbers(values) => {
+                    for v in values {
+                        let v = if v.is_nan() { f64::NAN } else { *v };
+                        bytes.extend_from_slice(&v.to_bits().to_le_bytes());
+                    }
+                }
+                Cells::Integers(values) => {
+                    values.iter().for_each(|v| bytes.extend_from_slice(&v.to_le_bytes()))
+                }
+                Cells::Words(words) => {
+                    bytes.extend_from_slice(&(words.vocabulary.len() as u64).to_le_bytes());
+                    words.vocabulary.iter().for_each(|w| text(&mut bytes, w));
+                    words.codes.iter().for_each(|c| bytes.extend_from_slice(&c.to_le_bytes()));
+                }
+            }
+        }
+    }
+    bytes
 }

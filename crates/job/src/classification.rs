@@ -5,9 +5,8 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 
 use super::answer::{Answer, Stop};
-use super::executor::Executor;
 use super::exponent::LargestExponent;
-use super::question::{AnyQuestion, JobError, Question};
+use super::question::{AnyQuestion, Ask, JobError, Question};
 use super::run::Run;
 use super::spec::{Observation, RunSpec, SwitchSpec};
 use twofold_analyse::Direction;
@@ -55,7 +54,7 @@ impl Classification {
     /// # Errors
     ///
     /// The failure of the computation.
-    pub fn ask(&self, executor: &Executor<'_>) -> Result<Evidence, JobError> {
+    pub fn ask(&self, executor: &dyn Ask) -> Result<Evidence, JobError> {
         Ok(executor.ask(self)?.fact("evidence")?)
     }
 }
@@ -87,7 +86,7 @@ impl Question for Classification {
         std::iter::once(self.run.clone()).chain(twins).map(|run| Arc::new(Run(run)) as _).collect()
     }
 
-    fn compute(&self, executor: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
+    fn compute(&self, executor: &dyn Ask, _: &dyn Monitor) -> Result<Answer, JobError> {
         let evidence = self.evidence(executor)?;
         Ok(Answer::of_tables(Vec::new()).with_fact("evidence", &evidence))
     }
@@ -128,14 +127,14 @@ pub(super) enum SoFar<T> {
 }
 
 impl Classification {
-    fn evidence(&self, executor: &Executor<'_>) -> Result<Evidence, JobError> {
+    fn evidence(&self, executor: &dyn Ask) -> Result<Evidence, JobError> {
         // What cannot be judged is not computed.
         plane(&self.run)?;
         self.evidence_of(executor, &*executor.ask(&Run(self.run.clone()))?)
     }
 
     /// The evidence that an answer to the run's question gives.
-    fn evidence_of(&self, executor: &Executor<'_>, answer: &Answer) -> Result<Evidence, JobError> {
+    fn evidence_of(&self, executor: &dyn Ask, answer: &Answer) -> Result<Evidence, JobError> {
         match self.so_far(executor, answer)? {
             SoFar::Judged(evidence) => Ok(evidence),
             SoFar::Awaits(exponent) => {
@@ -147,7 +146,7 @@ impl Classification {
     /// What an answer to the run's question comes to without the orbit's exponent.
     pub(super) fn so_far(
         &self,
-        executor: &Executor<'_>,
+        executor: &dyn Ask,
         answer: &Answer,
     ) -> Result<SoFar<Evidence>, JobError> {
         let run = &self.run;
@@ -234,10 +233,7 @@ impl Classification {
 
     /// The structure that noise can wash out: sections of its twins without kicks, each as long as
     /// it was not captured by a closed orbit.
-    fn noise_free_structure(
-        &self,
-        executor: &Executor<'_>,
-    ) -> Result<Vec<Vec<SectionPoint>>, JobError> {
+    fn noise_free_structure(&self, executor: &dyn Ask) -> Result<Vec<Vec<SectionPoint>>, JobError> {
         let mut free = Vec::new();
         for twin in self.noise_free_twins() {
             let (_, section) = section(&twin, &*executor.ask(&Run(twin.clone()))?)?;
@@ -306,6 +302,7 @@ fn section(run: &RunSpec, answer: &Answer) -> Result<(Vec<f64>, Vec<SectionPoint
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Executor;
     use crate::spec::{DEFAULT_MAX_STEPS, Method, MethodSpec};
     use twofold_integrate::{StepCap, Tolerance};
     use twofold_system::{Definition, System};

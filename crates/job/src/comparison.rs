@@ -3,8 +3,7 @@
 use serde_json::{Value, json};
 
 use super::answer::Answer;
-use super::executor::Executor;
-use super::question::{JobError, Question};
+use super::question::{Ask, JobError, Question};
 use super::recording::{Data, Recording};
 use super::run::Run;
 use super::spec::RunSpec;
@@ -34,7 +33,7 @@ impl Question for PathComparison {
         Run(self.0.clone()).cost() + Run(self.1.clone()).cost()
     }
 
-    fn compute(&self, executor: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
+    fn compute(&self, executor: &dyn Ask, _: &dyn Monitor) -> Result<Answer, JobError> {
         let (a, b) = (path(executor, &self.0)?, path(executor, &self.1)?);
         let range = common_box([&a[..], &b[..]]);
         let (a, b) = (DividerWalk::new(&a, &range), DividerWalk::new(&b, &range));
@@ -44,7 +43,7 @@ impl Question for PathComparison {
     }
 }
 
-fn path(executor: &Executor<'_>, run: &RunSpec) -> Result<Vec<Sample>, JobError> {
+fn path(executor: &dyn Ask, run: &RunSpec) -> Result<Vec<Sample>, JobError> {
     // Many pairs are compared, of paths that have no other use and together fill much memory.
     let recording =
         Recording::of_answer(run, &*executor.ask_in_passing(&Run(run.clone()))?)?.whole()?;
@@ -59,6 +58,7 @@ fn path(executor: &Executor<'_>, run: &RunSpec) -> Result<Vec<Sample>, JobError>
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Executor;
     use crate::cases;
     use crate::spec::{Observation, SwitchSpec};
 

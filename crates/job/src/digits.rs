@@ -4,8 +4,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::answer::{Answer, Stop};
-use super::executor::Executor;
-use super::question::{JobError, Question};
+use super::question::{Ask, JobError, Question};
 use super::table::{Column, Entry, Table};
 use twofold_analyse::digits::DigitsQuestion;
 use twofold_instances as instances;
@@ -42,7 +41,7 @@ impl Question for MethodDigits {
         500.0 * self.compared.t_end * (1e-3 / self.eps).max(1.0)
     }
 
-    fn compute(&self, _: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
+    fn compute(&self, _: &dyn Ask, _: &dyn Monitor) -> Result<Answer, JobError> {
         let found = instances::smoothed(&self.system, Transition::Tanh, self.eps)?
             .digits(&self.compared)?;
         let columns =
@@ -71,6 +70,7 @@ impl Question for MethodDigits {
 
 #[cfg(test)]
 mod tests {
+    use crate::Executor;
     use std::f64::consts::PI;
 
     use super::*;

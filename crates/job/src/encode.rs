@@ -10,6 +10,7 @@ use std::io::Write as _;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
+pub use super::answer::bits;
 use super::answer::{Answer, Stop};
 use super::question::Question;
 use super::shortest::shortest;
@@ -23,48 +24,6 @@ pub struct Malformed(pub String);
 
 fn malformed<T>(what: impl Into<String>) -> Result<T, Malformed> {
     Err(Malformed(what.into()))
-}
-
-/// The bytes that are hashed: table by table, column by column, little-endian. Names and units are
-/// part of them; all not-a-numbers are one.
-pub fn bits(tables: &[Table]) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    let text = |bytes: &mut Vec<u8>, text: &str| {
-        bytes.extend_from_slice(&(text.len() as u64).to_le_bytes());
-        bytes.extend_from_slice(text.as_bytes());
-    };
-    bytes.extend_from_slice(&(tables.len() as u64).to_le_bytes());
-    for table in tables {
-        text(&mut bytes, &table.name);
-        bytes.extend_from_slice(&(table.columns.len() as u64).to_le_bytes());
-        for column in &table.columns {
-            text(&mut bytes, &column.name);
-            text(&mut bytes, &column.unit);
-            bytes.push(match column.kind() {
-                ColumnKind::Number => b'n',
-                ColumnKind::Integer => b'i',
-                ColumnKind::Word => b'w',
-            });
-            bytes.extend_from_slice(&(column.len() as u64).to_le_bytes());
-            match &column.cells {
-                Cells::Numbers(values) => {
-                    for v in values {
-                        let v = if v.is_nan() { f64::NAN } else { *v };
-                        bytes.extend_from_slice(&v.to_bits().to_le_bytes());
-                    }
-                }
-                Cells::Integers(values) => {
-                    values.iter().for_each(|v| bytes.extend_from_slice(&v.to_le_bytes()))
-                }
-                Cells::Words(words) => {
-                    bytes.extend_from_slice(&(words.vocabulary.len() as u64).to_le_bytes());
-                    words.vocabulary.iter().for_each(|w| text(&mut bytes, w));
-                    words.codes.iter().for_each(|c| bytes.extend_from_slice(&c.to_le_bytes()));
-                }
-            }
-        }
-    }
-    bytes
 }
 
 /// Reads bytes from the front.

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::answer::{Answer, Stop};
 use super::plan::QuestionPlan;
-use super::question::{AnyQuestion, JobError, Question, key};
+use super::question::{AnyQuestion, Ask, JobError, Question, key};
 use super::store::{Kept, Store};
 use crate::record::Hash;
 use twofold_integrate::Monitor;
@@ -71,6 +71,20 @@ impl Executor<'static> {
     /// An executor without store and without display.
     pub fn quiet() -> Self {
         Executor::new(None, &())
+    }
+}
+
+impl Ask for Executor<'_> {
+    fn ask(&self, question: &dyn Question) -> Result<Arc<Answer>, JobError> {
+        Executor::ask(self, question)
+    }
+
+    fn ask_in_passing(&self, question: &dyn Question) -> Result<Arc<Answer>, JobError> {
+        Executor::ask_in_passing(self, question)
+    }
+
+    fn gather(&self, questions: &[AnyQuestion]) {
+        Executor::gather(self, questions);
     }
 }
 
@@ -208,7 +222,7 @@ mod tests {
         fn cost(&self) -> f64 {
             self.0 as f64
         }
-        fn compute(&self, executor: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
+        fn compute(&self, executor: &dyn Ask, _: &dyn Monitor) -> Result<Answer, JobError> {
             self.1.fetch_add(1, Ordering::Relaxed);
             let value: u64 = match self.0 {
                 13 => return Err(JobError::Other("unlucky".into())),

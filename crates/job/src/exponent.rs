@@ -5,10 +5,9 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::answer::{Answer, Stop};
-use super::executor::Executor;
-use super::question::{JobError, Question};
-use super::rest::switching;
+use super::question::{Ask, JobError, Question};
 use super::spec::SwitchSpec;
+use super::spec::switching;
 use twofold_analyse::lyapunov::{self, Estimate, Exponent};
 use twofold_analyse::tangent::Tangent;
 use twofold_instances_switched::{self as switched, Late};
@@ -253,7 +252,7 @@ impl Question for LargestExponent {
         self.settings.transient + self.settings.duration
     }
 
-    fn compute(&self, _: &Executor<'_>, monitor: &dyn Monitor) -> Result<Answer, JobError> {
+    fn compute(&self, _: &dyn Ask, monitor: &dyn Monitor) -> Result<Answer, JobError> {
         let found = self.exponent(monitor);
         let mut answer = Answer::of_tables(Vec::new());
         if let Ok(Estimate { exponent, .. }) = &found
@@ -276,6 +275,7 @@ impl Question for LargestExponent {
 
 #[cfg(test)]
 mod tests {
+    use crate::Executor;
     use std::ops::ControlFlow;
 
     use super::*;

@@ -15,8 +15,7 @@ use twofold_integrate::Monitor;
 use twofold_system::{Expression, System};
 
 use super::answer::{Answer, Stop};
-use super::executor::Executor;
-use super::question::{JobError, Question};
+use super::question::{Ask, JobError, Question};
 use super::table::{Column, Entry, Table};
 
 /// A run of a general system.
@@ -284,7 +283,7 @@ impl Question for GeneralRun {
         self.options.t_end - self.options.t_start
     }
 
-    fn compute(&self, _: &Executor<'_>, monitor: &dyn Monitor) -> Result<Answer, JobError> {
+    fn compute(&self, _: &dyn Ask, monitor: &dyn Monitor) -> Result<Answer, JobError> {
         let mut whole = self.table();
         let mut full = None;
         let mut keep = |part: &Table| {
@@ -344,7 +343,7 @@ impl Question for GeneralExponents {
     }
 
     /// Facts: `from` and `to` (the times of the mean) and `exponents`, a list of [`MeanRate`]s.
-    fn compute(&self, _: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
+    fn compute(&self, _: &dyn Ask, _: &dyn Monitor) -> Result<Answer, JobError> {
         let found = exponents(&self.run.model, &self.run.options, self.transient, self.count)?;
         let list: Vec<MeanRate> = found
             .values
@@ -393,7 +392,7 @@ impl Question for GeneralSensitivities {
     /// The table `sensitivities` has a row a state: its name, its `value` at the end and its
     /// derivatives by each component of the start (`start.x`) and by each parameter (`params.p`).
     /// Fact: `t`, when the run ended.
-    fn compute(&self, _: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
+    fn compute(&self, _: &dyn Ask, _: &dyn Monitor) -> Result<Answer, JobError> {
         let by: Vec<&str> = self.by.iter().map(String::as_str).collect();
         let found = sensitivities(&self.run.model, &self.run.options, &by)?;
         let states = self.run.model.coordinates();
@@ -508,7 +507,7 @@ impl Question for GeneralRests {
     }
 
     /// Facts: `states` (their names) and `rests`, a list of [`Resting`]s.
-    fn compute(&self, _: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
+    fn compute(&self, _: &dyn Ask, _: &dyn Monitor) -> Result<Answer, JobError> {
         let found = rests(&self.model, &self.within)?;
         let modes = self.model.definition().modes();
         let list: Vec<Resting> = found
@@ -547,6 +546,7 @@ impl Question for GeneralRests {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Executor;
 
     fn run(text: &str, t_end: f64) -> GeneralRun {
         let model = Model::new(Definition::from_toml(text, "f").unwrap());

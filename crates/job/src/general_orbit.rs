@@ -10,10 +10,9 @@ use twofold_hybrid::{Ending, HybridError, Model, Options, follow};
 use twofold_integrate::Monitor;
 
 use super::answer::{Answer, Stop};
-use super::executor::Executor;
 use super::general::GeneralRun;
 use super::orbit::{Along, CLOSED, ITERATIONS, LEAST_CLOSED, ROUGHLY, branch_tables};
-use super::question::{JobError, Question};
+use super::question::{Ask, JobError, Question};
 
 /// A closed orbit of a general system, by Newton's method once the motion has settled, and its
 /// branch along a parameter if one is named.
@@ -55,11 +54,9 @@ impl Question for GeneralOrbit {
         self.settle
     }
 
-    /// Facts: `states` (their names), `point`, `period`, `multipliers` (real and imaginary parts,
-    /// the largest first) and `gap` (how far the orbit is from closed, relative to its largest
-    /// state). Of a branch also the tables `branch` and `bifurcations` and the fact `end`, as of
-    /// [`ClosedOrbit`](super::ClosedOrbit).
-    fn compute(&self, _: &Executor<'_>, monitor: &dyn Monitor) -> Result<Answer, JobError> {
+    /// Facts: `states` (their names), `point`, `period`, `multipliers` (real and imaginary parts, the largest first) and `gap` (how far the orbit is from closed,
+    /// relative to its largest state). Of a branch also the tables `branch` and `bifurcations` and the fact `end`, as of [`ClosedOrbit`](super::ClosedOrbit).
+    fn compute(&self, _: &dyn Ask, monitor: &dyn Monitor) -> Result<Answer, JobError> {
         let model = match &self.along {
             Some(along) => at(&self.run.model, along, along.from)?,
             None => self.run.model.clone(),
@@ -218,6 +215,7 @@ impl ReturnMap for Map<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Executor;
     use crate::general::expression;
     use twofold_hybrid::Definition;
 

@@ -5,8 +5,7 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 
 use super::answer::{Answer, Stop};
-use super::executor::Executor;
-use super::question::{AnyQuestion, JobError, Question};
+use super::question::{AnyQuestion, Ask, JobError, Question};
 use super::run::Run;
 use super::spec::{MethodSpec, Observation, RunSpec, SpecError, finest_extended};
 use super::table::{Column, Entry, Table};
@@ -62,7 +61,7 @@ impl Question for Horizon {
         10.0 * Run(self.run.clone()).cost()
     }
 
-    fn compute(&self, executor: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
+    fn compute(&self, executor: &dyn Ask, _: &dyn Monitor) -> Result<Answer, JobError> {
         let method = &self.run.method;
         if method.name != Method::TaylorExtended {
             let rule = "only orbits of taylor-extended have a horizon: other methods' errors are \
@@ -134,6 +133,7 @@ impl Question for Horizon {
 
 #[cfg(test)]
 mod tests {
+    use crate::Executor;
     use std::ops::ControlFlow;
 
     use super::*;

@@ -79,7 +79,7 @@ pub use horizon::Horizon;
 pub use limit::{AfterVisit, SmoothingLimit};
 pub use orbit::ClosedOrbit;
 pub use passage::{Leaving, TwoFoldPassage};
-pub use question::{AnyQuestion, JobError, Question};
+pub use question::{AnyQuestion, Ask, JobError, Question};
 pub use recording::{Data, Recording};
 pub use run::Run;
 pub use store::Store;

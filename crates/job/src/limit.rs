@@ -6,9 +6,8 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::answer::{Answer, Stop};
-use super::executor::Executor;
 use super::passage::TwoFoldPassage;
-use super::question::{AnyQuestion, JobError, Question};
+use super::question::{AnyQuestion, Ask, JobError, Question};
 use super::recording::side_word;
 use super::table::{Column, Entry, Table};
 use twofold_analyse::limit::{AfterVisitQuestion, ConvergenceQuestion};
@@ -45,7 +44,7 @@ impl Question for SmoothingLimit {
         5e4
     }
 
-    fn compute(&self, _: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
+    fn compute(&self, _: &dyn Ask, _: &dyn Monitor) -> Result<Answer, JobError> {
         let found = switched::sliding(&self.system)?.convergence(&self.compared)?;
         let columns = [
             Column::numbers("eps"),
@@ -99,7 +98,7 @@ impl AfterVisit {
     }
 
     /// Where they cross.
-    fn smoothed(&self, executor: &Executor<'_>) -> Result<Vec<Smoothed>, JobError> {
+    fn smoothed(&self, executor: &dyn Ask) -> Result<Vec<Smoothed>, JobError> {
         let passages = self.passages()?;
         let mut found = Vec::with_capacity(passages.len());
         for passage in passages {
@@ -139,7 +138,7 @@ impl Question for AfterVisit {
             .collect()
     }
 
-    fn compute(&self, executor: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
+    fn compute(&self, executor: &dyn Ask, _: &dyn Monitor) -> Result<Answer, JobError> {
         let crossings = self.smoothed(executor)?;
         let mut crossing =
             |eps: f64| Ok(crossings.iter().find(|c| c.0 == eps).and_then(|c| c.1.clone()));
@@ -178,6 +177,7 @@ impl Question for AfterVisit {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Executor;
     use crate::question::key;
     use crate::{Store, cases};
     use twofold_integrate::filippov::{FilippovOptions, FunnelGrid};

@@ -7,8 +7,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::answer::{Answer, Stop};
-use super::executor::Executor;
-use super::question::{JobError, Question};
+use super::question::{Ask, JobError, Question};
 use super::rest::{self, Rest};
 use super::run::Run;
 use super::spec::{Observation, RunSpec, SpecError, SwitchSpec};
@@ -154,7 +153,7 @@ impl Question for ClosedOrbit {
         10.0 * (self.settle + members * 50.0)
     }
 
-    fn compute(&self, executor: &Executor<'_>, monitor: &dyn Monitor) -> Result<Answer, JobError> {
+    fn compute(&self, executor: &dyn Ask, monitor: &dyn Monitor) -> Result<Answer, JobError> {
         self.validate()?;
         let (guess, returns) = match self.guess(executor)? {
             Guess::Loop { point, returns } => (point, returns),
@@ -322,7 +321,7 @@ impl ClosedOrbit {
         Ok((system, self.switch))
     }
 
-    fn guess(&self, executor: &Executor<'_>) -> Result<Guess, JobError> {
+    fn guess(&self, executor: &dyn Ask) -> Result<Guess, JobError> {
         let (system, switch) = self.at(self.along.as_ref().map_or(0.0, |a| a.from))?;
         let mut point = self.start.clone();
         let mut returns = self.returns;
@@ -666,6 +665,7 @@ impl ReturnMap for Map<'_> {
 
 #[cfg(test)]
 mod tests {
+    use crate::Executor;
     use std::f64::consts::PI;
     use std::sync::Mutex;
 

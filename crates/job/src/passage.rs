@@ -5,8 +5,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::answer::{Answer, Stop};
-use super::executor::Executor;
-use super::question::{JobError, Question};
+use super::question::{Ask, JobError, Question};
 use super::spec::{SpecError, SwitchSpec};
 use super::table::{Column, Entry, Table};
 use twofold_analyse::passage::{self, PassageAnswer, PassageQuestion};
@@ -51,7 +50,7 @@ impl Question for TwoFoldPassage {
             + 2e3 * self.followed.offsets.len() as f64
     }
 
-    fn compute(&self, _: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
+    fn compute(&self, _: &dyn Ask, _: &dyn Monitor) -> Result<Answer, JobError> {
         let field = instances::smoothed(&self.system, self.transition, self.eps)?;
         let found = field.passage(self.eps, &self.followed)?;
         Ok(Answer {
@@ -189,7 +188,7 @@ impl Question for Leaving {
         self.runs.len() as f64 * 10.0 / self.eps().unwrap_or(1.0).max(1e-9)
     }
 
-    fn compute(&self, _: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
+    fn compute(&self, _: &dyn Ask, _: &dyn Monitor) -> Result<Answer, JobError> {
         let eps = self.eps()?;
         match self.switch {
             SwitchSpec::Smoothed { transition, .. } => {
@@ -209,6 +208,7 @@ impl Question for Leaving {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Executor;
     use crate::cases;
     use twofold_integrate::filippov::{ExitRule, Side};
     use twofold_system::{Caricature, Relaxation};

@@ -113,7 +113,8 @@ impl QuestionPlan {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Answer, Executor, JobError, Question};
+    use crate::question::Ask;
+    use crate::{Answer, JobError, Question};
     use serde_json::{Value, json};
     use std::sync::Arc;
     use twofold_integrate::Monitor;
@@ -138,7 +139,7 @@ mod tests {
                 .map(|n| Arc::new(Number(n)) as _)
                 .collect()
         }
-        fn compute(&self, _: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
+        fn compute(&self, _: &dyn Ask, _: &dyn Monitor) -> Result<Answer, JobError> {
             Ok(Answer::of_tables(Vec::new()))
         }
     }

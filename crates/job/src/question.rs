@@ -6,7 +6,6 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 
 use super::answer::{Answer, NoSuchFact};
-use super::executor::Executor;
 use super::spec::SpecError;
 use crate::record::Hash;
 use twofold_hybrid::HybridError;
@@ -18,6 +17,27 @@ use twofold_system::BindError;
 /// Version of the numerics: a digest of the sources that numbers depend on, made when the program
 /// is built. Answers of another version are never taken for this one's.
 pub const NUMERICS: &str = env!("TWOFOLD_NUMERICS");
+
+/// Answers questions, each computed once: an [`Executor`](super::Executor), as questions see it.
+pub trait Ask: Sync {
+    /// The answer to a question.
+    ///
+    /// # Errors
+    ///
+    /// The failure of the computation; asked again, the same failure.
+    fn ask(&self, question: &dyn Question) -> Result<Arc<Answer>, JobError>;
+
+    /// The answer to a question that is not expected to be asked again: it is kept in the store,
+    /// not in memory.
+    ///
+    /// # Errors
+    ///
+    /// As [`Ask::ask`].
+    fn ask_in_passing(&self, question: &dyn Question) -> Result<Arc<Answer>, JobError>;
+
+    /// Computes all these questions in parallel, dependencies first.
+    fn gather(&self, questions: &[AnyQuestion]);
+}
 
 /// A computation as data: everything that its answer depends on, and nothing else.
 ///
@@ -64,7 +84,7 @@ pub trait Question: fmt::Debug + Send + Sync {
     /// # Errors
     ///
     /// If the question makes no sense, or the computation cannot be carried out.
-    fn compute(&self, executor: &Executor<'_>, monitor: &dyn Monitor) -> Result<Answer, JobError>;
+    fn compute(&self, executor: &dyn Ask, monitor: &dyn Monitor) -> Result<Answer, JobError>;
 }
 
 /// A question that can be handed around.
@@ -334,7 +354,7 @@ mod tests {
             fn json(&self) -> Value {
                 json!(self.1)
             }
-            fn compute(&self, _: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
+            fn compute(&self, _: &dyn Ask, _: &dyn Monitor) -> Result<Answer, JobError> {
                 Err(JobError::Interrupted)
             }
         }

@@ -12,7 +12,7 @@ use nalgebra::SVector;
 
 use super::answer::{Answer, NoSuchFact, Stop};
 use super::question::JobError;
-use super::rest::switching;
+use super::spec::switching;
 use super::spec::{RunSpec, SwitchSpec};
 use super::table::{Cells, Column, Entry, Table};
 use crate::record::hash::canonical_json;

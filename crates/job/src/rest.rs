@@ -10,15 +10,13 @@
 use serde::{Deserialize, Serialize};
 
 use super::answer::{Answer, Stop};
-use super::executor::Executor;
-use super::question::JobError;
+use super::question::{Ask, JobError};
 use super::run::Run;
-use super::spec::{Method, MethodSpec, Observation, RunSpec, SwitchSpec};
+use super::spec::{Method, MethodSpec, Observation, RunSpec, SwitchSpec, switching};
 use twofold_integrate::{Schedule, StepCap, Tolerance};
+use twofold_num::Dual;
 use twofold_num::elementary::{exp, ln, sqrt};
 use twofold_num::linear::{eigenvalues, solve_any};
-use twofold_num::tape::Program;
-use twofold_num::{Dual, Elementary};
 use twofold_system::{Field, System};
 
 /// The field of which a rest is a zero.
@@ -164,14 +162,6 @@ pub(super) fn field(system: &System, switch: SwitchSpec) -> Option<Field> {
     }
 }
 
-/// The value of h.
-pub(super) fn switching<S: Elementary>(system: &System, x: &[S]) -> S {
-    let mut h = [S::from_f64(f64::NAN)];
-    Program::new(&system.tape().select([0])).evaluate(x, &mut h);
-    let [h] = h;
-    h
-}
-
 /// The rest that Newton's method finds from `from`, the equation's state, whether or not anything
 /// ends there.
 pub fn near(system: &System, switch: SwitchSpec, from: &[f64]) -> Option<Rest> {
@@ -286,7 +276,7 @@ const AS_FAST: f64 = 0.75;
 ///
 /// If it was interrupted.
 pub fn at_end(
-    executor: &Executor<'_>,
+    executor: &dyn Ask,
     run: &RunSpec,
     answer: &Answer,
 ) -> Result<Option<Rest>, JobError> {

@@ -3,8 +3,7 @@
 use serde_json::Value;
 
 use super::answer::Answer;
-use super::executor::Executor;
-use super::question::{JobError, Question};
+use super::question::{Ask, JobError, Question};
 use super::simulate;
 use super::spec::{Method, RunSpec, SwitchSpec};
 use twofold_integrate::Monitor;
@@ -75,7 +74,7 @@ impl Question for Run {
         self.0.t_end * switch * method
     }
 
-    fn compute(&self, _: &Executor<'_>, monitor: &dyn Monitor) -> Result<Answer, JobError> {
+    fn compute(&self, _: &dyn Ask, monitor: &dyn Monitor) -> Result<Answer, JobError> {
         simulate::answer(&self.0, monitor)
     }
 }

@@ -5,15 +5,15 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::rest::switching;
-
 pub use twofold_integrate::Method;
 use twofold_integrate::delay::{
     History, Inside, LEAST_DELAY, LateSwitch, SHARP_METHODS, SMOOTH_METHODS,
 };
 use twofold_integrate::filippov::ExitRule;
 use twofold_integrate::{PRECISIONS, Schedule, StepCap, Tolerance, layered};
+use twofold_num::Elementary;
 use twofold_num::elementary::exp10;
+use twofold_num::tape::Program;
 use twofold_system::{Field, Relaxation, System, Transition};
 
 /// One run: system, switch, start, method, schedule, and what is recorded.
@@ -677,6 +677,14 @@ impl MethodSpec {
         }
         if self.max_steps == 0 { wrong("max-steps", 0.0, "give at least one step") } else { Ok(()) }
     }
+}
+
+/// The value of h.
+pub(super) fn switching<S: Elementary>(system: &System, x: &[S]) -> S {
+    let mut h = [S::from_f64(f64::NAN)];
+    Program::new(&system.tape().select([0])).evaluate(x, &mut h);
+    let [h] = h;
+    h
 }
 
 #[cfg(test)]

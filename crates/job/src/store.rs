@@ -304,7 +304,8 @@ fn header_of(bytes: &[u8]) -> Result<(&[u8], &[u8]), &'static str> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::executor::Executor;
+    use crate::Executor;
+    use crate::question::Ask;
     use crate::question::{JobError, key};
     use crate::table::{Column, Table};
     use serde_json::json;
@@ -323,7 +324,7 @@ mod tests {
         fn json(&self) -> Value {
             json!({ "of": self.0 })
         }
-        fn compute(&self, _: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
+        fn compute(&self, _: &dyn Ask, _: &dyn Monitor) -> Result<Answer, JobError> {
             COMPUTED.fetch_add(1, Ordering::Relaxed);
             let mut table = Table::new("square", [Column::numbers("x")]);
             table.push([(self.0 * self.0).into()]);
@@ -441,7 +442,7 @@ mod tests {
             }
             fn compute(
                 &self,
-                executor: &Executor<'_>,
+                executor: &dyn Ask,
                 monitor: &dyn Monitor,
             ) -> Result<Answer, JobError> {
                 Square(self.0).compute(executor, monitor)
@@ -480,7 +481,7 @@ mod tests {
             fn json(&self) -> Value {
                 Value::Null
             }
-            fn compute(&self, _: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
+            fn compute(&self, _: &dyn Ask, _: &dyn Monitor) -> Result<Answer, JobError> {
                 Ok(Answer { stop: Stop::Interrupted, ..Answer::of_tables(Vec::new()) })
             }
         }

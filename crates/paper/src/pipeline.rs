@@ -8,11 +8,11 @@ use serde_json::{Value, json};
 use super::verdict::{self, PanelVerdict, judge};
 use super::{Picture, Reading, View, drawing};
 use twofold_integrate::Statistics;
-use twofold_job::encode;
 use twofold_job::question::question_hash;
 use twofold_job::record::{FileError, Hash, PanelEntry, PictureEntry, VerdictEntry};
 use twofold_job::spec::RunSpec;
-use twofold_job::{Answer, AnyQuestion, Executor, JobError, Recording, Run, Stop, Table};
+use twofold_job::{Answer, AnyQuestion, JobError, Recording, Run, Stop, Table};
+use twofold_job::{Ask, encode};
 use twofold_render::{Pixels, RenderError, Rendered, render};
 
 /// A computed picture and its record.
@@ -166,7 +166,7 @@ pub fn questions<'a>(pictures: impl IntoIterator<Item = &'a Picture>) -> Vec<Any
 /// # Errors
 ///
 /// If a computation or the drawing failed.
-pub fn compute(picture: &Picture, executor: &Executor<'_>) -> Result<Computed, PipelineError> {
+pub fn compute(picture: &Picture, executor: &dyn Ask) -> Result<Computed, PipelineError> {
     compute_with_tables(picture, executor, &mut |_, _| Ok(()))
 }
 
@@ -182,7 +182,7 @@ pub type Keep<'a> = dyn FnMut(&str, &[u8]) -> Result<(), FileError> + 'a;
 /// As [`compute`], or what `keep` says.
 pub fn compute_with_tables(
     picture: &Picture,
-    executor: &Executor<'_>,
+    executor: &dyn Ask,
     keep: &mut Keep<'_>,
 ) -> Result<Computed, PipelineError> {
     let failed = |part: &str| {

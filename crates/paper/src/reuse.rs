@@ -20,7 +20,7 @@ use twofold_integrate::Monitor;
 use twofold_job::question::{key, question_hash};
 use twofold_job::record::{FileError, Hash, files};
 use twofold_job::store::Kept;
-use twofold_job::{Answer, Executor, JobError, Question, Store};
+use twofold_job::{Answer, Ask, JobError, Question, Store};
 
 /// The pictures that can be reused.
 #[derive(Debug)]
@@ -74,7 +74,7 @@ impl Question for Drawn<'_> {
         })
     }
 
-    fn compute(&self, executor: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
+    fn compute(&self, executor: &dyn Ask, _: &dyn Monitor) -> Result<Answer, JobError> {
         let made = compute(self.0, executor).map_err(|error| JobError::Other(error.to_string()))?;
         Ok(answer(&made.record))
     }
@@ -141,6 +141,7 @@ impl<'a> ReusablePictures<'a> {
 #[cfg(test)]
 mod tests {
     use std::fs;
+    use twofold_job::Executor;
 
     use super::*;
     use crate::pipeline::compute_with_tables;

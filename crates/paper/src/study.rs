@@ -5,7 +5,7 @@ use std::sync::Arc;
 use serde_json::Value;
 
 use twofold_integrate::Monitor;
-use twofold_job::{Answer, AnyQuestion, Executor, JobError, Question, Table};
+use twofold_job::{Answer, AnyQuestion, Ask, JobError, Question, Table};
 use twofold_render::Sheet;
 
 /// A picture that asks its own questions and draws the answers. Function pointers keep figures
@@ -49,7 +49,7 @@ impl Question for Computed {
         self.cost
     }
 
-    fn compute(&self, _: &Executor<'_>, _: &dyn Monitor) -> Result<Answer, JobError> {
+    fn compute(&self, _: &dyn Ask, _: &dyn Monitor) -> Result<Answer, JobError> {
         Ok(Answer::of_tables((self.compute)()?))
     }
 }
@@ -81,11 +81,7 @@ mod tests {
             self.0.json()
         }
 
-        fn compute(
-            &self,
-            executor: &Executor<'_>,
-            monitor: &dyn Monitor,
-        ) -> Result<Answer, JobError> {
+        fn compute(&self, executor: &dyn Ask, monitor: &dyn Monitor) -> Result<Answer, JobError> {
             self.0.compute(executor, monitor)
         }
     }

@@ -12,7 +12,7 @@ pub use super::claim::Claim as SectionClaim;
 use super::{Picture, Reading};
 use twofold_analyse::attractor::Evidence;
 use twofold_analyse::divider::Shared;
-use twofold_job::{AnyQuestion, Classification, Executor, JobError, PathComparison};
+use twofold_job::{AnyQuestion, Ask, Classification, JobError, PathComparison};
 use twofold_num::elementary::sqrt;
 use twofold_num::fit::mean;
 
@@ -147,7 +147,7 @@ pub fn questions(picture: &Picture, index: usize) -> Vec<AnyQuestion> {
 /// # Errors
 ///
 /// If a computation behind a verdict failed.
-pub fn judge(picture: &Picture, executor: &Executor<'_>) -> Result<Vec<PanelVerdict>, JobError> {
+pub fn judge(picture: &Picture, executor: &dyn Ask) -> Result<Vec<PanelVerdict>, JobError> {
     let mut verdicts = Vec::new();
     for (i, panel) in picture.panels.iter().enumerate() {
         let (Some(claim), Some(question)) = (panel.claim, question(picture, i)) else { continue };

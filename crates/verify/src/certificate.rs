@@ -5,19 +5,13 @@ use std::rc::Rc;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
+use super::check::{Bounds, Check, decimal, exactly, holds, need, range, tight};
 use super::inner::inner_law;
 use super::orbit::{Caricature, Crossing, FlowSettings};
 use super::rational::{Range, Rational};
 use super::recompute::{Known, PLANE, Patch, krawczyk};
 use super::strict::without_repeats;
 use super::{Refused, Verified};
-
-/// A failed check: what should hold.
-pub(super) type Check<T = ()> = Result<T, String>;
-
-pub(super) fn need(holds: bool, what: impl Into<String>) -> Check {
-    if holds { Ok(()) } else { Err(what.into()) }
-}
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -38,8 +32,6 @@ struct Parameters {
     v_plus: String,
     v_minus: String,
 }
-
-pub(super) type Bounds = [f64; 2];
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -351,20 +343,6 @@ fn data<T: DeserializeOwned>(text: &str) -> Result<T, Refused> {
         .map_err(|e| Refused::Unreadable(e.to_string()))
 }
 
-pub(super) fn exactly(x: f64) -> Check<Rational> {
-    Rational::exactly(x).ok_or_else(|| format!("{x} is a number"))
-}
-
-pub(super) fn decimal(text: &str) -> Check<Rational> {
-    Rational::decimal(text).ok_or_else(|| format!("{text:?} is a decimal number"))
-}
-
-pub(super) fn range([low, high]: Bounds) -> Check<Range> {
-    let range = Range { low: exactly(low)?, high: exactly(high)? };
-    need(range.low <= range.high, format!("the bounds {low:e}, {high:e} are in order"))?;
-    Ok(range)
-}
-
 fn ranges<const N: usize>(bounds: [Bounds; N]) -> Check<[Range; N]> {
     let found: Vec<Range> = bounds.into_iter().map(range).collect::<Check<_>>()?;
     found.try_into().map_err(|_| "the box is complete".to_owned())
@@ -399,22 +377,6 @@ fn equation(p: &Parameters, alpha: &str) -> Check<Caricature> {
         v_plus: is(&p.v_plus, "-1.2", "v+")?,
         v_minus: is(&p.v_minus, "-1.4", "v-")?,
     })
-}
-
-/// Whether a claimed enclosure holds what was computed here.
-pub(super) fn holds(claimed: &Range, ours: &Range, what: &str) -> Check {
-    need(
-        ours.within(claimed),
-        format!("{what}: the enclosure {claimed} holds what the checker computes, {ours}"),
-    )
-}
-
-/// Whether `claimed` holds `exact`, and is wider by rounding alone: some units in the last place of
-/// the numbers that it was made of.
-pub(super) fn tight(claimed: &Range, exact: &Range, scale: &Rational, what: &str) -> Check {
-    need(exact.within(claimed), format!("{what} holds what its parts give"))?;
-    let room = &(scale + &exact.magnitude()) * &Rational::tenth_to(14);
-    need(claimed.within(&exact.widened(&room)), format!("{what} is no wider than its parts give"))
 }
 
 /// What is claimed of a closed orbit.

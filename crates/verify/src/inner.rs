@@ -3,7 +3,7 @@
 
 use serde::Deserialize;
 
-use super::certificate::{Bounds, Check, decimal, holds, need, range, tight};
+use super::check::{Bounds, Check, decimal, holds, need, range, tight};
 use super::orbit::Inner;
 use super::rational::{Range, Rational};
 use super::recompute::Known;

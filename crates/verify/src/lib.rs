@@ -22,6 +22,7 @@
 
 mod ball;
 mod certificate;
+mod check;
 mod inner;
 mod orbit;
 mod rational;

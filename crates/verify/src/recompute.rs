@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use std::rc::Rc;
 
 use super::ball::{Ball, Fixed, Number};
-use super::certificate::{Check, need};
+use super::check::{Check, need};
 use super::orbit::{Caricature, Crossing, Flow, FlowSettings, Inner, Set};
 use super::rational::{Range, Rational};
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::cli::speak::{deliver, is_standard_output};
-use crate::cli::{CliError, Exit, general, print};
+use crate::cli::{CliError, Exit, models, print};
 use crate::hybrid;
 use crate::system::definition::State;
 use crate::system::library;
@@ -41,7 +41,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let text = match &arguments.from {
         None => TEMPLATE,
         Some(name) => library::text(name).or_else(|| library::general(name)).ok_or_else(|| {
-            let (near, known) = general::known(name);
+            let (near, known) = models::known(name);
             CliError::Usage(format!(
                 "--from {name}: there is no such built-in system{near}; built in are {known}"
             ))

@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use crate::cli::general;
+use crate::cli::models;
 use crate::cli::speak::{Delivery, deliver, try_delivery};
 use crate::cli::{CliError, Exit, ending};
 use crate::job::general::{Family, GeneralRests, RestPlace, Resting};
@@ -50,7 +50,7 @@ impl Arguments {
     /// # Errors
     /// If the system cannot be read, or a bound is wrong.
     pub fn question(&self) -> Result<GeneralRests, CliError> {
-        let model = general::any_model(&self.system, &self.set)?;
+        let model = models::any_model(&self.system, &self.set)?;
         let names = model.coordinates();
         let mut within = vec![(-10.0, 10.0); names.len()];
         for text in &self.within {

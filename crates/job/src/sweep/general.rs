@@ -11,9 +11,8 @@ use twofold_system::Expression;
 use super::outcome::place_of;
 use super::{Coordinate, Outcome};
 use crate::answer::Answer;
-use crate::executor::Executor;
 use crate::general::GeneralRun;
-use crate::question::{JobError, Question};
+use crate::question::{Ask, JobError, Question};
 use crate::table::{Column, Entry};
 
 /// A motion rests that stays where it is for this share of its run longer, within so much of the
@@ -67,7 +66,7 @@ impl Question for GeneralOutcome {
         self.0.cost()
     }
 
-    fn compute(&self, _: &Executor<'_>, monitor: &dyn Monitor) -> Result<Answer, JobError> {
+    fn compute(&self, _: &dyn Ask, monitor: &dyn Monitor) -> Result<Answer, JobError> {
         Ok(Answer::of_tables(Vec::new()).with_fact("ending", &self.ending(monitor)?))
     }
 }

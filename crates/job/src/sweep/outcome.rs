@@ -6,8 +6,7 @@ use serde_json::{Value, json};
 use super::far;
 use crate::answer::{Answer, Stop};
 use crate::classification::{Classification, SoFar};
-use crate::executor::Executor;
-use crate::question::{JobError, Question};
+use crate::question::{Ask, JobError, Question};
 use crate::rest::{self, Rest};
 use crate::run::Run;
 use crate::simulate::simulate_until;
@@ -175,7 +174,7 @@ impl Question for OutcomeQuestion {
         Run(self.0.run.clone()).cost() + self.0.cost()
     }
 
-    fn compute(&self, executor: &Executor<'_>, monitor: &dyn Monitor) -> Result<Answer, JobError> {
+    fn compute(&self, executor: &dyn Ask, monitor: &dyn Monitor) -> Result<Answer, JobError> {
         let answer = self.run(executor, monitor)?;
         Ok(Answer::of_tables(Vec::new())
             .with_fact("outcome", &self.judged(executor, &answer)?.outcome))
@@ -195,7 +194,7 @@ impl OutcomeQuestion {
     /// Whatever the computation met.
     pub(super) fn run(
         &self,
-        executor: &Executor<'_>,
+        executor: &dyn Ask,
         monitor: &dyn Monitor,
     ) -> Result<Answer, JobError> {
         let run = &self.0.run;
@@ -217,11 +216,7 @@ impl OutcomeQuestion {
     /// # Errors
     ///
     /// Whatever the computation met.
-    pub fn ending(
-        &self,
-        executor: &Executor<'_>,
-        monitor: &dyn Monitor,
-    ) -> Result<Ending, JobError> {
+    pub fn ending(&self, executor: &dyn Ask, monitor: &dyn Monitor) -> Result<Ending, JobError> {
         self.judged(executor, &self.run(executor, monitor)?)
     }
 
@@ -230,7 +225,7 @@ impl OutcomeQuestion {
     /// # Errors
     ///
     /// Whatever the computation met.
-    fn judged(&self, executor: &Executor<'_>, answer: &Answer) -> Result<Ending, JobError> {
+    fn judged(&self, executor: &dyn Ask, answer: &Answer) -> Result<Ending, JobError> {
         match self.so_far(executor, answer)? {
             SoFar::Judged(outcome) => Ok(outcome),
             SoFar::Awaits(exponent) => {
@@ -246,7 +241,7 @@ impl OutcomeQuestion {
     /// As [`OutcomeQuestion::judged`].
     pub(super) fn so_far(
         &self,
-        executor: &Executor<'_>,
+        executor: &dyn Ask,
         answer: &Answer,
     ) -> Result<SoFar<Ending>, JobError> {
         if answer.stop == Stop::Interrupted {
@@ -283,6 +278,7 @@ impl OutcomeQuestion {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Executor;
     use crate::cases;
     use crate::spec::Observation;
     use twofold_analyse::attractor::{Cycle, Rate};

@@ -14,8 +14,6 @@ use twofold_render::style;
 use twofold_system::System;
 use twofold_system::filippov::{Region, lie_derivatives};
 
-use super::surface;
-
 /// h of a system over some of its states, the others fixed or of no importance to h.
 pub struct Level<'a> {
     h: Program,
@@ -306,7 +304,13 @@ fn divided(corners: &[[f64; 3]], condition: impl Fn(&[f64; 3]) -> bool) -> Vec<V
 
 /// Colour of a patch: by region, or that of crossing where the region is not known.
 pub fn colour(region: Option<Region>) -> Colour {
-    region.map_or(style::CROSSING, surface::colour)
+    match region {
+        Some(Region::Attracting) => style::ATTRACTING,
+        Some(Region::Repelling) => style::REPELLING,
+        Some(Region::CrossingUp | Region::CrossingDown | Region::Boundary) | None => {
+            style::CROSSING
+        }
+    }
 }
 
 /// Cells along a line, a plane's side, a box's side. Odd, so that zeros at the middle of a range

@@ -2,22 +2,12 @@
 
 use nalgebra::{SVector, vector};
 
-use super::level::Level;
-use twofold_render::sheet::{Colour, Patch};
-use twofold_render::style;
+use super::level::{Level, colour};
+use twofold_render::sheet::Patch;
 use twofold_system::filippov::{
-    Region, TwoFold, Visibility, lie_derivatives, normal_form_constants, region, two_fold,
+    TwoFold, Visibility, lie_derivatives, normal_form_constants, region, two_fold,
 };
 use twofold_system::{Caricature, Compiled, PiecewiseSmooth, System, Wheel};
-
-/// The colour of a region.
-pub fn colour(region: Region) -> Colour {
-    match region {
-        Region::Attracting => style::ATTRACTING,
-        Region::Repelling => style::REPELLING,
-        Region::CrossingUp | Region::CrossingDown | Region::Boundary => style::CROSSING,
-    }
-}
 
 /// The patches of h = 0 inside the box `ranges` (one (low, high) per coordinate), in the state's
 /// order of coordinates.
@@ -137,13 +127,13 @@ fn divide<P: PiecewiseSmooth<3>>(
     patches: &mut Vec<Patch>,
 ) {
     let middle = (0.5 * (u.0 + u.1), 0.5 * (v.0 + v.1));
-    let here = colour(region(system, &point(middle.0, middle.1)));
+    let here = colour(Some(region(system, &point(middle.0, middle.1))));
     // Looked at just inside the corners: an edge along a side (the caricature's axes) divides
     // nothing.
     let inside = |s: f64, r: (f64, f64)| r.0 + s * (r.1 - r.0);
     let uniform = [(0.02, 0.02), (0.98, 0.02), (0.98, 0.98), (0.02, 0.98)]
         .iter()
-        .all(|(s, t)| colour(region(system, &point(inside(*s, u), inside(*t, v)))) == here);
+        .all(|(s, t)| colour(Some(region(system, &point(inside(*s, u), inside(*t, v))))) == here);
     if uniform || halvings == 0 {
         let corners = [(u.0, v.0), (u.1, v.0), (u.1, v.1), (u.0, v.1)]
             .map(|(s, t)| point(s, t).into())

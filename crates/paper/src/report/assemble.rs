@@ -154,12 +154,6 @@ fn preview(pixels: &Pixels, how: Shrink) -> Option<Preview> {
     Some(Preview { png, size: [small.width, small.height] })
 }
 
-/// Whether a figure is one of the paper's; ours have names, not numbers, and come after them.
-pub(super) fn of_the_paper(id: &str) -> bool {
-    id.strip_prefix("fig")
-        .is_some_and(|number| !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit()))
-}
-
 /// A name cut into words and numbers, so that fig10 comes after fig9.
 fn natural(name: &str) -> Vec<Piece> {
     let mut pieces: Vec<Piece> = Vec::new();

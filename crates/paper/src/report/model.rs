@@ -433,3 +433,9 @@ pub(super) fn indented<T: Serialize>(value: &T) -> Vec<u8> {
     bytes.push(b'\n');
     bytes
 }
+
+/// Whether a figure is one of the paper's; ours have names, not numbers, and come after them.
+pub(super) fn of_the_paper(id: &str) -> bool {
+    id.strip_prefix("fig")
+        .is_some_and(|number| !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit()))
+}

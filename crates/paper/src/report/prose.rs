@@ -5,13 +5,13 @@
 use std::fmt::Write as _;
 
 use super::html::escape;
-use super::model::{Report, VerdictReport};
+use super::model::{Report, VerdictReport, of_the_paper};
 use crate::Reading;
 
 /// What this folder's verdicts say, a paragraph for each reading, as HTML.
 pub fn of_this_folder(report: &Report) -> Vec<String> {
     let pictures = || {
-        let figures = report.figures.iter().filter(|f| super::assemble::of_the_paper(&f.id));
+        let figures = report.figures.iter().filter(|f| of_the_paper(&f.id));
         figures.flat_map(|f| &f.pictures).filter(|p| p.alterations.is_empty())
     };
     let mut paragraphs = Vec::new();

@@ -1,0 +1,96 @@
+//! Systems by name or file, as general ones.
+
+use std::path::Path;
+
+use super::CliError;
+use crate::hybrid::definition::is_general;
+use crate::hybrid::model::ModelError;
+use crate::hybrid::{Definition, Model};
+use crate::record::files::read_text;
+use crate::system::diagnostic::nearest;
+use crate::system::library;
+
+/// The system of this name, a general one or one with h, plus and minus read as such.
+///
+/// # Errors
+/// If there is none, or it cannot be understood.
+pub fn any_model(name: &str, set: &[String]) -> Result<Model, CliError> {
+    named(name, set, true)?.ok_or_else(|| {
+        let (near, _) = known(name);
+        CliError::Usage(format!(
+            "--system {name}: there is no such built-in system{near}; give a file's name \
+            for your own"
+        ))
+    })
+}
+
+/// The names of all built-in systems, after advice if one of them is like `name`.
+pub fn known(name: &str) -> (String, String) {
+    let known: Vec<&str> = library::names().chain(library::general_names()).collect();
+    let near =
+        nearest(name, &known).map_or(String::new(), |near| format!(", did you mean {near}?"));
+    (near, known.join(", "))
+}
+
+/// The general system of this name with parameters `set`, or with `any` also one with h, plus and minus, if there is one.
+///
+/// # Errors
+/// If its file cannot be read or understood, or a value is wrong.
+pub fn named(name: &str, set: &[String], any: bool) -> Result<Option<Model>, CliError> {
+    let path = Path::new(name);
+    let built_in = library::general(name).or_else(|| library::text(name).filter(|_| any));
+    let (definition, folder) = match built_in {
+        Some(text) => (Definition::from_toml(text, name), None),
+        None => {
+            if library::text(name).is_some() || !path.is_file() {
+                return Ok(None);
+            }
+            let text = read_text(path)?;
+            let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+            if !any && !is_general(&text, json) {
+                return Ok(None);
+            }
+            let read = if json {
+                Definition::from_json(&text, name)
+            } else {
+                Definition::from_toml(&text, name)
+            };
+            (read, path.parent())
+        }
+    };
+    let wrong = |problem: String| CliError::Usage(format!("--system {name}: {problem}"));
+    let mut model = Model::new(definition.map_err(|e| wrong(e.to_string()))?);
+    for (table, entry) in model.definition().tables().to_vec() {
+        let text = match folder {
+            Some(folder) => read_text(&folder.join(&entry.file))?,
+            None => library::table(&entry.file).unwrap_or_default().to_owned(),
+        };
+        model = model.with_table(&table, &text).map_err(|e| wrong(e.to_string()))?;
+    }
+    for text in set {
+        let refused = |problem: String| CliError::Usage(format!("--set \"{text}\": {problem}"));
+        let Some((parameter, value)) = text.split_once('=') else {
+            return Err(refused(
+                "there is no \"=\"; give it as NAME=VALUE, such as alpha=0.2".into(),
+            ));
+        };
+        let value: f64 = value.trim().parse().map_err(|_| {
+            refused(format!(
+                "`{}` is not a decimal number; write it like 0.25, -3 or 1e-5",
+                value.trim()
+            ))
+        })?;
+        model = model.with(parameter.trim(), value).map_err(|e| refused(e.to_string()))?;
+    }
+    model.values().map_err(|error| {
+        let named = |text: &&String| match (&error, text.split_once('=')) {
+            (ModelError::Value(name, ..), Some((parameter, _))) => parameter.trim() == name,
+            _ => false,
+        };
+        match set.iter().rfind(named) {
+            Some(text) => CliError::Usage(format!("--set \"{text}\": {error}")),
+            None => wrong(error.to_string()),
+        }
+    })?;
+    Ok(Some(model))
+}
