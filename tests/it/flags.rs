@@ -134,6 +134,11 @@ const TABLE: &[(&str, &str, &[&str])] = &[
     ),
     (
         "",
+        "sweep --system impact-oscillator --over params.w=2,2.1 --t-end 5",
+        &["--period 2", "--section x=0.1"],
+    ),
+    (
+        "",
         "scan --system stick-slip --section x=0.5 --over params.belt=0.3,0.4 --t-end 20 --out \
             d.csv",
         &[
