@@ -34,6 +34,8 @@ pub(super) struct Tangents {
     pub reset: Option<(Vec<f64>, Vec<f64>)>,
     /// The least and the largest value of each state at the ends of steps.
     pub bounds: Vec<[f64; 2]>,
+    /// The size of each state in the last step.
+    pub sizes: Vec<f64>,
 }
 
 /// What stands before something is met.
@@ -54,6 +56,7 @@ impl Follower<'_> {
         for (bounds, ends) in tangents.bounds.iter_mut().zip(step.x.iter().zip(&step.y)) {
             *bounds = [bounds[0].min(*ends.0).min(*ends.1), bounds[1].max(*ends.0).max(*ends.1)];
         }
+        tangents.sizes = step.x.iter().zip(&step.y).map(|(a, b)| a.abs().max(b.abs())).collect();
         for y in &mut tangents.vectors {
             let mut k: Vec<Vec<f64>> = Vec::with_capacity(7);
             let mut end = Vec::new();
@@ -317,14 +320,12 @@ impl Follower<'_> {
             return false;
         }
         let n = self.n;
-        let size: f64 = gradient
-            .iter()
-            .zip(&self.size)
-            .zip(x)
-            .map(|((g, s), x)| g.abs() * s.max(x.abs()))
-            .sum();
-        let shares =
-            field.iter().zip(&self.size).zip(x).map(|((f, s), x)| f.abs() / s.max(x.abs()));
+        // Nothing was followed yet: nothing is known of the state's size.
+        let Some(sizes) = self.tangents.as_ref().map(|t| &t.sizes).filter(|s| s.len() == n) else {
+            return false;
+        };
+        let size: f64 = gradient.iter().zip(sizes).map(|(g, s)| g.abs() * s).sum();
+        let shares = field.iter().zip(sizes).map(|(f, s)| f.abs() / s);
         let ahead = 1e-6 / shares.filter(|s| s.is_finite()).fold(f64::MIN_POSITIVE, f64::max);
         let mut there = self.variables.clone();
         (0..n).for_each(|i| there[i] = x[i] + ahead * field[i]);
