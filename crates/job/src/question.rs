@@ -43,7 +43,7 @@ pub trait Ask: Sync {
 ///
 /// Two equal questions have equal answers, to the last bit, on any machine. A question computes on
 /// the thread that asks it and starts no others: parallel is only what is asked side by side
-/// ([`Executor::gather`]).
+/// ([`Ask::gather`]).
 pub trait Question: fmt::Debug + Send + Sync {
     /// The kind of computation: "run".
     fn kind(&self) -> &'static str;
@@ -73,7 +73,7 @@ pub trait Question: fmt::Debug + Send + Sync {
     }
 
     /// Questions that computing this one will ask, as far as they are known beforehand.
-    /// [`Executor::gather`] has them answered first, so that no thread waits for another; nothing
+    /// [`Ask::gather`] has them answered first, so that no thread waits for another; nothing
     /// else depends on it.
     fn rests_on(&self) -> Vec<AnyQuestion> {
         Vec::new()
