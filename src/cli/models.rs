@@ -32,7 +32,8 @@ pub fn known(name: &str) -> (String, String) {
     (near, known.join(", "))
 }
 
-/// The general system of this name with parameters `set`, or with `any` also one with h, plus and minus, if there is one.
+/// The general system of this name with parameters `set`, or with `any` also one with h, plus and
+/// minus, if there is one.
 ///
 /// # Errors
 /// If its file cannot be read or understood, or a value is wrong.

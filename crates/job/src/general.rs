@@ -19,6 +19,26 @@ use super::question::{Ask, JobError, Question};
 use super::table::{Column, Entry, Table};
 
 /// A run of a general system.
+///
+/// ```
+/// use twofold_hybrid::{Definition, Model, Options};
+/// use twofold_job::{Executor, general::GeneralRun};
+/// let text = "
+///     states = ['x', 'v']
+///     start = [1, 0]
+///     f = ['v', '-9.81']
+///     [[event]]
+///     name = 'impact'
+///     when = 'x'
+///     direction = 'down'
+///     set = { v = '-0.8*v' }
+/// ";
+/// let model = Model::new(Definition::from_toml(text, "ball.toml")?);
+/// let options = Options { t_end: 2.0, ..Options::default() };
+/// let answer = Executor::quiet().ask(&GeneralRun { model, options })?;
+/// assert!(answer.tables[0].words("event").any(|event| event == "impact"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct GeneralRun {
     /// The system.

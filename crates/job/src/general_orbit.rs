@@ -54,8 +54,10 @@ impl Question for GeneralOrbit {
         self.settle
     }
 
-    /// Facts: `states` (their names), `point`, `period`, `multipliers` (real and imaginary parts, the largest first) and `gap` (how far the orbit is from closed,
-    /// relative to its largest state). Of a branch also the tables `branch` and `bifurcations` and the fact `end`, as of [`ClosedOrbit`](super::ClosedOrbit).
+    /// Facts: `states` (their names), `point`, `period`, `multipliers` (real and imaginary parts,
+    /// the largest first) and `gap` (how far the orbit is from closed, relative to its largest
+    /// state). Of a branch also the tables `branch` and `bifurcations` and the fact `end`, as of
+    /// [`ClosedOrbit`](super::ClosedOrbit).
     fn compute(&self, _: &dyn Ask, monitor: &dyn Monitor) -> Result<Answer, JobError> {
         let model = match &self.along {
             Some(along) => at(&self.run.model, along, along.from)?,
