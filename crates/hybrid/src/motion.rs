@@ -17,7 +17,7 @@ pub mod tangent;
 
 use clock::Clock;
 use search::active_value;
-use sliding::determinant_of_negative;
+pub(crate) use sliding::determinant_of_negative;
 
 use std::rc::Rc;
 

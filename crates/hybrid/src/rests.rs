@@ -15,6 +15,7 @@ use twofold_num::linear::{eigenvalues, solve_any};
 use crate::definition::{Direction, Event, When};
 use crate::equation::{Configuration, Equation, EquationError};
 use crate::model::Model;
+use crate::motion::determinant_of_negative;
 
 /// A switching surface on which a rest lies.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,6 +33,8 @@ pub struct Family {
     pub dimension: usize,
     /// The two ends of a curve, in the box; nothing if it closes or its dimension is not 1.
     pub ends: Option<[Vec<f64>; 2]>,
+    /// Whether stability is another in different parts of a curve.
+    pub changes: bool,
     /// Points of the curve, in order.
     points: Vec<Vec<f64>>,
 }
@@ -65,8 +68,11 @@ pub struct Rest {
 
 impl Rest {
     /// "stable node", "saddle", ... from the eigenvalues; on a surface that repels everything is
-    /// unstable. Of a curve of rests, what they are all along it is not asked.
+    /// unstable. Of a curve of rests what they are all along it, of a larger set what this one is.
     pub fn kind(&self) -> String {
+        if self.family.as_ref().is_some_and(|f| f.changes) {
+            return "stability changes along the curve".into();
+        }
         if let Some(surface) = &self.boundary {
             return format!(
                 "boundary equilibrium: the equations change on {surface} = 0, and one side does \
@@ -122,9 +128,9 @@ pub enum RestError {
     Box(String),
 }
 
-/// Starts of Newton's method: for each set of surfaces of one size, as many as there are places for
-/// all of them together, but so many at least.
+/// Starts of Newton's method in a field and on each surface.
 const STARTS: usize = 400;
+/// Sets of several surfaces share as many; each has so many at least.
 const LEAST_STARTS: usize = 20;
 const MOST_ITERATIONS: usize = 60;
 /// Surfaces on which a rest can lie at once.
@@ -184,7 +190,10 @@ pub fn rests(model: &Model, within: &[(f64, f64)]) -> Result<Vec<Rest>, RestErro
             if sets.len() > MOST_SETS {
                 break;
             }
-            let starts = (STARTS / sets.len().max(1)).max(LEAST_STARTS);
+            let starts = match together {
+                0 | 1 => STARTS,
+                _ => (STARTS / sets.len().max(1)).max(LEAST_STARTS),
+            };
             for on in &sets {
                 for (x, config) in places.iter().zip(&configs).take(starts) {
                     search.add(config, on, x, &mut found);
@@ -305,7 +314,7 @@ impl Search<'_> {
     fn add(&self, config: &Configuration, on: &[usize], start: &[f64], found: &mut Vec<Rest>) {
         let middle = vec![0.5; on.len()];
         let Some(mut zero) = self.settle(config, on, start, &middle, DEPENDENT) else { return };
-        if !self.is_valid(config, on, &zero) || self.is_known(config, on, &zero.x, found) {
+        if !self.is_valid(config, on, &zero) || self.is_known(config, on, &zero.x, 0, found) {
             return;
         }
         let continues = |zero: &Zero, direction: &[f64]| {
@@ -328,7 +337,7 @@ impl Search<'_> {
             isolated.filter(|z| self.is_valid(config, on, z)).and_then(|z| self.rest(config, on, z))
         };
         if let Some(rest) = rest
-            && !self.is_known(config, on, &rest.x, found)
+            && !self.is_known(config, on, &rest.x, dimension, found)
         {
             found.push(rest);
         }
@@ -341,13 +350,22 @@ impl Search<'_> {
         mixes && self.is_inside(&zero.x) && self.is_its_own(config, &zero.x, on)
     }
 
-    fn is_known(&self, config: &Configuration, on: &[usize], x: &[f64], found: &[Rest]) -> bool {
+    /// Whether a rest is listed, or the set to which it belongs. Sets of more dimensions than one
+    /// are not told apart: one is listed for each set of surfaces.
+    fn is_known(
+        &self,
+        config: &Configuration,
+        on: &[usize],
+        x: &[f64],
+        dimension: usize,
+        found: &[Rest],
+    ) -> bool {
         let names: Vec<String> =
             on.iter().map(|g| self.equation.guards[*g].expression.to_string()).collect();
         found.iter().any(|r| {
             let same = r.mode == config.mode && r.on.iter().map(|on| &on.surface).eq(names.iter());
             same && match &r.family {
-                Some(Family { dimension, .. }) if *dimension > 1 => true,
+                Some(family) if family.dimension > 1 => dimension > 1,
                 Some(_) => self.passes(r, x),
                 None => self.near(&r.x, x),
             }
@@ -654,7 +672,8 @@ impl Search<'_> {
     ) -> Option<Rest> {
         if dimension > 1 {
             let mut rest = self.rest(config, on, zero)?;
-            rest.family = Some(Family { dimension, ends: None, points: Vec::new() });
+            rest.family =
+                Some(Family { dimension, ends: None, changes: false, points: Vec::new() });
             return Some(rest);
         }
         let first = zero.open.first()?.clone();
@@ -711,9 +730,17 @@ impl Search<'_> {
                 [a, b]
             }
         });
-        let there = self.settle(config, on, &middle, &zero.weights, DEPENDENT)?;
-        let mut rest = self.rest(config, on, there)?;
-        rest.family = Some(Family { dimension, ends, points });
+        // At an end the equations change.
+        let inner = points.get(1..points.len().saturating_sub(1)).unwrap_or_default();
+        let family = Family { dimension, ends, changes: false, points: Vec::new() };
+        let at = |x: &Vec<f64>| {
+            let there = self.settle(config, on, x, &zero.weights, DEPENDENT)?;
+            Some(Rest { family: Some(family.clone()), ..self.rest(config, on, there)? })
+        };
+        let mut rest = at(&middle)?;
+        let kind = rest.kind();
+        let changes = inner.iter().filter_map(&at).any(|other| other.kind() != kind);
+        rest.family = Some(Family { changes, points, ..family });
         Some(rest)
     }
 }
@@ -807,8 +834,8 @@ fn least_step(mut rows: Vec<(Vec<f64>, f64, f64)>, dependent: f64) -> Option<Ste
 fn attracts(w: &[f64], k: usize) -> Option<bool> {
     let minor = |rows: &[usize]| {
         let matrix: Vec<f64> =
-            rows.iter().flat_map(|i| rows.iter().map(move |j| -w[i * k + j])).collect();
-        determinant(matrix, rows.len())
+            rows.iter().flat_map(|i| rows.iter().map(move |j| w[i * k + j])).collect();
+        determinant_of_negative(matrix, rows.len())
     };
     let all: Vec<usize> = (0..k).collect();
     if minor(&all) < 0.0 {
@@ -825,39 +852,13 @@ fn attracts(w: &[f64], k: usize) -> Option<bool> {
         };
     }
     // W + W^T is negative definite: so is that of D^1/2 W D^1/2, which has the eigenvalues of D W.
-    let symmetric: Vec<f64> = (0..k * k).map(|p| -0.5 * (w[p] + w[p % k * k + p / k])).collect();
+    let symmetric: Vec<f64> = (0..k * k).map(|p| 0.5 * (w[p] + w[p % k * k + p / k])).collect();
     let leading = |m: usize| {
         let part: Vec<f64> = (0..m)
             .flat_map(|i| (0..m).map(move |j| (i, j)))
             .map(|(i, j)| symmetric[i * k + j])
             .collect();
-        determinant(part, m)
+        determinant_of_negative(part, m)
     };
     (1..=k).all(|m| leading(m) > 0.0).then_some(true)
-}
-
-/// The determinant of a matrix, row by row, by elimination.
-fn determinant(mut a: Vec<f64>, n: usize) -> f64 {
-    let mut product = 1.0;
-    for k in 0..n {
-        let Some(pivot) = (k..n).max_by(|i, j| a[i * n + k].abs().total_cmp(&a[j * n + k].abs()))
-        else {
-            break;
-        };
-        if pivot != k {
-            (0..n).for_each(|j| a.swap(k * n + j, pivot * n + j));
-            product = -product;
-        }
-        product *= a[k * n + k];
-        if product == 0.0 {
-            return 0.0;
-        }
-        for i in k + 1..n {
-            let factor = a[i * n + k] / a[k * n + k];
-            for j in k..n {
-                a[i * n + j] -= factor * a[k * n + j];
-            }
-        }
-    }
-    product
 }

@@ -1333,6 +1333,15 @@ fn rests_on_curves_and_on_several_surfaces() {
     near(from[0] + from[1], 1.0, 1e-9);
     assert_eq!(set.kind(), "unstable: neighbours leave the set");
     assert_eq!(line.len(), 2);
+    // On y = 0 the rate across is x: it repels right of zero and attracts left of it.
+    let turning = find("states = ['x', 'y']\nf = ['y', 'x*y']", 3.0, 2);
+    assert_eq!(turning[0].kind(), "stability changes along the curve");
+    // A plane of rests in x < 0, and an isolated one of the same field behind it is not lost.
+    let both = "states = ['x', 'y']\nf = ['max(x, 0) * (x - 1)', 'max(x, 0) * (y - 1)']";
+    let found = find(both, 3.0, 2);
+    let dimensions: Vec<_> =
+        found.iter().map(|r| r.family.as_ref().map_or(0, |f| f.dimension)).collect();
+    assert!(dimensions.contains(&2) && dimensions.contains(&0), "{dimensions:?}");
     // A circle of rests closes.
     let ring = find("states = ['x', 'y']\nf = ['x*(1 - x^2 - y^2)', 'y*(1 - x^2 - y^2)']", 3.0, 2);
     let closed = ring.iter().find_map(|r| r.family.clone()).unwrap();

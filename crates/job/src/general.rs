@@ -484,6 +484,8 @@ pub struct Family {
     pub dimension: usize,
     /// Both ends of a curve that has some.
     pub ends: Option<[Vec<f64>; 2]>,
+    /// Whether stability is another in different parts of a curve.
+    pub changes: bool,
 }
 
 /// Where a motion rests.
@@ -548,10 +550,11 @@ impl Question for GeneralRests {
                         attracting: rest.attracting,
                     },
                 },
-                family: rest
-                    .family
-                    .as_ref()
-                    .map(|f| Family { dimension: f.dimension, ends: f.ends.clone() }),
+                family: rest.family.as_ref().map(|f| Family {
+                    dimension: f.dimension,
+                    ends: f.ends.clone(),
+                    changes: f.changes,
+                }),
                 eigenvalues: rest.eigenvalues.clone(),
                 kind: rest.kind(),
                 behind: rest.behind.clone(),

@@ -101,30 +101,31 @@ fn line(rest: &Resting, names: &[&str], with_mode: bool) -> String {
     let point = |state: &[f64]| -> String {
         names.iter().zip(state).map(|(n, v)| format!("{n} = {v}")).collect::<Vec<_>>().join(", ")
     };
+    let changes = rest.family.as_ref().is_some_and(|f| f.changes);
+    let on = |surfaces: &str, moves: &str| {
+        format!("pseudo-equilibrium on {surfaces} = 0{}", if changes { "" } else { moves })
+    };
     let mode = if with_mode { format!(", mode {}", rest.mode) } else { String::new() };
-    let place = match &rest.place {
-        RestPlace::Field => "equilibrium".to_owned(),
+    // Weights are those at the point that is named.
+    let (place, weights) = match &rest.place {
+        RestPlace::Field => ("equilibrium".to_owned(), String::new()),
         RestPlace::Surface { surface, weight, attracting } => {
-            let moves = if *attracting { "attracts" } else { "repels" };
-            format!("pseudo-equilibrium on {surface} = 0, which {moves} (weight {weight})")
+            let moves = if *attracting { ", which attracts" } else { ", which repels" };
+            (on(surface, moves), format!(" (weight {weight})"))
         }
         RestPlace::Intersection { surfaces, weights, attracting } => {
             let moves = match attracting {
-                Some(true) => "which attract",
-                Some(false) => "which repel",
-                None => "whose speeds decide whether they attract",
+                Some(true) => ", which attract",
+                Some(false) => ", which repel",
+                None => ", whose speeds decide whether they attract",
             };
             let weights: Vec<String> = weights.iter().map(f64::to_string).collect();
-            format!(
-                "pseudo-equilibrium on {} = 0, {moves} (weights {})",
-                surfaces.join(" = 0 and "),
-                weights.join(", ")
-            )
+            (on(&surfaces.join(" = 0 and "), moves), format!(" (weights {})", weights.join(", ")))
         }
     };
     let state = match &rest.family {
         None => point(&rest.state),
-        Some(Family { dimension: 1, ends: Some([from, to]) }) => {
+        Some(Family { dimension: 1, ends: Some([from, to]), .. }) => {
             format!(
                 "every point of a curve from {} to {}, such as {}",
                 point(from),
@@ -132,7 +133,7 @@ fn line(rest: &Resting, names: &[&str], with_mode: bool) -> String {
                 point(&rest.state)
             )
         }
-        Some(Family { dimension: 1, ends: None }) => {
+        Some(Family { dimension: 1, ends: None, .. }) => {
             format!("every point of a closed curve, such as {}", point(&rest.state))
         }
         Some(Family { dimension, .. }) => {
@@ -157,5 +158,6 @@ fn line(rest: &Resting, names: &[&str], with_mode: bool) -> String {
         .behind
         .as_ref()
         .map(|event| format!("; behind the event {event:?}, which changes motion before"));
-    format!("{place}{mode}: {state}; {}{values}{}", rest.kind, behind.unwrap_or_default())
+    let behind = behind.unwrap_or_default();
+    format!("{place}{mode}: {state}{weights}; {}{values}{behind}", rest.kind)
 }

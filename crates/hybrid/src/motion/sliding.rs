@@ -394,7 +394,7 @@ fn sum(terms: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// The determinant of -a, of k rows, by elimination with pivots.
-pub(super) fn determinant_of_negative(mut a: Vec<f64>, k: usize) -> f64 {
+pub(crate) fn determinant_of_negative(mut a: Vec<f64>, k: usize) -> f64 {
     let mut product = 1.0;
     for column in 0..k {
         let size = |i: &usize| a[*i * k + column].abs();
