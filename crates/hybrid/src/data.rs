@@ -14,7 +14,7 @@ pub struct Table {
     pub pieces: Vec<[f64; 4]>,
 }
 
-/// What is wrong with a table's data.
+/// An error in a table's data.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{0}")]
 pub struct BadTable(String);

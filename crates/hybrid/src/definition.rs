@@ -98,7 +98,7 @@ pub enum ParameterEntry {
     Table {
         /// Its value.
         value: Constant,
-        /// What it is, in words.
+        /// Its meaning, in words.
         #[serde(default)]
         meaning: String,
         /// Its unit.
@@ -126,7 +126,7 @@ pub enum Direction {
     Both,
 }
 
-/// What happens where impacts accumulate.
+/// Motion after infinitely many impacts in finite time (Zeno).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum AfterZeno {
@@ -134,7 +134,7 @@ pub enum AfterZeno {
     Stick,
 }
 
-/// How a table is read between its rows.
+/// Interpolation of a table between its rows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Interpolation {
@@ -180,7 +180,7 @@ pub struct EventEntry {
     /// Fires at this time, or at these, the run's start included.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub at: Option<Constants>,
-    /// What happens where it fires infinitely often in finite time: "stick", or the run ends there.
+    /// Motion after it fires infinitely often in finite time: "stick", or else the run ends there.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub after_zeno: Option<AfterZeno>,
 }
@@ -203,8 +203,8 @@ pub struct TableEntry {
     pub time: String,
     /// The name of its column of values.
     pub column: String,
-    /// How it is read between its rows: `previous` value, `linear` (the default), `cubic` spline,
-    /// or `pchip`, which overshoots nowhere.
+    /// Interpolation between its rows: `previous` value, `linear` (the default), `cubic` spline, or
+    /// `pchip`, which overshoots nowhere.
     #[serde(default)]
     pub interpolation: Interpolation,
 }
@@ -219,15 +219,15 @@ pub struct Document {
     /// One line for headings of pictures.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub title: String,
-    /// What the system describes, in sentences.
+    /// Description of the system, in sentences.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub about: String,
-    /// Where the system comes from, a string each.
+    /// Sources of the system, a string each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub references: Vec<String>,
     /// The states, in order: a name, or a table.
     pub states: Vec<StateEntry>,
-    /// Where runs begin: a number or expression for each state.
+    /// Start of runs: a number or expression for each state.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start: Option<Vec<Constant>>,
     /// The two or three states that pictures show.
@@ -288,7 +288,7 @@ pub struct Mode {
 /// When an event fires.
 #[derive(Clone, Debug, PartialEq)]
 pub enum When {
-    /// Where an expression passes zero in a direction.
+    /// An expression passes zero in a direction.
     Zero(Expression, Direction),
     /// When a condition becomes true.
     Becomes(Expression),
@@ -371,7 +371,7 @@ fn item(place: &Place, i: usize) -> Place {
     place
 }
 
-/// What is wrong with a document, and where.
+/// An error in a document, with its place.
 pub(crate) struct Problem {
     place: Place,
     within: Option<(String, Range<usize>)>,
@@ -482,7 +482,7 @@ impl Definition {
         if self.document.title.is_empty() { self.name() } else { &self.document.title }
     }
 
-    /// What the file says, as data.
+    /// The file's content, as data.
     pub fn document(&self) -> &Document {
         &self.document
     }

@@ -57,7 +57,7 @@ pub struct Compiled {
     pub outputs: usize,
     /// The place of each guard among the active ones.
     place: Vec<Option<usize>>,
-    /// Which variables each value depends on: derivatives, then watched values.
+    /// Bit sets of the variables that each value depends on: derivatives, then watched values.
     depends: Vec<Vec<u64>>,
     /// The states and the time that each watched value depends on, and for each of those variables
     /// a colour: no value depends on two of one colour, so that one derivative a colour gives all
@@ -68,7 +68,8 @@ pub struct Compiled {
     pub(crate) affine: Vec<Option<Affine>>,
     /// Whether there are others.
     pub(crate) is_curved: bool,
-    /// What can be flat where a step looks and steep elsewhere, and the program of its arguments.
+    /// Functions that can be flat where a step evaluates them and steep elsewhere, and the program
+    /// of their arguments.
     pub(crate) gates: Vec<Gate>,
     pub(crate) gate_arguments: Program,
     /// The same of the watched values.
@@ -94,7 +95,7 @@ pub struct Equation {
     known: std::cell::RefCell<HashMap<Vec<i8>, Rc<Compiled>>>,
 }
 
-/// What an equation has that cannot be followed.
+/// Why an equation cannot be followed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum EquationError {
     /// Wrong parameters or data.
@@ -709,7 +710,7 @@ impl Affine {
 /// The values of a tape that are sums of variables with constant factors.
 fn affine(tape: &Tape) -> Vec<Option<Affine>> {
     use twofold_num::tape::Operation::{Add, Div, Mul, Neg, Sub, Variable};
-    // What depends on no variable is a number, whatever the variables are.
+    // A value that depends on no variable is a number even if all variables are not-a-number.
     let fixed = tape.values(&vec![f64::NAN; tape.variables()]);
     let number = |constant: f64| Affine { constant, factors: Vec::new() };
     let mut of: Vec<Option<Affine>> = Vec::with_capacity(tape.operations().len());

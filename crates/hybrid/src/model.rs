@@ -85,7 +85,7 @@ impl Model {
         Ok(Self { definition, given: BTreeMap::new(), tables: self.tables.clone() })
     }
 
-    /// What the system is.
+    /// The system's definition.
     pub fn definition(&self) -> &Definition {
         &self.definition
     }
@@ -149,9 +149,9 @@ impl Model {
         crate::Equation::new(self, None).is_ok_and(|equation| equation.depends_on_time())
     }
 
-    /// What decides the system's numbers, as data: what the file says, with these values, the
-    /// tables' points, and where names are not in the order of the alphabet their order: motion
-    /// begins in the first mode.
+    /// The data that determine the system's numbers: the file's content with these values, the
+    /// tables' points, and the order of names where it is not alphabetical, since motion begins in
+    /// the first mode.
     pub fn json(&self) -> Value {
         let d = &self.definition.document;
         let mut document = serde_json::to_value(d).unwrap_or_default();

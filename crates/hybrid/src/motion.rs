@@ -36,7 +36,7 @@ use crate::selection::{
 };
 use crate::step::Step;
 
-/// What is recorded.
+/// Data recorded during a run.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Record {
     /// The path, by points that a polyline through leaves by at most this distance.
@@ -49,11 +49,11 @@ pub enum Record {
         /// The time.
         every: f64,
     },
-    /// Where an expression is zero.
+    /// The state at each zero of an expression.
     Section(Expression),
 }
 
-/// Which side motion takes where it is not decided.
+/// Side taken where the motion is not unique.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Exit {
     /// The run ends with an error.
@@ -64,7 +64,7 @@ pub enum Exit {
     Minus,
 }
 
-/// How steps are made.
+/// Integration method.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Method {
     /// Dormand & Prince, explicit.
@@ -94,12 +94,12 @@ impl Method {
     }
 }
 
-/// How a system is followed.
+/// Options for the integration of a system.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
-    /// Where the time begins.
+    /// Start time.
     pub t_start: f64,
-    /// Where it ends.
+    /// End time.
     pub t_end: f64,
     /// The initial state; without one the file's.
     pub start: Option<Vec<f64>>,
@@ -113,13 +113,13 @@ pub struct Options {
     pub max_step: f64,
     /// The most steps.
     pub max_steps: u64,
-    /// What is recorded.
+    /// Data to record.
     pub record: Record,
-    /// What is done where motion is not decided.
+    /// Side taken where the motion is not unique.
     pub exit: Exit,
-    /// How steps are made.
+    /// Integration method.
     pub method: Method,
-    /// What is done where several mixtures stay on several surfaces.
+    /// Mixture taken if several mixtures of the fields stay on several surfaces.
     pub intersection: Intersection,
 }
 
@@ -160,14 +160,14 @@ pub struct Point<'a> {
     pub direction: Option<f64>,
 }
 
-/// How a run came to its end.
+/// Reason for the end of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Ending {
     /// At its end time.
     Finished,
     /// By an event that says stop.
     Stopped(String),
-    /// Where an event accumulates: the event, the time and a bound on its error.
+    /// At the accumulation (Zeno) of an event: the event, the time and a bound on its error.
     Zeno {
         /// The event's name.
         event: String,
@@ -224,7 +224,7 @@ pub enum HybridError {
     Undecided {
         /// When.
         t: f64,
-        /// Where.
+        /// The state.
         x: Vec<f64>,
         /// The switching functions that are zero there.
         surfaces: String,
@@ -236,9 +236,9 @@ pub enum HybridError {
     Stuck {
         /// When.
         t: f64,
-        /// Where.
+        /// The state.
         x: Vec<f64>,
-        /// What is the matter.
+        /// The reason, in words.
         why: String,
     },
     /// A domain is left.
@@ -249,9 +249,9 @@ pub enum HybridError {
     Domain {
         /// When.
         t: f64,
-        /// Where.
+        /// The state.
         x: Vec<f64>,
-        /// Which operation, in which equation.
+        /// The operation without a value, and its equation.
         what: String,
     },
     /// Switches accumulate.
@@ -265,7 +265,7 @@ pub enum HybridError {
         t: f64,
         /// A bound on its error.
         error: f64,
-        /// Where.
+        /// The state.
         x: Vec<f64>,
         /// The switching function.
         surfaces: String,
@@ -280,9 +280,9 @@ pub enum HybridError {
     },
 }
 
-/// How often a step is made shorter before it is given up.
+/// Largest number of times that a step is shortened before it is given up.
 const MOST_SHORTENINGS: usize = 200;
-/// How often switches may make each other jump at one moment.
+/// Largest number of times that switches may make each other jump at one moment.
 const MOST_JUMPS: usize = 32;
 
 /// Derivatives of watched values that are smaller parts of their terms than this are zero.
@@ -290,7 +290,7 @@ const SMALLEST_SLOPE: f64 = 1e-11;
 
 type Nested = Dual<Dual<f64, 1>, 1>;
 
-/// What a step is searched for.
+/// A condition that a step is searched for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Sought {
     /// The value of an active guard, by its number; whole parts have two.
@@ -375,7 +375,7 @@ struct Contact {
 struct Accepted {
     length: f64,
     error: f64,
-    /// Where it is searched: in parts, or the whole of it without any.
+    /// Subintervals in which the step is searched; empty: the whole step.
     parts: Vec<(f64, f64)>,
     /// Whether longer ones were tried.
     rejected: bool,
@@ -401,8 +401,8 @@ struct Follower<'a> {
     /// weight is one to rounding; else 0.
     along: Vec<f64>,
     base: Vec<(Rc<Compiled>, Vec<f64>)>,
-    /// Where mixtures differ: the fields on all sides of the surfaces slid upon, for the rule that
-    /// chooses among them.
+    /// Fields on all sides of the surfaces slid upon, for the rule that chooses among mixtures if
+    /// these differ.
     corners: Vec<(Rc<Compiled>, Vec<f64>)>,
     /// The surfaces of [`Intersection::Order`].
     order: Vec<usize>,
@@ -414,7 +414,7 @@ struct Follower<'a> {
     rests: bool,
     /// Whether the last step's error was the rounding of the time.
     noisy: bool,
-    /// Which side of zero each watched expression is on; 0 if it stays there.
+    /// Sign of each watched expression; 0 if it stays at zero.
     watch_side: Vec<f64>,
     /// Guards and watched expressions that left zero at the step's beginning.
     fresh_guard: Vec<bool>,
@@ -440,7 +440,7 @@ struct Follower<'a> {
     scale: Vec<f64>,
     room: Vec<f64>,
     samples: [Vec<f64>; 5],
-    /// What variables and watched values can be in a step.
+    /// Ranges of variables and of watched values in a step.
     ranges: [Vec<Range>; 2],
     expansions: series::Expansions,
     reached: Option<&'a dyn Fn(f64) -> bool>,
@@ -505,7 +505,7 @@ pub fn follow_to_rest(
     follower.options = &more;
     let within = within * follower.size.iter().fold(0.0_f64, |most, s| most.max(*s));
     let stays = |x: &[f64]| x.iter().zip(&outcome.x).all(|(a, b)| (a - b).abs() <= within);
-    // Where motion cannot go on it does not rest.
+    // A motion that cannot go on is not at rest.
     let ending = follower.run(&mut |point| stays(point.x));
     let rests = ending == Ok(Ending::Finished) && stays(&follower.x);
     if ending == Ok(Ending::Interrupted) && !reached(follower.t) {
@@ -517,7 +517,7 @@ pub fn follow_to_rest(
 /// Steps between two words on the time reached.
 const STEPS_BETWEEN_WORDS: u64 = 64;
 
-/// What each state's error is measured by in a step.
+/// Scale of each state's error in a step.
 fn scale_now(follower: &Follower, step: &Step, out: &mut Vec<f64>) {
     let options = follower.options;
     let span = options.t_end - options.t_start;
@@ -562,7 +562,7 @@ fn order(equation: &Equation, rule: &Intersection) -> Result<Vec<usize>, HybridE
     Ok(order)
 }
 
-/// Where a brief step of length `h` of the classical method of order 4 ends (Kutta 1901).
+/// End of a brief step of length `h` of the classical Runge-Kutta method of order 4 (Kutta 1901).
 fn a_little_later(
     field: &mut dyn FnMut(f64, &[f64]) -> Vec<f64>,
     t: f64,
@@ -808,7 +808,8 @@ impl<'a> Follower<'a> {
                     }
                     return Err(error);
                 }
-                // Where things happen often, no longer than what is between them.
+                // If switches or events are frequent, a step is no longer than the time between
+                // them.
                 h = self.step_of_series(&step)?.min(if h > 0.0 { h } else { f64::INFINITY });
             } else if h == 0.0 {
                 h = self.first_step(&room);
@@ -895,7 +896,8 @@ impl<'a> Follower<'a> {
                 self.clear_fresh(&list, &last_values, earliest.is_finite());
             }
             h = if earliest.is_finite() {
-                // Where things happen often, steps are about as long as what is between them.
+                // If switches or events are frequent, a step is about as long as the time between
+                // them.
                 let between = std::mem::replace(&mut last_met, self.t);
                 h_next.max(h).min(1.5 * (self.t - between).max(f64::EPSILON * self.t.abs()))
             } else {
@@ -970,7 +972,8 @@ impl<'a> Follower<'a> {
             }
             let error = step.error(&|i| scale[i]);
             let factor = if error <= 1.0 {
-                // What the step did not see begins there: it is made to end before.
+                // The structure that the step missed begins at `unseen`: the step is made to end
+                // before it.
                 let unseen = self.unseen(step, scale).map(|theta| theta.clamp(0.05, 0.9));
                 match unseen.or_else(|| self.too_long_for_tangents(step)) {
                     Some(factor) => factor,
@@ -1005,7 +1008,7 @@ impl<'a> Follower<'a> {
         before.iter().zip(&after).map(|(a, b)| (b - a).abs()).collect()
     }
 
-    /// What is due at the present time, together with what is met here.
+    /// Handles the events due at the present time together with the conditions met here.
     fn on_time(
         &mut self,
         clock: &mut Clock,

@@ -24,7 +24,7 @@ impl Range {
         }
     }
 
-    /// What lies between Bernstein coefficients, which have the rounding of a few sums.
+    /// Range between Bernstein coefficients that carry the rounding of a few sums.
     pub fn between(b: &[f64; 5]) -> Self {
         let (low, high) = b.iter().fold((b[0], b[0]), |(low, high), b| (low.min(*b), high.max(*b)));
         Self::new(

@@ -608,7 +608,7 @@ impl Search<'_> {
         let (n, k) = (self.n, on.len());
         let Zero { x, weights, .. } = zero;
         let m = self.mixture(config, on, &x, &weights);
-        // How fast the surfaces' functions change with the weights.
+        // Change of the switching functions' rates with the weights.
         let mut normal = vec![0.0; k * k];
         for i in 0..k {
             for j in 0..k {
@@ -616,8 +616,8 @@ impl Search<'_> {
                     (0..n).map(|l| m.gradients[i * n + l] * m.by_weight[l * k + j]).sum();
             }
         }
-        // Where the mixture vanishes, sliding is linearised by (1 - B (C B)^-1 C) A: the rows of C
-        // have the eigenvalue 0, which is none of the surfaces.
+        // If the mixture vanishes, sliding is linearised by (1 - B (C B)^-1 C) A: the rows of C
+        // have the eigenvalue 0, which does not belong to motion along the surfaces.
         let mut along = m.local.jacobian.clone();
         for j in 0..if k > 0 { n } else { 0 } {
             let pull = |i: usize| {

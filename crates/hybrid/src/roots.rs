@@ -8,8 +8,8 @@
 
 /// Places of the samples, as fractions.
 pub(crate) const PLACES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
-/// How often a step is halved where its end is on the same side, and where it is beyond zero: down
-/// to the last digits.
+/// Largest number of halvings of a step whose end is on the same side, and of one whose end is
+/// beyond zero: down to the last digits.
 const DEPTH: usize = 12;
 const DEEPEST: usize = 60;
 
@@ -40,7 +40,7 @@ pub(crate) fn at_fraction(b: &[f64; 5], u: f64) -> f64 {
 /// Whether the polynomial through these values stays on its side of zero, where it may begin at
 /// zero.
 pub(crate) fn stays(v: &[f64; 5], side: f64) -> bool {
-    // What is zero all along passes it nowhere.
+    // A function that is zero all along passes zero nowhere.
     if v.iter().all(|v| *v == 0.0) {
         return true;
     }
@@ -102,9 +102,9 @@ pub(crate) fn first(
     first([v[2], p, v[3], q, v[4]], side, middle, to, f, depth + 1)
 }
 
-/// Where a function that is on its side at both ends of an interval is beyond zero between them,
-/// and its value there: its least value is sought by parabolas (Brent 1973, ch. 5), where the least
-/// of five values is not at an end.
+/// Place beyond zero, and the value there, of a function that is on its side at both ends of an
+/// interval: its minimum is sought by parabolas (Brent 1973, ch. 5) from the three values about the
+/// least of five.
 fn dip(
     v: &[f64; 5],
     side: f64,
@@ -241,7 +241,7 @@ fn root_between(q: &[f64], mut low: f64, mut high: f64) -> f64 {
     u
 }
 
-/// How often coefficients change their sign.
+/// Number of sign changes among coefficients.
 fn changes(b: &[f64; 5]) -> usize {
     let (mut changes, mut before) = (0, 0.0);
     for c in b.iter().filter(|c| **c != 0.0) {
@@ -251,8 +251,8 @@ fn changes(b: &[f64; 5]) -> usize {
     changes
 }
 
-/// Where the polynomial through five values, which has one change of sign, is zero, as a fraction:
-/// Newton's method within bounds.
+/// Zero of the polynomial through five values, which has one change of sign, as a fraction of the
+/// interval: Newton's method within bounds.
 fn polynomial_root(v: &[f64; 5], side: f64) -> f64 {
     let b = bernstein(v);
     let value = |u: f64| {
@@ -296,7 +296,7 @@ fn narrow(from: f64, to: f64, v: &[f64; 5], side: f64, f: &mut dyn FnMut(f64) ->
         if fb == 0.0 || b - a <= 4.0 * f64::EPSILON * b.abs() {
             break;
         }
-        // Where a few secants did not halve the interval, as near a pole, the next step does.
+        // If a few secants did not halve the interval, as near a pole, the next step does.
         let slow = i % 4 == 3 && b - a > 0.5 * std::mem::replace(&mut width, b - a);
         if slow || !(c > a && c < b) {
             c = 0.5 * (a + b);

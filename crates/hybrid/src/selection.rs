@@ -1,4 +1,4 @@
-//! Where motion goes from switching surfaces.
+//! Continuation of the motion from switching surfaces.
 //!
 //! At a point where k switching functions are zero each may go to its positive side (its derivative
 //! is positive there), to its negative side (negative), or stay at zero, where the field is a
@@ -9,7 +9,7 @@
 use twofold_num::linear::solve_any;
 use twofold_system::Expression;
 
-/// What a switching function does.
+/// Motion of a switching function from zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Way {
     /// Goes to its negative side.
@@ -34,7 +34,7 @@ impl Way {
 /// Most surfaces that depend on each other at one point.
 pub const MOST_TOGETHER: usize = 6;
 
-/// Which mixture of the fields is taken on several surfaces at once where mixtures have different
+/// Choice among mixtures of the fields on several surfaces at once, if mixtures have different
 /// velocities.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Intersection {

@@ -51,12 +51,12 @@ pub(crate) struct Series {
     pub terms: Vec<Vec<f64>>,
     /// The same by powers of the fraction of the step.
     pub scaled: Vec<Vec<f64>>,
-    /// What rounding leaves of speeds that cancel.
+    /// Rounding errors of speeds that cancel.
     pub noise: Vec<f64>,
-    /// What rounding leaves of what is followed beside the states.
+    /// Rounding errors of the functions followed beside the states.
     pub rounding: Vec<f64>,
-    /// How far the derivative of the series is from the field in the middle and at the end, times
-    /// the step.
+    /// Differences of the series' derivative from the field in the middle and at the end, times the
+    /// step.
     defect: Vec<f64>,
 }
 
@@ -72,7 +72,7 @@ fn horner_slope(c: &[f64], u: f64) -> f64 {
 /// A step and the room for it.
 #[derive(Clone, Debug)]
 pub(crate) struct Step {
-    /// Where it begins.
+    /// Start time.
     pub t: f64,
     /// Its length.
     pub h: f64,
@@ -185,7 +185,7 @@ impl Step {
         }
     }
 
-    /// What the error falls by with the step's length, as a power.
+    /// Power of the step's length with which the error falls.
     pub fn power(&self) -> f64 {
         self.series
             .as_ref()

@@ -358,7 +358,7 @@ fn events_happen_in_the_files_order_one_after_the_other() {
     near(outcome.x[1], 12.0, 1e-12);
 }
 
-/// What is zero at the start happens when it is next met.
+/// An event's expression that is zero at the start triggers the event at its next zero.
 #[test]
 fn an_event_that_is_zero_at_the_start_waits() {
     let text =
@@ -694,8 +694,8 @@ fn tangent_vectors_agree_with_finite_differences() {
     near(a[0] * b[0] - a[1] * b[1], determinant, 1e-5);
 }
 
-/// What left zero at one event is not zero at the next: a ball above another meets the floor and
-/// the other by turns.
+/// An expression that left zero at one event is not zero at the next: a ball above another meets
+/// the floor and the other by turns.
 #[test]
 fn events_that_follow_each_other_are_told_apart() {
     let text = "states = ['x1', 'v1', 'x2', 'v2']\nstart = [1, 0, 2, 0]\nf = ['v1', '-9.81', 'v2', \
@@ -905,8 +905,8 @@ fn the_order_of_switches_decides() {
     near(t, 2.0, 1e-9);
     assert!(ways.contains("does not attract for each side"), "{ways}");
     near(run(&ends, named(&["y", "x"]), 4.0).unwrap().x[2], -1.0, 1e-9);
-    // Where all mixtures have one velocity the order is not asked: these turns have no surface that
-    // attracts for both sides of the other.
+    // If all mixtures have one velocity, the order does not matter: these turns have no surface
+    // that attracts for both sides of the other.
     let turns =
         "states = ['x', 'y']\nstart = [0, 0]\nf = ['-sign(x) - 2*sign(y)', '2*sign(x) - sign(y)']";
     assert_eq!(run(turns, named(&["x", "y"]), 1.0).unwrap().x, [0.0, 0.0]);
@@ -1107,7 +1107,7 @@ fn a_division_by_zero_is_not_crossed() {
     ends("states = ['x']\nstart = [2]\nf = ['-1/x^2']", 2.8, 8.0 / 3.0, "`-1/x^2`");
     ends("states = ['x']\nstart = [1]\nf = ['-1/x']", 3.0, 0.5, "`-1/x`");
     ends("states = ['x']\nstart = [1]\nf = ['tan(x)']", 0.3, -1.0_f64.sin().ln(), "`tan(x)`");
-    // What is continued through zero is followed.
+    // A quotient that is continued through zero is followed.
     near(
         end("states = ['x', 'y']\nstart = [-1, 0]\nf = ['1', 'sin(x)/x']", 2.0)[1],
         2.0 * 0.946_083_070_367_183,
@@ -1179,7 +1179,7 @@ fn conditions_are_met_again_after_resets() {
     near(end(slides, 10.5)[0], 1.5, 1e-12);
 }
 
-/// What rests at equality: a counter is at least 5 when it is 5, and not above.
+/// Conditions at equality: a counter is at least 5 when it is 5, and not above.
 #[test]
 fn counters_are_compared_as_they_are_written() {
     let count = |condition: &str| {
@@ -1610,7 +1610,7 @@ fn series_reach_the_last_digits() {
     near(end(layer, 10.0).x[0], 0.0, 1e-13);
 }
 
-/// What has no series is refused by name.
+/// Motion without a Taylor series is refused by name.
 #[test]
 fn motion_without_a_series_is_refused() {
     let fails = |text: &str, options: Options| {
@@ -1705,15 +1705,15 @@ fn a_flat_zero_is_met_once() {
     let cubes = "states = ['x', 'n']\nstart = [-1, 0]\nf = ['1', '0']\n[[event]]\nwhen = '(x + \
         0.5)^5*(x - 0.5)^3'\ndirection = 'both'\nset = { n = 'n + 1' }";
     near(last(cubes, 2.0), 2.0, 0.0);
-    // What is touched is not passed, even where it is zero to the last digit.
+    // A zero that is only touched is not passed, even if it is zero to the last digit.
     let touched =
         "states = ['x', 'v', 'y']\nstart = [1, 0, 0]\nf = ['v', '-x', 'if(x^2*(2 + v) > 0, 1, 0)']";
     near(end(touched, 20.0)[2], 20.0, 1e-9);
     near(last("states = ['x', 'y']\nstart = [-1, 0]\nf = ['1', 'sign(3*x^2)']", 2.0), 2.0, 1e-12);
 }
 
-/// What the motion slides on may jump away, by another switch or by a table: the state stays where
-/// it is, and moves on from there.
+/// A surface that is slid upon may jump away, by another switch or by a table: the state stays in
+/// place, and moves on from there.
 #[test]
 fn what_is_slid_upon_may_jump_away() {
     let from = |f: &str| format!("states = ['x', 'y']\nstart = [0.3, 0]\nf = ['{f}', '1']");

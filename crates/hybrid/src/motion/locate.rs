@@ -1,10 +1,10 @@
-//! Where in a step what is sought is met first.
+//! Search for the first condition that is met in a step.
 
 use super::*;
 
 impl Follower<'_> {
-    /// What is met first in a step, with its place and all else in the same part of the step;
-    /// `last` takes the values where the search ends.
+    /// First condition met in a step, with its place and all others in the same part of the step;
+    /// `last` takes the values at the end of the search.
     pub(super) fn find(
         &mut self,
         step: &Step,
@@ -38,8 +38,8 @@ impl Follower<'_> {
         found
     }
 
-    /// What is met first if sums of states are all that is sought: they are polynomials, which need
-    /// no evaluation. Their values at the end; else none.
+    /// Adds the first zeros if all conditions are sums of states, which are polynomials in a step
+    /// and need no evaluation. Returns their values at the step's end, or `None` for each.
     fn find_in_polynomials(
         &self,
         step: &Step,
@@ -66,8 +66,8 @@ impl Follower<'_> {
         list.iter().zip(all).map(end).collect()
     }
 
-    /// What is met first by the series of each function, with the values at the end where there is
-    /// one.
+    /// Adds the first zero of each function's Taylor series; returns the values at the step's end
+    /// where there is a series.
     fn find_in_series(
         &mut self,
         step: &Step,
@@ -88,7 +88,7 @@ impl Follower<'_> {
             let begins = (self.is_fresh(*sought) && !far).then(|| {
                 let terms =
                     self.place_of(*sought).and_then(|place| terms.get(place)).unwrap_or(&0.0);
-                // What leaves sliding is tangent to the surface.
+                // A surface that sliding has just left is tangent to the motion.
                 let left =
                     if let Sought::Guard { guard, .. } = sought { self.left[*guard] } else { 0.0 };
                 SMALLEST_SLOPE * step.h * terms.max(left)
@@ -98,9 +98,9 @@ impl Follower<'_> {
         ends
     }
 
-    /// What is met first of what is `open`, by values at five places of each part, and more where
-    /// these do not tell; the values at the end of the last part are left in the last sample,
-    /// not-a-number where a function has no value on the way.
+    /// Adds the first zeros of the conditions that are `open`, from values at five places of each
+    /// part, and more if these do not decide; the values at the end of the last part are left in
+    /// the last sample, not-a-number if a function has no value on the way.
     fn find_by_values(
         &mut self,
         step: &Step,

@@ -1,4 +1,4 @@
-//! What happens at a point that is met: crossings, events, resets, contacts.
+//! Actions at a point that is met: crossings, events, resets, contacts.
 
 use super::*;
 
@@ -123,7 +123,7 @@ impl Follower<'_> {
             let jumped =
                 |guard: &usize| !zero.contains(guard) && sides[*guard] != self.config.sides[*guard];
             if !self.sliding.is_empty() && self.compiled.active.iter().any(jumped) {
-                // What jumped with it may let sliding end.
+                // Other switching functions that jumped may end sliding.
                 let (slid, none) = (self.sliding.clone(), vec![false; self.slides.len()]);
                 self.decide(&slid, &none)?;
             }
@@ -318,7 +318,7 @@ impl Follower<'_> {
                 return Ok(Some(Ending::Interrupted));
             }
         }
-        // What a reset or a new mode makes true happens at once.
+        // Events that a reset or a new mode makes true happen at once.
         self.happen(definition, &newly, &[], observe)
     }
 
@@ -414,7 +414,7 @@ impl Follower<'_> {
             return false;
         }
         self.project();
-        // What is left of the time that infinitely many take.
+        // The remaining time of the infinitely many events.
         let (now, x, mut rate) = (self.t, self.x.clone(), vec![0.0; self.n]);
         self.rhs(now, &x, &mut rate);
         for i in 0..self.n {
@@ -581,7 +581,7 @@ impl Follower<'_> {
         }
         let parts: Vec<Vec<f64>> =
             fields.iter().map(|f| moves.iter().map(|i| f[*i] / fastest[*i]).collect()).collect();
-        // Where mixtures differ only one that all surfaces hold is known to stay.
+        // If mixtures differ, only one that all surfaces hold is known to stay.
         if settling::mixtures_differ(&parts) && !self.holds_still(&near, &moves) {
             return false;
         }

@@ -1,4 +1,4 @@
-//! What a step is searched for, and what it may have jumped over.
+//! Conditions that a step is searched for, and those that it may have jumped over.
 
 use twofold_num::tape::Program;
 
@@ -10,7 +10,7 @@ use twofold_num::Arithmetic as _;
 /// Most parts of a step that are searched; one with more is made shorter, to this part.
 const MOST_PARTS: usize = 4096;
 pub(super) const SHORTER: f64 = 0.25;
-/// How often a step is halved in search of where it is smooth.
+/// Largest number of halvings of a step in search of a part where it is smooth.
 const DEEPEST: usize = 16;
 /// By so much of what its error is measured by the derivative of the continuous extension, which is
 /// of lower order than the step, may miss the field.
@@ -20,7 +20,7 @@ const LARGEST_DEFECT: f64 = 1e3;
 const ALONG: f64 = 1e-10;
 
 impl Follower<'_> {
-    /// What may be met in a step, with the side that it is on.
+    /// Collects the conditions that may be met in a step, each with the side that it is on.
     pub(super) fn sought(&mut self, step: &Step, list: &mut Vec<(Sought, f64)>) {
         list.clear();
         let compiled = self.compiled.clone();
@@ -67,8 +67,8 @@ impl Follower<'_> {
         list.extend((0..self.contacts.len()).map(|place| (Sought::Release(place), 1.0)));
     }
 
-    /// What guards and watched expressions can be in a step, if one of them is no sum of states:
-    /// their [`Range`]s for the states' ones.
+    /// Bounds guards and watched expressions in a step by the states' [`Range`]s, if one of them is
+    /// no sum of states.
     fn bound(&mut self, step: &Step, ranges: &mut [Vec<Range>; 2]) {
         let [variables, values] = ranges;
         values.clear();
@@ -463,7 +463,7 @@ impl Follower<'_> {
                 break;
             }
             let correction = self.value_of(sought, self.t + length, &step.y) / slope;
-            // Where the function only touches zero, or is none at all, the first place stays.
+            // If the function only touches zero, or has no value, the first place stays.
             let rounding = 2.0 * f64::EPSILON * (self.t + length).abs();
             let wanted = (length - correction).clamp(0.0, longest);
             if !correction.is_finite()
@@ -576,8 +576,8 @@ impl Follower<'_> {
         h.max(1e3 * f64::EPSILON * self.t.abs()).min(span)
     }
 
-    /// Where an expression's domain ends at a switch, as that of |x|^0.5 does on either side, no
-    /// step goes across. Very near to it the state is put onto the switch, and what holds there is
+    /// No step goes across a switch at which an expression's domain ends, as that of |x|^0.5 does
+    /// on either side. Very near to it the state is put onto the switch, and what holds there is
     /// decided; false if no switch is so near.
     pub(super) fn land_at_an_edge(&mut self) -> Result<bool, HybridError> {
         let n = self.n;
@@ -701,7 +701,8 @@ impl Follower<'_> {
         }
     }
 
-    /// What is allowed to the weight of a field that runs along a surface.
+    /// Rounding error allowed in the weight of a field that runs along a surface; 0 for other
+    /// fields.
     pub(super) fn rounding_along(&self, place: usize, plus: bool) -> f64 {
         if self.along[self.sliding[place]] == if plus { 1.0 } else { -1.0 } { ALONG } else { 0.0 }
     }
@@ -756,7 +757,7 @@ impl Follower<'_> {
 fn are_quiet(gates: &[Gate], first: &[f64], between: &[f64], last: &[f64]) -> bool {
     gates.iter().enumerate().all(|(i, gate)| {
         let (p, q, r) = (first[i], between[i], last[i]);
-        // What does not move misses nothing, also at the logarithm of zero.
+        // An argument that does not move misses nothing, also at the logarithm of zero.
         if p == q && q == r {
             return true;
         }

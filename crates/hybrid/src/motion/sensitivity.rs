@@ -1,4 +1,4 @@
-//! How the state at the end of a run changes with the start and with parameters.
+//! Sensitivity of the state at the end of a run to the start and to parameters.
 //!
 //! Parameters become states that do not move, so that one set of tangent vectors, with the same
 //! saltation matrices, carries both. Everything that happens at a switch or reset is in them: that

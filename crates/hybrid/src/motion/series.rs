@@ -23,11 +23,11 @@ const LEAST_SEARCHED: f64 = 1e-8;
 const MOST_SEARCHED: f64 = 64.0;
 /// By so much of its size a function that is followed beside the states may be off its series.
 const LARGEST_MISS: f64 = 1e-6;
-/// What is followed beside the states may ask for steps shorter than theirs down to this part; a
-/// pole asks for shorter ones still.
+/// Shortest step that the functions followed beside the states may ask for, as a share of the
+/// states' own; near a pole it would be shorter, which is an error.
 const LEAST_FOLLOWED: f64 = 1e-7;
 
-/// What decides the equation that moves the state.
+/// Key of the equation that moves the state.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 struct Key {
     compiled: usize,
@@ -38,17 +38,17 @@ struct Key {
     pivots: Vec<usize>,
 }
 
-/// What a step is searched for beside sums of states: its series is made along with those of the
-/// states.
+/// A function that a step is searched for and that is no sum of states: its series is made along
+/// with those of the states.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Followed {
     /// A guard or watched value, by its place.
     Value(usize),
     /// The weight of a positive side in sliding.
     Weight(usize),
-    /// What is positive while sliding attracts.
+    /// The function that is positive while sliding attracts.
     Attraction,
-    /// What a contact pushes with.
+    /// The force of a contact.
     Push(usize),
 }
 
@@ -57,9 +57,10 @@ enum Followed {
 struct Known {
     /// Kept, so that its address names it.
     _compiled: Rc<Compiled>,
-    /// Which variable each of the equation's own is; the states come first.
+    /// The variable of the system for each variable of this equation; the states come first.
     inputs: Vec<usize>,
-    /// What is followed beside the states, and its values; their variables come last.
+    /// Functions followed beside the states, and the program of their values; their variables come
+    /// last.
     followed: Vec<Followed>,
     values: Program,
     solution: Solution<f64>,
@@ -185,7 +186,7 @@ impl Follower<'_> {
         }
     }
 
-    /// What rounding leaves of a function that is followed where its terms cancel.
+    /// Rounding error of a followed function at zero, where its terms cancel.
     fn rounding_of(&self, what: Followed) -> f64 {
         let active = self.compiled.active.len();
         let size = match what {
@@ -221,7 +222,8 @@ impl Follower<'_> {
                 if c[k] == 0.0 {
                     continue;
                 }
-                // What is smaller than numbers are counts for nothing, as in the scale of a step.
+                // Quantities below the smallest normal number count for nothing, as in the scale of
+                // a step.
                 let by = |size: f64, power: usize| {
                     rough_pow((size + f64::MIN_POSITIVE) / c[k].abs(), 1.0 / power as f64)
                 };
@@ -256,7 +258,7 @@ impl Follower<'_> {
             * twofold_num::elementary::exp(SAFETY_EXPONENT / (order(self.options) - 1) as f64))
     }
 
-    /// What is said where a series of what is sought ends.
+    /// The error for a function whose Taylor series does not reach far enough.
     fn not_followed(&self, step: &Step, place: usize) -> HybridError {
         let active = self.compiled.active.len();
         let what = match self.followed().get(place) {
@@ -274,7 +276,7 @@ impl Follower<'_> {
         HybridError::Stuck { t: step.t, x: step.x.clone(), why }
     }
 
-    /// How many parts of a step are searched each by itself.
+    /// Number of subintervals of a step that are searched separately.
     pub(super) fn searched(&self, step: &Step) -> usize {
         let Some(series) = &step.series else { return 1 };
         let tolerance = self.options.rtol.max(LEAST_SEARCHED);
@@ -292,7 +294,7 @@ impl Follower<'_> {
         most.min(MOST_SEARCHED).ceil() as usize
     }
 
-    /// What is followed beside the states in the present step.
+    /// Functions followed beside the states in the present step.
     fn followed(&self) -> &[Followed] {
         let known = self.expansions.present.as_ref().and_then(|key| self.expansions.known.get(key));
         known.map_or(&[], |known| &known.followed)
@@ -410,7 +412,7 @@ impl Follower<'_> {
             direction.iter_mut().zip(&out).for_each(|(d, f)| *d = Some(*f));
             direction[n] = Some(Recorded::one());
             out.extend(inputs[n..].iter().map(|i| if *i == n { Recorded::one() } else { zero() }));
-            // What is followed is a state whose derivative is its own along the motion.
+            // A followed function is an extra state, whose derivative is that along the motion.
             let slopes = Replay::new(&others, &v).derivatives(&direction);
             out.extend(slopes.into_iter().map(|slope| slope.unwrap_or(zero())));
             out

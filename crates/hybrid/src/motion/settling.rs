@@ -38,7 +38,7 @@ impl Follower<'_> {
         }
     }
 
-    /// Which side a guard's value is on; none if it is zero to rounding.
+    /// Side that a guard's value is on; none if it is zero to rounding.
     pub(super) fn side_of(&self, guard: usize) -> Option<f64> {
         let g = &self.equation.guards[guard];
         let value = self.equation.value(&g.expression, self.t, &self.x);
@@ -68,7 +68,7 @@ impl Follower<'_> {
                     self.fresh_guard[guard] = false;
                 }
                 None => {
-                    // What rests at equality is not greater.
+                    // A guard at equality counts as not greater.
                     self.config.sides[guard] =
                         self.low(guard) + if self.equation.guards[guard].whole { 1.0 } else { 0.0 };
                     at_zero.push(guard);
@@ -163,7 +163,7 @@ impl Follower<'_> {
             (config, place, rates)
         };
         let k = zero.len();
-        // Which functions depend on each other.
+        // Sets of functions that depend on each other.
         let sets = if k == 1 {
             vec![vec![0]]
         } else {
@@ -295,7 +295,7 @@ impl Follower<'_> {
                         fields.push(field);
                         speeds.push(rates);
                     }
-                    // Where all mixtures have one velocity there is nothing to choose.
+                    // If all mixtures have one velocity, there is nothing to choose.
                     if mixtures_differ(&fields) {
                         let guards: Vec<usize> = slides.iter().map(|s| zero[set[*s]]).collect();
                         let own: Vec<Vec<f64>> = speeds
@@ -329,7 +329,7 @@ impl Follower<'_> {
                         base[i] + added().sum::<f64>(),
                         added().fold(base[i].abs(), |a, v| a + v.abs()),
                     );
-                    // What is zero to rounding goes nowhere.
+                    // A rate that is zero to rounding counts as zero.
                     goes(i, if rate.abs() <= 1e-13 * size { 0.0 } else { rate })
                 })
             });

@@ -284,7 +284,8 @@ impl Follower<'_> {
         (a, matrix)
     }
 
-    /// How the contacts' states move the derivatives of their expressions, row by row.
+    /// Matrix of the contacts, row by row: effect of each contact's state on the derivative of each
+    /// contact's expression.
     pub(super) fn grips(&self, field: &[f64]) -> Vec<f64> {
         let columns: Vec<Vec<f64>> =
             self.contacts.iter().map(|c| self.second_along(field, Some(c.state))).collect();
@@ -295,8 +296,8 @@ impl Follower<'_> {
             .collect()
     }
 
-    /// What is added to the speed of each contact's state under `field`, so that its expression
-    /// stays at zero; not-a-number where nothing does.
+    /// Rates added to each contact's state under `field` so that its expression stays at zero;
+    /// not-a-number if there are none.
     pub(super) fn contact_forces(&self, field: &[f64]) -> Vec<f64> {
         let rates = self.second_along(field, None);
         let pulls: Vec<f64> =
@@ -341,7 +342,8 @@ impl Follower<'_> {
         out.iter().map(|d| d.partials[0].partials[0]).collect()
     }
 
-    /// What the watched values of a configuration do at the present point.
+    /// The compiled equation of a configuration, and the rates of its watched values at the present
+    /// point.
     pub(super) fn rates(&mut self, config: &Configuration) -> (Rc<Compiled>, Rates) {
         let compiled = self.equation.compiled(config);
         let variables = self.load(config);
@@ -366,7 +368,7 @@ impl Follower<'_> {
                 std::mem::replace(&mut self.compiled, compiled.clone()),
             );
             second = self.second_along(&field, None);
-            // What the field's bends add, and the rest, may cancel to rounding.
+            // The contribution of the field's derivatives may cancel the rest to rounding.
             for (o, gradient) in compiled.gradients(&self.variables).iter().enumerate() {
                 let (mut by_bends, mut size) = (0.0, 0.0);
                 for (variable, slope) in

@@ -38,7 +38,7 @@ pub(super) struct Tangents {
     pub sizes: Vec<f64>,
 }
 
-/// What stands before something is met.
+/// Field, gradient and speed before a condition is met.
 pub(super) struct Before {
     field: Vec<f64>,
     gradient: Vec<f64>,
@@ -191,7 +191,8 @@ impl Follower<'_> {
             self.variables[n] = t;
             let mut field0 = vec![0.0; n];
             self.compiled.field.evaluate(&self.variables, &mut field0);
-            // What each surface's positive side adds to the field, and to the surfaces' functions.
+            // Change of the field, and of the surfaces' functions' rates, by each surface's
+            // positive side.
             let separate = self.separate.clone();
             let (added, matrix): (Vec<Vec<f64>>, Vec<f64>) = match &separate {
                 Some(owners) => {
@@ -237,7 +238,8 @@ impl Follower<'_> {
         Ok(())
     }
 
-    /// What is needed of the moment before something is met.
+    /// Data of the moment before a condition is met, for the saltation matrix; none without
+    /// tangents.
     pub(super) fn before(&mut self, met: &[Sought]) -> Result<Option<Before>, HybridError> {
         if self.tangents.is_none() {
             return Ok(None);
@@ -654,7 +656,7 @@ pub struct ClosedOrbit {
     /// Its Floquet multipliers, largest first (real and imaginary parts); of an autonomous system
     /// without the one that is 1.
     pub multipliers: Vec<[f64; 2]>,
-    /// How far it is from closed, in the largest of its states' sizes.
+    /// Closure error after one period, in units of its states' largest size.
     pub gap: f64,
 }
 
