@@ -43,7 +43,7 @@ impl Monitor for () {
     }
 }
 
-/// How far a run goes and by what rules, whatever the equation and the method.
+/// Duration and rules of a run, independent of equation and method.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DriveOptions {
@@ -55,8 +55,8 @@ pub struct DriveOptions {
     pub step_cap: StepCap,
     /// Most steps of the whole run; with them it ends as [`StopReason::StepBudget`].
     pub max_steps: u64,
-    /// How many leading components of the state a kick perturbs: the states of the system, but not
-    /// a hysteretic phi.
+    /// Number of leading components of the state that a kick perturbs: the states of the system,
+    /// but not a hysteretic phi.
     pub kicked_states: usize,
 }
 
@@ -73,7 +73,7 @@ impl DriveOptions {
     }
 }
 
-/// How a run ended.
+/// Result of a run.
 #[derive(Clone, Debug, PartialEq)]
 #[must_use = "a run may have been cut short: look at `stop`"]
 pub struct Summary<const N: usize> {
@@ -110,8 +110,8 @@ impl<const N: usize> Summary<N> {
 /// Runs `stepper` from (0, x0) over `options`.
 ///
 /// # Errors
-/// What the method could not do. Running out of steps is no error but a [`StopReason`]: what was
-/// observed until then stands.
+/// The method's failure. Running out of steps is no error but a [`StopReason`]: what was observed
+/// until then stands.
 pub fn drive<const N: usize, F, M>(
     field: &F,
     x0: SVector<f64, N>,

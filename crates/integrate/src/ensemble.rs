@@ -52,7 +52,7 @@ pub struct End<O, const N: usize> {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SectionPlane {
-    /// Which component of the state.
+    /// Index of the component of the state.
     pub coordinate: usize,
     /// Its value there.
     pub value: f64,
@@ -405,8 +405,8 @@ struct State<S: Simd, O, const N: usize, const K: usize> {
     x: [[S::f64s; K]; N],
     fsal: [[S::f64s; K]; N],
     corner: [[S::f64s; K]; N],
-    /// What can hide in steps: [`Plain`](super::guard::Plain)'s fields; never anything if `flat` is
-    /// -infinity, and always something if it is NaN.
+    /// [`Plain`](super::guard::Plain)'s fields, of the gate that a step may miss; none if `flat` is
+    /// -infinity, and always one if it is NaN.
     slopes: [[S::f64s; K]; N],
     offset: [S::f64s; K],
     flat: [S::f64s; K],
@@ -645,7 +645,7 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
         let next = accepted.and(again).select(smaller(next, h), next);
         let next = accepted.select(smaller(next, of(self.max_step)), next);
 
-        // What every step does.
+        // Updates of every step.
         let (one, zero) = (number(1.0), number(0.0));
         let t1 = last.select(of(self.t_end), t0 + h);
         self.h = next.parts();
@@ -661,7 +661,7 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
             self.fsal[i] = accepted.select(k7[i], k1[i]).parts();
         }
 
-        // What few do.
+        // Conditions that few steps meet.
         let tiny = h
             .size()
             .at_most(t0.size() * number(f64::EPSILON), set)
@@ -685,7 +685,7 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
         let below = far.at_most(zero - w0, set).and(far.at_most(zero - w1, set));
         let known = flat.at_most(flat, set);
         let plain = bend.at_most(number(SMALL_BEND), set).or(above).or(below).and(known);
-        // Where not.
+        // Steps in which the gate may be missed.
         let hiding = number(0.5).less(plain.select(zero, one), set).and(accepted);
         noted = noted.or(hiding);
         let mut met = None;
@@ -720,7 +720,7 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
                     square += x1[i] * x1[i];
                 }
             }
-            // Who attends to it decides; the margin is for the root's rounding.
+            // The code that attends to it decides; the margin is for the root's rounding.
             let long = number(least * least * (1.0 + 1e-9)).at_most(square, set);
             let short = square.at_most(number(most * most * (1.0 - 1e-9)), set);
             let may = number(0.5).less(long.and(short).select(zero, one), set).and(accepted);
@@ -886,11 +886,11 @@ struct Seen<S: Simd, const N: usize, const K: usize> {
     accepted: [S::f64s; K],
     sound: [S::f64s; K],
     last: [S::f64s; K],
-    /// Where a step may hide something.
+    /// Whether the step may miss a gate, lane by lane.
     hiding: [S::f64s; K],
     met: Option<[S::f64s; K]>,
     beyond: Option<[S::f64s; K]>,
-    /// Where what is carried may be too short or too long.
+    /// Whether the carried vector may be too short or too long, lane by lane.
     outside: Option<[S::f64s; K]>,
     x: [[S::f64s; K]; N],
     /// Stages 1, 3, 4, 5, 6, 7.
@@ -965,8 +965,8 @@ fn bare<S: Simd, const N: usize, const K: usize>(
     parts
 }
 
-/// Where the step may meet the plane: as
-/// [`CrossingFinder::through_plane`](super::roots::CrossingFinder::through_plane) decides it.
+/// Whether the step may meet the plane, by the rule of
+/// [`CrossingFinder::through_plane`](super::roots::CrossingFinder::through_plane).
 #[inline(always)]
 fn may_meet<S: Simd, const N: usize, const K: usize>(
     coordinate: usize,
@@ -1009,8 +1009,8 @@ fn may_meet<S: Simd, const N: usize, const K: usize>(
     far.less(number(0.5), set)
 }
 
-/// How far one coordinate may leave the range between its values `a` and `b` at a step's ends: as
-/// [`Dense`]'s [`reach`](super::step::Interpolant::reach) bounds it.
+/// Bound on the distance by which one coordinate leaves the range between its values `a` and `b` at
+/// a step's ends, as [`Dense`]'s [`reach`](super::step::Interpolant::reach).
 #[inline(always)]
 fn reach<S: Simd, const K: usize>(
     a: Registers<S, K>,

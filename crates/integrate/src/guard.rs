@@ -77,7 +77,7 @@ struct Along {
 
 impl Along {
     fn new(ends: [f64; 2], bend: f64) -> Self {
-        // What is no number is no bound.
+        // A bound that is not a number is infinite.
         Self { ends, bend: if bend >= 0.0 { bend } else { f64::INFINITY } }
     }
 
@@ -448,8 +448,8 @@ struct Missed {
 const FINEST: f64 = 1e-12;
 /// Most parts of a step that are looked at; a step with more is made in shorter ones.
 const MOST_PARTS: usize = 4000;
-/// What a step has missed is allowed to be so many times the tolerance: what its error estimate
-/// does not show.
+/// Largest error that a step may have missed, as a multiple of the tolerance: one that its error
+/// estimate does not show.
 const ALLOWED: f64 = 20.0;
 /// The right-hand side is outside what the method saw if by so much of its variation there.
 const OUTSIDE: f64 = 0.1;
@@ -538,7 +538,8 @@ impl Gates {
         self.defect(step, tolerance, &leaves)
     }
 
-    /// Where the right-hand side is outside what the method saw, as far as that matters.
+    /// Part of a step in which the right-hand side leaves the range that the method saw, if this
+    /// exceeds the allowed error.
     fn defect<const N: usize>(
         &mut self,
         step: &Step<'_, N>,
@@ -621,7 +622,7 @@ impl Stages {
         Self { asked: Stage { end, max_step }, before: Vec::new() }
     }
 
-    /// That under way.
+    /// The stage under way.
     pub(super) fn now(&self) -> Stage {
         self.before.last().copied().unwrap_or(self.asked)
     }
@@ -635,8 +636,8 @@ impl Stages {
         self.before.len() < stages
     }
 
-    /// What lies between the times `from` and `to` was missed by a step from (t, x): to there, and
-    /// through it with short steps.
+    /// Plans the steps to a structure between the times `from` and `to` that a step from (t, x)
+    /// missed, and short steps through it.
     #[cold]
     #[inline(never)]
     pub(super) fn go_through<const N: usize>(

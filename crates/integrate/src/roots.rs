@@ -529,7 +529,7 @@ fn scan<const N: usize>(
         let (a, b) = (piece.a, piece.b);
         let at = enclosed(&piece.states());
         if !at.value.contains(0.0) {
-            // What rounding lets end on the other side of zero begins there.
+            // A piece that begins beyond zero, by rounding, has its crossing there.
             if at.value.is_positive() != (sign > 0.0) {
                 return if a > 0.0 {
                     Scan::Crossing((a - NARROWEST).max(0.0), a)
@@ -568,7 +568,7 @@ fn first_in(q: &dyn Fn(f64) -> f64, a: f64, b: f64, depth: usize) -> Option<Zero
     isolate(q, &coefficients, a, b, 0, size)
 }
 
-/// How often an interval is halved on which `q` is no such polynomial.
+/// Largest number of halvings of an interval on which `q` is no such polynomial.
 const DEEPEST: usize = 10;
 
 /// Places in (a, b], the last of them b, that leave at most one zero of `q` between neighbours.
@@ -912,7 +912,7 @@ mod tests {
         assert!((r - std::f64::consts::SQRT_2).abs() <= 4.5e-16);
     }
 
-    /// How often the function is asked, as it was when this was written: what no zero shows. No
+    /// Number of evaluations of the function, against recorded ones: the zeros do not show it. No
     /// bracket begins at 0, and some go backwards.
     #[test]
     fn brent_asks_no_more_than_it_did() {

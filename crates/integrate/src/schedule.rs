@@ -129,7 +129,7 @@ impl Schedule {
 #[derive(Clone, Debug)]
 pub struct Kicker {
     kick: Kick,
-    /// How many leading components are kicked.
+    /// Number of leading components that are kicked.
     states: usize,
     stream: RandomStream,
 }

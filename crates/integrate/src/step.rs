@@ -57,13 +57,13 @@ pub struct Step<'a, const N: usize> {
 }
 
 impl<const N: usize> Step<'_, N> {
-    /// Where in the step the domain of an equation ends, and which of its operations has no value
+    /// End of an equation's domain in the step, as a fraction, and the operation that has no value
     /// there.
     pub(crate) fn domain_end(&self, ends: &Ends) -> Option<(f64, String)> {
         ends.first(&|theta| self.at(theta).as_slice().to_vec(), &[0.0, 0.25, 0.5, 0.75, 1.0])
     }
 
-    /// That as a failure.
+    /// The end of the domain in the step as a failure.
     pub(crate) fn stays_in_domain(&self, ends: Option<&Ends>) -> Result<(), Failure> {
         match ends.and_then(|ends| self.domain_end(ends)) {
             None => Ok(()),
@@ -162,7 +162,7 @@ pub trait Stepper<const N: usize> {
     /// no longer finite. The stepper must be restarted before it is used again.
     fn step<F: VectorField<N>>(&mut self, field: &F) -> Result<Step<'_, N>, Failure>;
 
-    /// What the method has done since it was made.
+    /// Work of the method since it was made.
     fn statistics(&self) -> &Statistics;
 }
 
@@ -311,7 +311,7 @@ pub enum Failure {
         t: f64,
         /// The last good state.
         state: Vec<f64>,
-        /// Which part of the equation has no value.
+        /// The part of the equation that has no value.
         what: String,
     },
     /// The solution ends in finite time, or beyond the range of numbers.
@@ -334,9 +334,9 @@ pub enum Failure {
     NotSmooth {
         /// When.
         t: f64,
-        /// Where.
+        /// The state.
         state: Vec<f64>,
-        /// Which part of the equation is not.
+        /// The part of the equation that is not smooth.
         what: String,
     },
     /// The step became too small to advance time.
@@ -371,7 +371,7 @@ pub enum Failure {
     NotApplicable {
         /// The method's name.
         method: &'static str,
-        /// What it is about the equation.
+        /// The reason, in words.
         why: String,
     },
     /// An implicit method's nonlinear equations could not be solved even with tiny steps.

@@ -141,7 +141,7 @@ pub struct Taylor<const N: usize, S = f64> {
     order: usize,
     t: S,
     x: SVector<S, N>,
-    /// What rounding has taken from `x` since the last restart, to be added with the next step.
+    /// Rounding errors of `x` since the last restart, to be added with the next step.
     lost: SVector<S, N>,
     /// Time, state and what rounding had taken at the start of the last step.
     from: (S, SVector<S, N>, SVector<S, N>),
@@ -520,7 +520,7 @@ fn resolved(c: &[f64], allowed: f64) -> f64 {
     part
 }
 
-/// Where the polynomial `c` first changes its sign in [0, 1], zero counting as positive.
+/// First sign change of the polynomial `c` in [0, 1], zero counting as positive.
 fn first_crossing(c: &[f64]) -> Option<f64> {
     let sign = if c[0] < 0.0 { -1.0 } else { 1.0 };
     let at = |s: f64| sign * value(c, s);
@@ -561,7 +561,7 @@ fn first_crossing(c: &[f64]) -> Option<f64> {
     None
 }
 
-/// What a step may do near a layer.
+/// Limits of a step near a layer.
 #[derive(Clone, Copy, Debug)]
 struct Layers {
     /// erf(w), and tanh with it, is exactly +-1 beyond.
@@ -1017,7 +1017,7 @@ mod tests {
         assert_eq!(stride_time(&[5.0, 0.1], LAYER_STRIDE, 1.0), 1.0);
     }
 
-    /// What the series of tanh w leaves out at the end of the longest step that is trusted, w =
+    /// Truncation error of the series of tanh w at the end of the longest step that is trusted, w =
     /// distance - s + bend s^2 being the argument. With it, the step, and whether it is longer than
     /// what is always allowed (where the error is the step control's business).
     fn left_out(distance: f64, bend: f64, tolerance: f64) -> (f64, f64, bool) {

@@ -68,8 +68,8 @@ impl<const N: usize> Seen<N> {
         }
     }
 
-    /// What a run came to, in one line: its last words, its steps, the crossings of a plane, the
-    /// digest of everything.
+    /// Summary of a run in one line: its end, its steps, the crossings of a plane, the digest of
+    /// everything.
     fn line<E: std::fmt::Debug>(mut self, name: &str, end: &E) -> String {
         write!(self.digest, "{end:?}").unwrap();
         format!("{name}: {} steps, {} passages, {:016x}", self.steps, self.passed, self.digest.0)

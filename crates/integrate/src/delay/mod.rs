@@ -225,7 +225,7 @@ impl<'a, P> Sides<'a, P> {
         self.system.switching(x)
     }
 
-    /// Where the orbit passes h = `level` in `step`.
+    /// Crossings of h = `level` by the orbit in `step`.
     fn passages<const N: usize>(
         &self,
         passages: &mut CrossingFinder,

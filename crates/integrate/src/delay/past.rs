@@ -187,7 +187,7 @@ struct Piece<const N: usize> {
 /// The orbit in the last delay.
 #[derive(Clone, Debug)]
 pub(super) struct Past<const N: usize> {
-    /// Where it was before all pieces.
+    /// State before all pieces.
     before: SVector<f64, N>,
     pieces: VecDeque<Piece<N>>,
 }

@@ -34,7 +34,7 @@ struct Coming<S> {
 /// are those of the band's far edge, and switch at once.
 pub(super) struct Sharp<'a, P, M: Cuttable<N>, const N: usize> {
     sides: Sides<'a, P>,
-    /// What is carried along.
+    /// The quantity carried along with the orbit.
     carry: Option<&'a dyn Carry<N>>,
     /// Zero for a relay.
     delay: f64,
@@ -52,7 +52,7 @@ pub(super) struct Sharp<'a, P, M: Cuttable<N>, const N: usize> {
     positive: bool,
     t_end: f64,
     max_step: f64,
-    /// Where the method under way is to end, if it goes on.
+    /// Time at which the method under way ends, if it goes on.
     end: Option<M::Number>,
     /// Since when the present mode lasts, and how long each lasted before.
     since: f64,
@@ -304,7 +304,7 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
                 self.queue.is_empty() && !M::CUTS_EXACTLY && self.since == self.reached.0.to_f64();
             self.begin(if alone { self.max_step.min(guess) } else { self.max_step })?;
             if alone && guess < self.max_step {
-                // What follows this step is not short because the mode was.
+                // The next step need not be short, although the mode was.
                 self.end = None;
             }
         }
@@ -320,8 +320,8 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
             let Some(first) = found.first() else { return Ok(()) };
             let (from, (to, _)) = (self.methods[i].start(), self.methods[i].reached());
             let due = self.refined(self.plus, first.theta) + delay;
-            // What a passage causes is the first switch to come, if none is known: it may be due
-            // within this very step.
+            // If no switch is queued, the next one is due to this passage: it may lie within this
+            // very step.
             let cut = self.queue.is_empty() && (to - due).to_f64() > ONE_TIME * to.to_f64().abs();
             if cut && is_due(due.to_f64(), from.to_f64()) {
                 // A relay on the edge of its band: the switch comes before the step.
@@ -338,7 +338,7 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
             if cut && !M::CUTS_EXACTLY && ((due - from) / (to - from)).to_f64() < KEPT {
                 self.again += 1;
                 self.begin(LONGER * (due - from).to_f64())?;
-                // What follows this step is not short because this one is.
+                // The next step need not be short, although this one is.
                 self.end = None;
                 continue;
             }

@@ -17,22 +17,22 @@ use twofold_system::{Blended, PiecewiseSmooth, Smoothed, Transition, VectorField
 /// The stepper of the smooth rule.
 pub(super) struct Smooth<'a, P, M, const N: usize> {
     sides: Sides<'a, P>,
-    /// What is carried along.
+    /// The quantity carried along with the orbit.
     carry: Option<&'a dyn Carry<N>>,
     delay: f64,
     transition: Transition,
     eps: f64,
     method: M,
     past: Past<N>,
-    /// Where steps end, in order: jumps of derivatives that arrive, and passages of the delayed
-    /// orbit through the layer.
+    /// Ends of steps, in order: jumps of derivatives that arrive, and passages of the delayed orbit
+    /// through the layer.
     ends: Vec<f64>,
     /// On which side of the surface the orbit was last.
     passages: CrossingFinder,
     reached: (f64, SVector<f64, N>),
     t_end: f64,
     max_step: f64,
-    /// Where the method under way is to end.
+    /// Time at which the method under way ends.
     end: Option<f64>,
 }
 
@@ -177,7 +177,7 @@ impl<const N: usize> Observer<N> for Each<'_, N> {
     }
 }
 
-/// What rounding makes of h at `x`, where h is a sum or a product of coordinates.
+/// Rounding error of h at `x`, if h is a sum or a product of coordinates.
 fn rounding<P: PiecewiseSmooth<N>, const N: usize>(
     sides: &Sides<'_, P>,
     x: &SVector<f64, N>,

@@ -53,7 +53,7 @@ pub trait Carry<const N: usize>: Sync {
     fn shift(&self, x: &SVector<f64, N>, plus: bool) -> Shift;
     /// The state after a switch at `x` to f+ or f-.
     fn switched(&self, x: &SVector<f64, N>, to_plus: bool, shift: Shift) -> SVector<f64, N>;
-    /// What the disturbed past adds to the derivative at `x` under the smooth rule.
+    /// Change of the derivative at `x` by the disturbed past under the smooth rule.
     fn feedback(
         &self,
         x: &SVector<f64, N>,

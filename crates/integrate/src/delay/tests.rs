@@ -375,7 +375,7 @@ fn a_delay_that_times_cannot_tell_apart_is_refused() {
     }
 }
 
-/// How far from the surface an orbit is after 0.5, at a step's end.
+/// Largest distance of an orbit from the surface after t = 0.5, at ends of steps.
 struct Far {
     x0: SVector<f64, 1>,
     t_end: f64,

@@ -76,7 +76,7 @@ where
     run_from(system, origin, t_end, settings, &mut Chooser::new(rule), observer, monitor)
 }
 
-/// Where and when a run starts.
+/// Start of a run: time, state and departure.
 #[derive(Clone, Debug)]
 pub(super) struct Origin<const N: usize> {
     pub t: f64,
@@ -252,7 +252,7 @@ impl Sliding {
         if self.repelling { -1.0 } else { 1.0 }
     }
 
-    /// How far L+h and L-h are from zero; both are positive inside the region.
+    /// Signed distances of L+h and L-h from zero; both are positive inside the region.
     fn margins<P: PiecewiseSmooth<N>, const N: usize>(
         &self,
         system: &P,
@@ -473,7 +473,7 @@ struct Limits {
     kink: f64,
     /// Closer to a two-fold than so many tolerances there is nothing to integrate.
     blur: f64,
-    /// Where a zero of h is farther from the surface than this share of the state, h jumps.
+    /// Distance of a zero of h from the surface, as a share of the state, above which h jumps.
     jump: f64,
     /// Sliding restarts on the surface when it has drifted off by this share of the state, or by
     /// `drift_in_tolerances`.
@@ -911,8 +911,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         SIDES.into_iter().find_map(cause)
     }
 
-    /// Where the domain of a field on one of `sides` ends in a step, of which `state` is the part
-    /// that it depends on.
+    /// End of the domain of a field on one of `sides` in a step, as a fraction, and the reason in
+    /// words; `state` is the part of the step that the field depends on.
     fn domain_end(
         &self,
         sides: &[Side],

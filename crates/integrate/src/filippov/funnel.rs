@@ -15,8 +15,8 @@ use twofold_num::elementary::pow;
 use twofold_system::filippov::{Region, region};
 use twofold_system::{PiecewiseSmooth, Reversed, VectorField};
 
-/// Which members of the funnel to compute: exit times between the shortest and the longest, both
-/// sides of each.
+/// Grid of members of the funnel: exit times between the shortest and the longest, both sides of
+/// each.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FunnelGrid {
@@ -45,7 +45,7 @@ pub struct FunnelMember<const N: usize> {
     pub side: Side,
     /// The orbit from the set-valued point on.
     pub trajectory: Trajectory<N>,
-    /// How it ended.
+    /// End and work of its run.
     pub summary: FilippovSummary<N>,
 }
 

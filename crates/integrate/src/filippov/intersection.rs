@@ -242,8 +242,8 @@ pub(super) fn project<P: PiecewiseSmooth<N>, const N: usize>(
     (last <= 64.0 * f64::EPSILON * y.amax()).then_some(y)
 }
 
-/// How far from the intersection a state may be and count as on it, by coordinates: what the
-/// tolerances resolve.
+/// Distance from the intersection within which a state counts as on it, by coordinates: ten
+/// tolerances.
 pub(super) fn resolution<const N: usize>(
     settings: &FilippovOptions,
     x: &SVector<f64, N>,

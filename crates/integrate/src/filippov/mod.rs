@@ -134,7 +134,7 @@ pub enum EventKind {
     /// Crossings accumulated (Zeno) at a point where the motion stays: zero lies between the two
     /// fields there.
     Accumulation {
-        /// How long before it the last crossing was that was computed; from there on the durations
+        /// Time from the last computed crossing to the accumulation; from there on the durations
         /// are a geometric series.
         leg: f64,
     },
@@ -175,7 +175,7 @@ pub enum EventKind {
 pub struct ModeEvent<const N: usize> {
     /// When.
     pub t: f64,
-    /// Where; on the surface.
+    /// The state, on the surface.
     pub state: SVector<f64, N>,
     /// Its kind.
     pub kind: EventKind,
@@ -385,11 +385,11 @@ pub enum FilippovError {
     if continuations.is_empty() { "not known".to_owned() } else { continuations.join("; ") }
 )]
 pub struct Choice {
-    /// Where the motion is.
+    /// Description of the undecided place.
     pub what: &'static str,
     /// The possible continuations.
     pub continuations: Vec<String>,
-    /// What the user can do.
+    /// Advice to the user.
     pub remedy: &'static str,
 }
 

@@ -6,9 +6,9 @@
 //! the other surface is reached, which becomes the one that is followed. Crossing, sliding, folds,
 //! two-folds and the exit rule are those of [`engine`](super::engine) on each surface.
 //!
-//! Where both surfaces meet, [`intersection`](super::intersection) lists what may follow. If that
-//! is one motion it is followed, also along the intersection itself; else the run ends with
-//! [`FilippovError::Undecided`].
+//! At points where both surfaces meet, [`intersection`](super::intersection) lists the possible
+//! continuations. A single one is followed, also along the intersection itself; otherwise the run
+//! ends with [`FilippovError::Undecided`].
 
 use nalgebra::SVector;
 
@@ -213,7 +213,7 @@ where
                 "the motion does not get away from where both switching surfaces meet",
             ));
         }
-        // Who slides is on both surfaces; a flight that only comes near one may pass by.
+        // A sliding motion is on both surfaces; a flight that only comes near one may pass by.
         let mut corner = run.corner(&place, if mode.slides() { SLID } else { 1.0 });
         if let Some(at) = corner
             && !mode.slides()
@@ -453,7 +453,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> SurfacesRun<'_, P, N> {
     }
 }
 
-/// Where a run on one surface came to the other.
+/// Arrival of a run on one surface at the other.
 struct Hit<const N: usize> {
     t: f64,
     x: SVector<f64, N>,
@@ -509,8 +509,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> FilippovObserver<N> for Guard<'_, P,
     }
 
     fn event(&mut self, event: &ModeEvent<N>) -> Flow {
-        // What the engine says after the step in which the other surface was reached did not
-        // happen.
+        // Events after the step in which the other surface was reached did not happen.
         if self.hit.is_some() {
             return Flow::Stop;
         }

@@ -1,4 +1,4 @@
-//! What holds for any piecewise-smooth system: two sides that mirror each other, the local analysis
+//! Properties of any piecewise-smooth system: two sides that mirror each other, the local analysis
 //! against differences of the field itself, and a two-fold that is not at the origin.
 
 use nalgebra::{SVector, vector};
@@ -318,7 +318,7 @@ fn the_local_analysis_is_that_of_the_field_itself() {
             for (theta, part) in [(0.0, -0.5), (-from / (to - from), 0.0), (1.0, 0.25)] {
                 assert!((step.at(theta) - curve.at(part * curve.radius)).amax() < 1e-9, "{theta}");
             }
-            // Where the curve may be used it is in the sliding regions.
+            // Within the departure limit the curve lies in the sliding regions.
             let limit = local.departure_limit(&s, curve).unwrap();
             assert!(limit <= curve.radius);
             // Arrival along it takes the series' time; an orbit beside it, the linear flow's

@@ -94,7 +94,7 @@ pub struct SlidingAtTwoFold<const N: usize> {
 pub struct InvariantCurve<const N: usize> {
     /// The eigenvalue mu.
     pub rate: f64,
-    /// Which of the two eigendirections it follows.
+    /// Index, 0 or 1, of the eigendirection that it follows.
     pub index: usize,
     /// |sigma| up to which the truncated series satisfies the invariance equation to 1e-12.
     pub radius: f64,
@@ -233,7 +233,8 @@ impl<const N: usize> SlidingAtTwoFold<N> {
         Some((time, time.abs() * distance / self.radius))
     }
 
-    /// How far from the two-fold along the curve, forward in time, the series may be used: |sigma|.
+    /// Largest |sigma| along the curve, forward in time from the two-fold, up to which the series
+    /// may be used.
     pub(super) fn departure_limit<P: PiecewiseSmooth<N>>(
         &self,
         system: &P,
@@ -277,7 +278,7 @@ impl<const N: usize> FusedFolds<N> {
         let along = |g: SVector<f64, N>| g - normal * (g.dot(&normal) / normal.norm_squared());
         let (a, b) = (along(of_plus), along(of_minus));
         let (aa, ab, bb) = (a.norm_squared(), a.dot(&b), b.norm_squared());
-        // Where a gradient is normal to the surface the fold is not on it.
+        // If a gradient is normal to the surface, the fold is not on it.
         let across = aa > 1e-12 * of_plus.norm_squared() && bb > 1e-12 * of_minus.norm_squared();
         if !(across && aa * bb - ab * ab <= 1e-12 * aa * bb) {
             return None;

@@ -32,7 +32,7 @@ pub(super) struct Layer<const N: usize> {
     pub gradient: SVector<f64, N>,
     /// u at x = 0.
     pub constant: f64,
-    /// Where parts meet, from one edge to the other.
+    /// Boundaries of the parts, from one edge to the other.
     points: Vec<f64>,
     /// The way from edge to edge.
     known: Vec<Section>,
@@ -42,7 +42,7 @@ pub(super) struct Layer<const N: usize> {
 /// numbers both ways, since tanh is odd.
 #[derive(Clone, Default)]
 pub(super) struct Section {
-    /// Where it begins, where it ends.
+    /// Start of the section; its end follows.
     pub from: f64,
     pub to: f64,
     count: usize,
@@ -140,7 +140,7 @@ impl<const N: usize> Layer<N> {
         place
     }
 
-    /// Where the layer ends.
+    /// Edge of the layer, in units of u.
     pub fn edge(&self) -> f64 {
         self.points[self.points.len() - 1]
     }
@@ -325,7 +325,7 @@ impl<F: VectorField<N>, const N: usize, const K: usize> WithSimd for In<Collocat
         let zero = number(0.0);
         let half = lanes(&section.halves);
         let scale = x0.map(|x| 1.0 / (tolerance.atol + tolerance.rtol * x.abs()));
-        // What is kept is kept bare: numbers that know their instruction set are larger.
+        // Kept values are bare arrays: numbers that know their instruction set are larger.
         let full = |parts| Registers::<S, K>::new(set, parts);
         let mut tanh = [zero.parts(); STAGES];
         for j in 0..STAGES {
@@ -334,7 +334,7 @@ impl<F: VectorField<N>, const N: usize, const K: usize> WithSimd for In<Collocat
         let mut states = [[zero.parts(); N]; STAGES];
         let mut slopes = [[zero.parts(); N]; STAGES];
         let mut rates = [zero.parts(); STAGES];
-        // Where each part begins and ends.
+        // Beginning and end of each part.
         let (mut first, mut last) = ([zero.parts(); N], [zero.parts(); N]);
         let (mut evaluations, mut before) = (2, f64::NAN);
         for sweep in 0..SWEEPS {
@@ -374,7 +374,7 @@ impl<F: VectorField<N>, const N: usize, const K: usize> WithSimd for In<Collocat
             if forward.less(number(0.5), set).any() {
                 return (false, evaluations);
             }
-            // How far the ends of the parts have moved, and a state in the middle of each.
+            // Displacement of the parts' ends, and a state in the middle of each.
             let (mut moved, mut no_number) = (zero, zero);
             for i in 0..N {
                 let mut increment = number(gauss.weights[0]) * full(slopes[0][i]);
@@ -408,8 +408,8 @@ impl<F: VectorField<N>, const N: usize, const K: usize> WithSimd for In<Collocat
             if sweep > 0 {
                 before = change;
             }
-            // What is left is about change * contraction / (1 - contraction); of the first
-            // iteration nothing is known.
+            // The remaining error is about change * contraction / (1 - contraction); it is unknown
+            // after the first iteration.
             if sweep > 0 && (contraction < 0.5 && change * contraction <= 0.02 || change <= 0.02) {
                 let mut error = 0.0_f64;
                 for i in 0..N {

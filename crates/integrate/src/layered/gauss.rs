@@ -8,9 +8,9 @@ use twofold_num::elementary::cos;
 /// Stages.
 pub(super) const STAGES: usize = 8;
 
-/// How much smaller than its last Legendre coefficients the error of the integral is between the
-/// stages: the next coefficient, some six times smaller, times the integral of its polynomial, at
-/// most 1.5/(2 k + 1).
+/// Ratio of the integral's error between the stages to the last Legendre coefficients: the next
+/// coefficient, some six times smaller, times the integral of its polynomial, at most 1.5/(2 k +
+/// 1).
 pub(super) const BETWEEN: f64 = 0.25 / (2 * STAGES + 1) as f64;
 
 /// A number for each stage.
@@ -18,7 +18,7 @@ pub(super) type Stages = [f64; STAGES];
 
 /// The method's numbers, for steps from -1 to 1.
 pub(super) struct Gauss {
-    /// Where the stages are: zeros of the Legendre polynomial of degree 8.
+    /// Nodes of the stages: zeros of the Legendre polynomial of degree 8.
     pub nodes: Stages,
     /// Integrals from -1 to 1 of the Lagrange polynomials.
     pub weights: Stages,

@@ -107,7 +107,7 @@ struct Equation<const N: usize> {
     layer: Option<Layer<N>>,
 }
 
-/// Where the orbit is.
+/// Place of the orbit relative to the layer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Place {
     /// Beyond the edge, on the side of this sign; `leaving` if on the edge itself.
@@ -120,7 +120,7 @@ enum Place {
     Inside,
 }
 
-/// Which interpolant the last step has.
+/// Interpolant of the last step.
 enum Made {
     Arc,
     Crossing,

@@ -22,7 +22,7 @@ use twofold_num::Given;
 use twofold_num::elementary::{rough_exp2, rough_log2, tanh};
 use twofold_system::VectorField;
 
-/// How far u may seem to move in a step with w for a state. With 0.5 steps are a twentieth more,
+/// Largest apparent motion of u in a step with w for a state. With 0.5 steps are a twentieth more,
 /// and the error is larger; with 0.1 nothing is gained.
 const NEAR: f64 = 0.25;
 
@@ -34,7 +34,7 @@ const MIDDLE: f64 = 0.9;
 /// tenth more steps.
 const SHARE: f64 = 0.5;
 
-/// What is known of an orbit inside a layer beside what [`Dopri5`] keeps.
+/// State of an orbit inside a layer, in addition to that of [`Dopri5`].
 #[derive(Clone, Copy, Default)]
 pub(super) struct Sliding {
     /// u and tanh u.
@@ -152,7 +152,7 @@ fn longest<F: VectorField<N>, const N: usize>(
     STRIDE / minus.max(plus)
 }
 
-/// Where a step begins.
+/// Start of a step.
 struct Start<'a, F, const N: usize> {
     field: &'a F,
     layer: &'a Layer<N>,

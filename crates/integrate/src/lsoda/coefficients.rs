@@ -151,8 +151,8 @@ pub(super) static ERROR_RATIO: [f64; BDF_ORDERS] = {
     ratios
 };
 
-/// How far along the negative real axis the predictor-corrector Adams methods of orders 1 to 12 are
-/// stable, as
+/// Stability limits of the predictor-corrector Adams methods of orders 1 to 12 on the negative real
+/// axis, as |h lambda|: the values of Petzold (1983), who chose them a little inside the region.
 /// |h lambda|: the values of Petzold (1983), who chose them a little inside the region.
 pub(super) static ADAMS_STABILITY: [f64; ADAMS_ORDERS] =
     [0.5, 0.575, 0.55, 0.45, 0.35, 0.25, 0.20, 0.15, 0.10, 0.075, 0.050, 0.025];

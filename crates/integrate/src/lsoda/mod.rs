@@ -91,7 +91,7 @@ pub struct Switch {
 /// allocate.
 const SWITCHES_KEPT: usize = 256;
 
-/// What the selection at the end of a step decided. Carried out when the next step begins, so that
+/// Decision of the selection at the end of a step. Carried out when the next step begins, so that
 /// until then the history is the dense output of the step that was made.
 #[derive(Clone, Copy, Debug)]
 struct Change {

@@ -40,8 +40,8 @@ pub(super) const MATRIX_DRIFT: f64 = 0.3;
 pub(super) const FIRST_RATE: f64 = 0.7;
 /// Steps between a change of method and the next thought of one, Petzold (1983).
 pub(super) const STEPS_BEFORE_SWITCH: i32 = 20;
-/// How much longer the BDF step must be before Adams is left for it: a BDF step costs about that
-/// much more.
+/// Ratio of the BDF step to the Adams step above which Adams is left for BDF: a BDF step costs
+/// about that much more.
 pub(super) const SWITCH_RATIO: f64 = 5.0;
 
 /// The order-1-to-5 restriction of the stiffness test: an Adams order above needs accuracy, not

@@ -275,7 +275,7 @@ fn failures_are_named() {
     assert!(matches!(nan, Err(Failure::NotFinite { .. })));
 }
 
-/// What the shortcut in the stiffness test rests on.
+/// Premise of the shortcut in the stiffness test.
 #[test]
 fn bdf_is_never_the_more_accurate_formula() {
     for q in 1..=BDF_ORDERS {
@@ -283,8 +283,8 @@ fn bdf_is_never_the_more_accurate_formula() {
     }
 }
 
-/// What stability leaves of a step is a length, |lambda| h = Petzold's bound, however long the step
-/// that it is asked at; where accuracy allows less, it is accuracy's.
+/// Stability limits a step to a length, |lambda| h = Petzold's bound, independent of the step at
+/// which it is evaluated; a smaller limit is that of accuracy.
 #[test]
 fn the_longest_stable_step_does_not_depend_on_the_step_at_hand() {
     for (lipschitz, h) in
