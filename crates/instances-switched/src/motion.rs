@@ -13,7 +13,8 @@ use twofold_integrate::filippov::{
 };
 use twofold_system::{BindError, Bound, Caricature, Compiled, System};
 
-/// Where the smoothed orbits of widths cross the plane behind a visit, or what they failed with.
+/// Crossing of the plane behind a visit by the smoothed orbit of a width, if it does, or its
+/// failure.
 pub type Crossing<'a> = &'a mut dyn FnMut(f64) -> Result<Option<Vec<f64>>, FilippovError>;
 
 /// A discontinuous system of `N` states.

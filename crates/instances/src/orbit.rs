@@ -24,7 +24,7 @@ pub struct How {
     pub precision: Option<u16>,
     /// Degree of its series; the one that the tolerance asks for if absent.
     pub order: Option<u16>,
-    /// How far, and with what restarts and kicks.
+    /// Duration, restarts and kicks.
     pub options: DriveOptions,
 }
 
@@ -50,7 +50,7 @@ pub struct Waiting<'a, F, const N: usize> {
     pub field: &'a F,
     /// The start.
     pub x0: SVector<f64, N>,
-    /// How far, and with what restarts and kicks.
+    /// Duration, restarts and kicks.
     pub options: DriveOptions,
     /// Receives the steps.
     pub observer: &'a mut dyn Observer<N>,
