@@ -180,7 +180,7 @@ const STALLED: f64 = 100.0;
 const ITERATIONS: usize = 60;
 /// The least error of a multiplier.
 const ROUNDING: f64 = 1e-13;
-/// Where a multiplier is this near to 1, Newton's method goes on as long as it helps.
+/// Distance of a multiplier from 1 below which Newton's method goes on as long as it helps.
 const NEAR_ONE: f64 = 1e-3;
 /// A loop of at most so many times the integration's error is not told from a point.
 const POINT: f64 = 1e3;
@@ -372,7 +372,7 @@ impl Change {
 /// A change of stability, where it happens.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bifurcation {
-    /// Which.
+    /// Kind of the change.
     pub change: Change,
     /// The parameter's value.
     pub parameter: f64,
@@ -652,7 +652,7 @@ fn finish(
 ) {
     let (change, end) = ended(map, &branch.orbits, trouble, missed);
     if let (End::Vanished, Some(last)) = (&end, &change) {
-        // Where orbits shrink to a point a multiplier is 1, which is no change of its own.
+        // Orbits that shrink to a point have a multiplier 1: this is no change of its own.
         let near = |b: &Bifurcation| {
             (b.parameter - last.parameter).abs()
                 <= b.uncertainty + last.uncertainty + 1e-6 * scales.parameter
@@ -669,8 +669,8 @@ fn finish(
 /// none beyond it.
 const VANISHING: f64 = 0.1;
 
-/// What happens where the branch cannot be followed, and how it ends; the next member was looked
-/// for over `missed` of the parameter.
+/// The change at which a branch cannot be followed, and its end; the next member was looked for
+/// over `missed` of the parameter.
 fn ended(
     map: &dyn ReturnMap,
     orbits: &[Orbit],
@@ -696,8 +696,9 @@ fn ended(
     }
 }
 
-/// Where a branch of shrinking orbits ends: at a Hopf point, if the rest within has a pair of
-/// imaginary eigenvalues there, with the frequency of the orbits (Kuznetsov 2004, sec. 3.4).
+/// The bifurcation that ends a branch of shrinking orbits: a Hopf point, if the rest within has a
+/// pair of imaginary eigenvalues there, with the frequency of the orbits (Kuznetsov 2004, sec.
+/// 3.4).
 fn vanishing(map: &dyn ReturnMap, orbits: &[Orbit], missed: f64) -> Bifurcation {
     let last = &orbits[orbits.len() - 1];
     let before = orbits.iter().rev().find(|o| o.extent > 1.5 * last.extent).unwrap_or(last);
@@ -893,8 +894,8 @@ struct Located {
     error: f64,
 }
 
-/// Where a test function is zero between two members: by regula falsi (the Illinois variant, Dowell
-/// & Jarratt 1971) along the chord.
+/// Zero of a test function between two members: by regula falsi (the Illinois variant, Dowell &
+/// Jarratt 1971) along the chord.
 fn locate(
     map: &dyn ReturnMap,
     a: &Orbit,
@@ -1264,7 +1265,7 @@ mod tests {
                 // The first is a step in the parameter; the orbit is not where it was, and is
                 // found.
                 0 => assert!((dp - want).abs() < 1e-12 && pair[1].iterations == 1, "{pair:?}"),
-                // What follows a straight line needs no search.
+                // A step along a straight line needs no iteration.
                 _ if k + 2 < n => {
                     assert!(
                         (length - want).abs() < 1e-9 && pair[1].iterations == 0,
@@ -1388,7 +1389,7 @@ mod tests {
     fn changes_lie_between_the_members_that_differ() {
         let scales = Scales { state: 1.0, parameter: 1.0 };
         let of = |m: &[[f64; 2]], n: &[[f64; 2]]| -> Vec<(Change, f64)> {
-            // Where the map cannot tell where a multiplier passes the circle.
+            // A map that cannot locate the passage of a multiplier through the unit circle.
             let nothing = Zeros(|_: f64, _: f64| None);
             let found = changes(&nothing, &with(3.0, m), &with(8.0, n), &scales, NEWTON);
             assert!(found.iter().all(|b| (b.uncertainty - 2.5).abs() < 1e-12), "{found:?}");

@@ -44,7 +44,7 @@ pub enum Error {
     SetValued {
         /// When.
         t: f64,
-        /// Where.
+        /// The state.
         state: Vec<f64>,
     },
     /// The section lies where the orbit slides.

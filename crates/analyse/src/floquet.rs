@@ -57,10 +57,9 @@ impl Default for FloquetOptions {
 /// A closed orbit with its stability.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ClosedOrbit {
-    /// Where it crosses the plane in the counted direction, in the order of the motion; full
-    /// states.
+    /// Crossings of the plane in the counted direction, in the order of the motion; full states.
     pub points: Vec<Vec<f64>>,
-    /// Where it crosses in the other direction.
+    /// Crossings of the plane in the other direction.
     pub opposite: Vec<Vec<f64>>,
     /// Its period.
     pub period: f64,
@@ -230,7 +229,7 @@ where
     Err(Error::NotConverged { residual, iterations: settings.iterations })
 }
 
-/// Where an orbit from a plane comes back to it.
+/// Return of an orbit to its plane.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Returned {
     /// The state there, in the order of the states.
@@ -340,7 +339,7 @@ fn returned<const N: usize, const M: usize, T: VectorField<M>>(
             }
             let f = tangent.eval(&landing);
             let dt = (plane.value - landing[plane.axis]) / f[plane.axis];
-            // What is left is of the size of the dense output's error: first order in it suffices.
+            // The remaining error is of the size of the dense output's: first order in it suffices.
             let landing = landing + f * dt;
             let f = tangent.eval(&landing);
             let point =

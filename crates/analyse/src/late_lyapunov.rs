@@ -55,7 +55,7 @@ impl<const M: usize> WithTangent<M> for Waiting<'_> {
 
 struct Late<S, const M: usize> {
     stepper: S,
-    /// Where it is put before the next step.
+    /// State and tangent vector from which the next step begins, if they were replaced.
     displaced: Option<SVector<f64, M>>,
 }
 

@@ -173,7 +173,7 @@ pub struct AfterVisitQuestion {
     pub settings: FilippovOptions,
 }
 
-/// Where a member of the funnel crosses.
+/// Crossing of a member of the funnel.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MemberCrossing {
@@ -185,14 +185,13 @@ pub struct MemberCrossing {
     pub crossing: Vec<f64>,
 }
 
-/// Where a smoothed orbit goes after its first visit, and the member of the funnel that goes
-/// nearest.
+/// Crossing of a smoothed orbit after its first visit, and the nearest member of the funnel.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AfterVisitRow {
     /// The smoothing parameter.
     pub eps: f64,
-    /// Where the smoothed orbit crosses.
+    /// Point at which the smoothed orbit crosses.
     pub crossing: Vec<f64>,
     /// The member that crosses nearest.
     pub nearest: MemberCrossing,
@@ -206,7 +205,7 @@ pub struct AfterVisitRow {
 pub struct AfterVisit {
     /// When the future becomes a set.
     pub t_visit: f64,
-    /// Where.
+    /// The state at that time.
     pub point: Vec<f64>,
     /// The crossings of the first grid's members, by exit time, plus before minus; members that
     /// make none are left out.

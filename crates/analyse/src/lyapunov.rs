@@ -414,11 +414,11 @@ fn mean_of(rates: &[f64], settings: &LyapunovOptions) -> Exponent {
 
 /// The mean with its interval, `steps` having been made until `t`.
 ///
-/// Where vectors grow like a power of time, as at a shear or in regular motion, the mean falls like
-/// ln(t)/t and its scatter says nothing of it (Skokos 2010, Lect. Notes Phys. 790, 63-135, sec. 5):
-/// ln |v| = exponent t + power ln t is fitted to the blocks, and the interval reaches as far as the
-/// power matters. The method's local errors, at most its tolerance in each step, would make a
-/// vector grow or shrink by themselves.
+/// If vectors grow like a power of time, as at a shear or in regular motion, the mean falls like
+/// ln(t)/t and its scatter does not show this error (Skokos 2010, Lect. Notes Phys. 790, 63-135,
+/// sec. 5): ln |v| = exponent t + power ln t is fitted to the blocks, and the interval is widened
+/// by the difference of the two exponents. The method's local errors, at most its tolerance in each
+/// step, would make a vector grow or shrink by themselves: their bound is added.
 pub(super) fn estimate_of(
     rates: &[f64],
     settings: &LyapunovOptions,

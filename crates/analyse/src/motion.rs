@@ -92,7 +92,7 @@ impl<const D: usize> MotionRecorder<D> {
         Motion { pieces, events: std::mem::take(&mut self.events) }
     }
 
-    /// What was recorded.
+    /// The recorded motion.
     pub fn into_motion(self) -> Motion<D> {
         let pieces =
             self.pieces.into_iter().map(|(mode, path)| (mode, path.into_samples())).collect();
@@ -149,7 +149,7 @@ impl<const D: usize> TimedMotion<D> {
         Motion { pieces, events: std::mem::take(&mut self.events) }
     }
 
-    /// What was recorded.
+    /// The recorded motion.
     pub fn into_motion(mut self) -> Motion<D> {
         self.take()
     }
@@ -263,7 +263,7 @@ mod tests {
                 && !taken.is_empty()
                 && taken.events.len() == 1
         );
-        // What comes next belongs to the last piece.
+        // Later steps continue the last piece.
         assert_eq!(r.kept(), 0);
         step(&mut r, Mode::Minus, 4.0, 5.0);
         step(&mut r, Mode::SlidingAttracting, 5.0, 6.0);

@@ -130,8 +130,8 @@ impl Predicted {
         speed2 * (1.0 / self.mu - 1.0) / (a - speed2 / (self.mu * z2))
     }
 
-    /// What the logarithm adds to the powers [`Predicted::across`] and [`Predicted::along`] at a
-    /// given eps, where z^2/eps = `z2`: the growth has 1/T as a factor (the faster the deviation
+    /// Correction of the powers [`Predicted::across`] and [`Predicted::along`] by the logarithm at
+    /// a given eps, where z^2/eps = `z2`: the growth has 1/T as a factor (the faster the deviation
     /// grows when the surface is left, the less the place moves).
     pub fn correction(&self, slope: f64, z2: f64) -> f64 {
         0.5 * self.selection(slope, z2) / z2
@@ -183,7 +183,7 @@ pub struct Disturbed {
 pub struct PassageAnswer {
     /// When y = 0 was passed within sqrt(eps) of the two-fold.
     pub visit: Option<f64>,
-    /// Where the surface was left: [`Leaving`].
+    /// Point at which the surface was left: [`Leaving`].
     pub leaving: Option<[f64; 3]>,
     /// The first passage through x = 0 after the visit, farther out than sqrt(eps).
     pub surface: Option<[f64; 3]>,
@@ -250,7 +250,7 @@ impl Leaving {
         self.last = Some(x);
     }
 
-    /// Where the surface was left, once it is known.
+    /// Point at which the surface was left, once it is known.
     pub fn place(&self) -> Option<[f64; 3]> {
         self.left
     }
@@ -288,7 +288,7 @@ fn approach<F: VectorField<3>>(
     let slides = |x: &SVector<f64, 3>| x[0].abs() < IN_LAYER * eps && x[1] > 0.0 && x[2] > 0.0;
     let (mut flight, mut sliding) = (Taylor::<3>::new(FLIGHT), Radau5::<3>::new(SLIDING));
     let (mut t, mut x) = (0.0, start);
-    // Which of the two methods knows the state.
+    // Whether the method that holds the state is the implicit one; none at the start.
     let mut implicit = None;
     while x.amax() >= near && t < by {
         let steps = flight.statistics().steps + sliding.statistics().steps;

@@ -436,7 +436,7 @@ mod tests {
         r.step(&step);
         assert_eq!(r.len(), 3);
         let taken = r.take();
-        // What the state does not have is zero.
+        // Components beyond the state's dimension are zero.
         assert!(
             taken.len() == 3 && r.len() == 0 && taken[0].x == [1.0, 0.0, 0.0, 0.0],
             "{taken:?}"

@@ -822,7 +822,8 @@ mod tests {
         assert!(return_time(&[1.0; 4]).is_nan() && return_time(&[4.0, 3.0, 2.0]).is_nan());
     }
 
-    /// What is found in points at one place after another; the last has phase 0.
+    /// Period, spreads and block that [`Turns::find`] gives for `points` in order; the last has
+    /// phase 0.
     fn found(points: &[Point], extent: f64) -> (usize, Vec<f64>, usize) {
         let turns = Turns::find(points, &[], extent, &Thresholds::default());
         let n = points.len();

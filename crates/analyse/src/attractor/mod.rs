@@ -1,4 +1,4 @@
-//! What a run settles on, decided from its section.
+//! Classification of a run's attractor from its Poincare section.
 //!
 //! [`classify`] takes the points of a Poincare section and returns a [`Verdict`] with its
 //! [`Evidence`]. In order:
@@ -456,7 +456,7 @@ mod tests {
             let cycle = e.verdict.cycle().unwrap();
             assert_eq!((e.name.as_str(), cycle.period, cycle.captured_at), (name, 1, 1e6), "{e:?}");
             assert!((cycle.approach.unwrap().per_time / gamma - 1.0).abs() < 0.05, "{e:?}");
-            // What is written of it is read again.
+            // The evidence survives a round trip through JSON.
             let text = serde_json::to_string(&e).unwrap();
             assert_eq!(serde_json::from_str::<Evidence>(&text).unwrap(), e);
             if gamma == 1e-4 {

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::{SectionPoint, Thresholds};
 use twofold_num::random::RandomStream;
 
-/// How much emptier than the sea the islands of noise-free runs are in a noisy one.
+/// Density contrast between the sea and the islands of noise-free runs in a noisy run.
 ///
 /// The sea is every cell that a noise-free run visits; an island is a hole of several cells in it.
 /// With the densities of points per cell, the contrast is 1 - (density in islands)/(density in
@@ -133,8 +133,8 @@ impl Map {
     fn of(grid: &Grid, points: &[[f64; 2]], island_cells: usize) -> Option<Self> {
         let side = grid.cells + 2;
         let visited = grid.count(points);
-        // What is not visited and can be walked to from the border is outside; other holes are
-        // islands if they are large enough.
+        // Unvisited cells connected to the border are outside; other holes are islands if they are
+        // large enough.
         let mut places: Vec<Option<Place>> =
             visited.iter().map(|n| (*n > 0).then_some(Place::Sea)).collect();
         let hole = |from: usize, places: &mut Vec<Option<Place>>| -> Vec<usize> {

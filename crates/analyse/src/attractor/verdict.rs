@@ -71,16 +71,16 @@ pub enum Verdict {
         /// Number of separate pieces visited in turn.
         bands: usize,
     },
-    /// What tells regular from irregular motion contradicts itself, or the largest exponent is
-    /// consistent with zero.
+    /// The tests of regularity contradict each other, or the largest exponent is consistent with
+    /// zero.
     Undecided {
         /// The largest exponent given with the question, with its error.
         lyapunov: Option<Exponent>,
     },
     /// Random.
     Noisy {
-        /// How much emptier than the sea the islands of noise-free runs still are; absent where
-        /// there is nothing to compare with.
+        /// Density contrast between the sea and the islands of noise-free runs; absent without a
+        /// comparison.
         contrast: Option<super::Contrast>,
         /// The closed orbit around which the noise holds the run in small clouds, if it does.
         around: Option<Cycle>,
