@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 use sha2::{Digest, Sha256};
 
-/// What a digest is made of.
+/// Sources that a digest covers, by path.
 #[derive(Default)]
 pub struct Sources(BTreeMap<String, Vec<u8>>);
 
@@ -49,8 +49,8 @@ impl Sources {
                 let text = String::from_utf8(bytes).map_err(|e| invalid(e.to_string()))?;
                 let (code, modules) = code(&text).map_err(invalid)?;
                 bytes = code.into_bytes();
-                // Where the file of a module stands that this file names: beside lib.rs, main.rs
-                // and mod.rs, below others.
+                // Folder of the modules that this file declares: beside lib.rs, main.rs and mod.rs,
+                // below others.
                 let stem = name.trim_end_matches(".rs");
                 let base = match stem.rsplit_once('/') {
                     Some((folder, "lib" | "main" | "mod")) => folder,
@@ -129,8 +129,8 @@ impl Sources {
     }
 }
 
-/// What Rust code says: its tokens, one a line, without comments, documentation and items under
-/// `#[cfg(test)]`; and the names of test modules that stand in files of their own.
+/// Tokens of Rust code, one a line, without comments, documentation and items under `#[cfg(test)]`;
+/// and the names of test modules that stand in files of their own.
 ///
 /// # Errors
 ///
