@@ -29,7 +29,7 @@ pub struct Answer {
 pub enum Stop {
     /// All that was asked for was done.
     Finished,
-    /// What was looked for was found before the time was up.
+    /// The condition looked for was met before the end time.
     Found,
     /// The future is a set, and the question names no member to follow.
     SetValued,

@@ -128,7 +128,7 @@ pub(super) enum SoFar<T> {
 
 impl Classification {
     fn evidence(&self, executor: &dyn Ask) -> Result<Evidence, JobError> {
-        // What cannot be judged is not computed.
+        // A run that cannot be judged is not computed.
         plane(&self.run)?;
         self.evidence_of(executor, &*executor.ask(&Run(self.run.clone()))?)
     }
@@ -143,7 +143,7 @@ impl Classification {
         }
     }
 
-    /// What an answer to the run's question comes to without the orbit's exponent.
+    /// Verdict on the run's answer, as far as it is known without the orbit's exponent.
     pub(super) fn so_far(
         &self,
         executor: &dyn Ask,
@@ -277,7 +277,7 @@ fn refused(why: &str) -> JobError {
     JobError::Other(why.into())
 }
 
-/// Where the run ended, and its section as the classifier takes it: in the plane of the first two
+/// End of the run, and its section as the classifier takes it: in the plane of the first two
 /// coordinates that the section leaves free. With two states there is one, and the other is 0; with
 /// more than three this is a projection, in which different points may fall together but one
 /// orbit's period, its approach and its irregularity are seen as they are.

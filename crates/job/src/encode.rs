@@ -160,7 +160,7 @@ fn headings(table: &Table) -> Vec<ColumnHeading> {
     table.columns.iter().map(heading).collect()
 }
 
-/// What starts the line of metadata: a comment to gnuplot, NumPy, R and pandas (`comment="#"`).
+/// Prefix of the line of metadata: a comment to gnuplot, NumPy, R and pandas (`comment="#"`).
 const COMMENT: &str = "# ";
 
 /// CSV: a line of column names, a row per line with shortest round-trip numbers (blanks are empty),

@@ -196,7 +196,7 @@ fn said(answer: &Answer) -> String {
     let work =
         answer.statistics.as_ref().map(|s| format!("{} steps, {rows}", s.steps)).unwrap_or(rows);
     match answer.stop {
-        // What was looked for, such as an event that ends the run, is said by the command.
+        // The command reports a condition that was met, such as an event that ends the run.
         Stop::Finished | Stop::Found => work,
         other => format!("{work}, {}", other.word()),
     }
@@ -296,7 +296,7 @@ mod tests {
             assert_eq!(executor.ask_in_passing(&question).unwrap().fact::<u64>("value"), Ok(1));
             assert_eq!(COUNT.load(Ordering::Relaxed), times);
         }
-        // What is there already is taken.
+        // An answer that is kept already is used.
         executor.ask(&question).unwrap();
         executor.ask_in_passing(&question).unwrap();
         assert_eq!(COUNT.load(Ordering::Relaxed), 3);

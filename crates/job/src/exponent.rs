@@ -43,7 +43,7 @@ pub struct LargestExponent {
     pub system: System,
     /// The switch; kicks are part of the settings.
     pub switch: SwitchSpec,
-    /// Where the orbit starts.
+    /// Start of the orbit.
     pub start: Vec<f64>,
     /// Options of the computation.
     pub settings: lyapunov::LyapunovOptions,

@@ -127,7 +127,7 @@ impl GeneralRun {
         let number = |value: &Value, what: &str| value.as_f64().ok_or_else(|| wrong(what));
         let read = |value: &Value| expression(value.as_str().unwrap_or_default(), &model);
         let (method, observe) = (&json["method"], &json["observe"]);
-        // What is not finite is null.
+        // A value that is not finite is null in JSON.
         let length = |value: &Value| value.as_f64().unwrap_or(f64::INFINITY);
         let options = Options {
             t_start: number(&json["t_start"], "the start")?,
@@ -169,7 +169,7 @@ impl GeneralRun {
         Ok(Self { model, options })
     }
 
-    /// What a file of this run says about itself.
+    /// Description of this run in its files.
     pub fn about(&self) -> Value {
         json!({ "kind": "general-run", "question": self.json() })
     }
@@ -488,7 +488,7 @@ pub struct Family {
     pub changes: bool,
 }
 
-/// Where a motion rests.
+/// Place at which a motion rests.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum RestPlace {

@@ -22,7 +22,7 @@ pub struct GeneralOrbit {
     pub run: GeneralRun,
     /// Time in which the motion settles first; whole periods of a drive.
     pub settle: f64,
-    /// Where or when an orbit closes.
+    /// Return after which an orbit closes: crossings of a section, or a period.
     pub after: Return,
     /// The parameter to follow it along.
     pub along: Option<Along>,

@@ -85,7 +85,7 @@ pub use run::Run;
 pub use store::Store;
 pub use table::{Column, Entry, Table};
 
-/// What the tests of this crate ask about.
+/// Systems and runs for the tests of this crate.
 #[cfg(test)]
 mod cases {
     use super::spec::*;

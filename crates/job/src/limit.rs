@@ -23,7 +23,7 @@ use twofold_system::{System, Transition};
 pub struct SmoothingLimit {
     /// The system.
     pub system: System,
-    /// Which orbits, when.
+    /// Orbits and times to compare.
     pub compared: ConvergenceQuestion,
 }
 
@@ -65,14 +65,14 @@ impl Question for SmoothingLimit {
     }
 }
 
-/// Where smoothed orbits go after the first visit to a two-fold, and the member of the funnel of
-/// Filippov futures that goes nearest. Tables: `funnel`, a row per future that makes the crossing;
-/// `after`, a row per eps. Facts: `t_visit`, `width` (the funnel's, at the crossing).
+/// Crossings of smoothed orbits after the first visit to a two-fold, and the nearest member of the
+/// funnel of Filippov futures. Tables: `funnel`, a row per future that makes the crossing; `after`,
+/// a row per eps. Facts: `t_visit`, `width` (the funnel's, at the crossing).
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct AfterVisit {
     /// The system.
     pub system: System,
-    /// Which orbits, which futures.
+    /// Orbits and futures to compare.
     pub compared: AfterVisitQuestion,
 }
 
@@ -97,7 +97,7 @@ impl AfterVisit {
         Ok(eps.iter().map(passage).collect())
     }
 
-    /// Where they cross.
+    /// Crossing of each smoothed orbit, by eps; none if it was not reached.
     fn smoothed(&self, executor: &dyn Ask) -> Result<Vec<Smoothed>, JobError> {
         let passages = self.passages()?;
         let mut found = Vec::with_capacity(passages.len());

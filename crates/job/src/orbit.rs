@@ -62,7 +62,7 @@ pub struct ClosedOrbit {
     pub system: System,
     /// The switch.
     pub switch: SwitchSpec,
-    /// Where to begin.
+    /// State at which the search begins.
     pub start: Vec<f64>,
     /// Longest time for which the motion settles before Newton's method begins; 0: not at all.
     pub settle: f64,
@@ -101,7 +101,7 @@ fn has_past(switch: SwitchSpec) -> Option<SpecError> {
 pub struct Along {
     /// Its name: one of the system's, or `eps`.
     pub parameter: String,
-    /// Where the first orbit is looked for.
+    /// Parameter value at which the first orbit is sought.
     pub from: f64,
     /// The other end.
     pub to: f64,
@@ -206,10 +206,10 @@ impl Question for ClosedOrbit {
     }
 }
 
-/// Where the motion from the start settles.
+/// Set on which the motion from the start settles: a first guess.
 #[derive(Clone, Debug, PartialEq)]
 enum Guess {
-    /// Where Newton's method begins, in the equation's states, and the number of returns.
+    /// Start of Newton's method, in the equation's states, and the number of returns.
     Loop {
         point: Vec<f64>,
         returns: usize,

@@ -13,7 +13,7 @@ use twofold_instances::{self as instances, How, Orbits};
 use twofold_integrate::{DriveOptions, Method, Monitor, Schedule, Statistics, StepCap, Tolerance};
 use twofold_system::{System, Transition};
 
-/// How the smoothed orbit passes the two-fold at the origin. Table `passage`: one row with the
+/// Passage of the smoothed orbit by the two-fold at the origin. Table `passage`: one row with the
 /// visit's time and the places of leaving (`left_`), of the first passage through x = 0
 /// (`surface_`), of the exit on y = 0 (`exit_`) and of the far exit (`far_`); blank what did not
 /// happen. Table `growth`: a row per moment at which disturbances are made (`offset`, in units of
@@ -98,8 +98,8 @@ impl TwoFoldPassage {
     }
 }
 
-/// Where orbits leave the switching surface behind the two-fold at the origin, whatever decides
-/// their switching: smoothing or hysteresis, with or without kicks. Table `leaving`: a row per run;
+/// Points at which orbits leave the switching surface behind the two-fold at the origin, under any
+/// switching rule: smoothing or hysteresis, with or without kicks. Table `leaving`: a row per run;
 /// blank if the orbit was not there in time.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Leaving {
@@ -261,8 +261,8 @@ mod tests {
         }
     }
 
-    /// What happened in its columns, what did not blank; what was carried from the start before all
-    /// that was made near the visit.
+    /// Quantities that were found fill their columns, others are blank; disturbances carried from
+    /// the start come before all that were made near the visit.
     #[test]
     fn a_passage_is_two_tables() {
         let question = TwoFoldPassage {

@@ -48,7 +48,7 @@ pub enum Stability {
 pub struct Rest {
     /// The field of which it is a zero.
     pub kind: RestKind,
-    /// Where; with phi as last state, if the switch is hysteretic.
+    /// The state, with phi as last component if the switch is hysteretic.
     pub state: Vec<f64>,
     /// Eigenvalues (real, imaginary) of the equation there, by falling real part; along the
     /// surface, of a pseudo-equilibrium. None where the equation has no derivative.
@@ -216,7 +216,7 @@ fn pseudo(system: &System, plus: &Field, minus: &Field, from: &[f64]) -> Option<
     let mut start = from.to_vec();
     start.push(if weight.is_finite() { weight } else { 0.5 });
     let Some(found) = zero(&start, n, &equations) else {
-        // Where the fields have no derivative the run may have come to the very point (in finite
+        // If the fields have no derivative, the run may have come to the very point (in finite
         // time).
         let left: Vec<f64> = m.iter().zip(&along).map(|(m, a)| m + weight * a).collect();
         let at_rest = size(&left) <= 1e-6 * size(&p).max(size(&m)) && (0.0..=1.0).contains(&weight);

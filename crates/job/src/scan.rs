@@ -85,7 +85,7 @@ struct Found {
     late: Vec<(f64, Vec<f64>)>,
     /// Over two settings.
     landing: Option<Landing>,
-    /// Where the run ended: state and mode.
+    /// End of the run: state and mode.
     end: Option<(Vec<f64>, usize)>,
 }
 
@@ -135,7 +135,7 @@ impl Scan {
     /// start or attractor, are one.
     ///
     /// # Errors
-    /// What does not go together, in words.
+    /// Settings that contradict each other, in words.
     pub fn new(sweep: Sweep, follow: Option<Follow>, alike: f64) -> Result<Self, String> {
         let scan = Self { sweep, follow, alike };
         let axes = scan.axes();
@@ -196,7 +196,7 @@ impl Scan {
         self.axes().len() == 2
     }
 
-    /// Which way attractors are followed.
+    /// Direction in which attractors are followed.
     pub fn follow(&self) -> Option<Follow> {
         self.follow
     }

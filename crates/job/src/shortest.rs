@@ -72,8 +72,8 @@ mod tests {
         assert!(text.is_empty());
     }
 
-    /// Where the two differ at all, which is why the one is not simply the other: both neighbours
-    /// are equally near.
+    /// Values for which the two writers differ, which is why the one is not simply the other: both
+    /// neighbours are equally near.
     #[test]
     fn where_two_texts_are_equally_near() {
         let mut ties = 0;

@@ -618,7 +618,7 @@ fn observed<const D: usize, const N: usize>(
     })
 }
 
-/// How the run is made; `states` of the equation's components are the system's.
+/// Method and options of the run; `states` of the equation's components are the system's.
 fn how(spec: &RunSpec, states: usize) -> How {
     let MethodSpec { name, tolerance, step_cap, max_steps, precision, order } = spec.method;
     let options = DriveOptions {
@@ -649,7 +649,7 @@ mod tests {
         [SwitchSpec::tanh(1e-2), hysteretic, SwitchSpec::Filippov { exit, funnel: None }]
     }
 
-    /// What is given away in parts: all rows, and how many each part had.
+    /// A run that is streamed in parts: all rows, and the number of rows in each part.
     fn in_parts(run: &RunSpec) -> (Streamed, Vec<Vec<crate::Entry>>, Vec<usize>) {
         let (mut rows, mut parts) = (Vec::new(), Vec::new());
         let mut take = |table: &Table| {

@@ -87,7 +87,7 @@ pub enum SwitchSpec {
         /// Transition function; given if `eps` is.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         transition: Option<Transition>,
-        /// Where the orbit was before the start.
+        /// The orbit before the start.
         #[serde(default)]
         history: History,
     },
@@ -102,17 +102,16 @@ pub enum SwitchSpec {
     },
     /// The discontinuous system itself, in Filippov's sense (sec. 3).
     Filippov {
-        /// How repelling sliding ends: the choice that the equations do not make.
+        /// End of repelling sliding: the choice that the equations do not make.
         exit: ExitRule,
-        /// Which futures are followed if `exit` is [`ExitRule::All`]; required there, absent
+        /// Futures that are followed if `exit` is [`ExitRule::All`]; required there, absent
         /// elsewhere.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         funnel: Option<FunnelSpec>,
     },
 }
 
-/// Which members of a funnel are computed: exit times, geometrically spaced, and both sides of
-/// each.
+/// Grid of the members of a funnel: exit times, geometrically spaced, and both sides of each.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FunnelSpec {

@@ -57,7 +57,7 @@ pub enum Kept {
     Damaged(String),
 }
 
-/// How an entry begins.
+/// First bytes of an entry.
 const MAGIC: &[u8; 16] = b"twofold answer 1";
 /// Length of the digest at an entry's end, in hexadecimal.
 const DIGEST: usize = 64;
@@ -83,7 +83,7 @@ impl Store {
         Self { folder: folder.into() }
     }
 
-    /// Where it is.
+    /// Folder of the store.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
@@ -100,7 +100,7 @@ impl Store {
         self.within(&path).is_ok() && path.is_file()
     }
 
-    /// What is kept under `key` for `question`.
+    /// The entry under `key` for `question`.
     pub fn get(&self, key: &Hash, question: &dyn Question) -> Kept {
         let path = self.path(key);
         if let Err(error) = self.within(&path) {
@@ -381,8 +381,8 @@ mod tests {
         assert_eq!(store.entries().unwrap(), []);
     }
 
-    /// What the store did not write stays, whatever it is called; links are followed neither when
-    /// reading, writing nor removing.
+    /// Files that the store did not write stay, whatever their names; links are followed neither
+    /// when reading, writing nor removing.
     #[cfg(unix)]
     #[test]
     fn what_is_not_the_stores_is_left_alone() {
@@ -463,7 +463,7 @@ mod tests {
         assert!(another(store.get(&ours, &question)), "under another key");
         store.put(&ours, &question, &answer).unwrap();
         assert_eq!(store.get(&ours, &question), Kept::Answer(answer));
-        // What is there and no file cannot be read; it is not nothing.
+        // An entry that exists and is no file cannot be read; it does not count as absent.
         fs::remove_file(store.path(&others)).unwrap();
         assert_eq!(store.get(&others, &question), Kept::Nothing);
         fs::create_dir(store.path(&others)).unwrap();

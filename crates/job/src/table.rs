@@ -52,7 +52,7 @@ pub struct Words {
     pub vocabulary: Vec<String>,
     /// Index into the vocabulary, row by row.
     pub codes: Vec<u32>,
-    /// Where in the vocabulary a word stands; empty as long as looking through it is soon done.
+    /// Index of a word in the vocabulary; empty as long as a linear search is fast.
     places: HashMap<String, usize>,
 }
 

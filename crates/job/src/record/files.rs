@@ -2,8 +2,8 @@
 //! or a run that is killed, never sees half a file, and an existing file stays until its successor
 //! is whole.
 //!
-//! What is not a regular file (a pipe, a terminal, an open descriptor such as /dev/stdout) is
-//! written to and never replaced. A symbolic link is followed, and what it leads to is replaced,
+//! A target that is not a regular file (a pipe, a terminal, an open descriptor such as /dev/stdout)
+//! is written to and never replaced. A symbolic link is followed, and what it leads to is replaced,
 //! not the link. A temporary file is locked by the process that writes it, so that another process
 //! can tell those of the dead from those of the living and remove them.
 
@@ -174,7 +174,7 @@ pub fn try_folder(folder: &Path) -> Result<(), FileError> {
     Temporary::new_in(there).map(drop).map_err(FileError::new("write in", there))
 }
 
-/// Where bytes go.
+/// Target of a write.
 enum Place {
     /// Something that is written to as it stands.
     Stream,
@@ -255,7 +255,7 @@ const SUFFIX: &str = ".tmp";
 /// Random characters between them.
 const RANDOM: usize = 6;
 
-/// What this process has under way, for [`abandon`].
+/// Unfinished writes of this process, for [`abandon`].
 static UNDER_WAY: Mutex<UnderWay> =
     Mutex::new(UnderWay { temporaries: BTreeSet::new(), swept: BTreeSet::new() });
 
@@ -389,7 +389,7 @@ pub fn sweep(folder: &Path) -> usize {
 pub fn abandon() {
     let mine = under_way();
     for path in &mine.temporaries {
-        // What cannot be removed now is swept by a later run.
+        // A file that cannot be removed now is swept by a later run.
         let _ = fs::remove_file(path);
     }
     std::mem::forget(mine);
@@ -526,7 +526,7 @@ mod tests {
         write(&path, b"two").unwrap();
         assert_eq!(read(&path).unwrap(), b"two");
         assert_eq!(names(path.parent().unwrap()), ["b.txt"]);
-        // Who had the old file open still has it whole: it was replaced, not written over.
+        // A reader of the old file still has it whole: it was replaced, not written over.
         assert_eq!(at_most(reader, 100).unwrap(), b"the first and longer one");
     }
 
@@ -813,7 +813,7 @@ mod tests {
         );
     }
 
-    /// What cannot be put in its place leaves nothing, and what is there stays.
+    /// A file that cannot be put in its place leaves nothing behind, and the target stays.
     #[test]
     fn a_place_that_is_taken_meanwhile_leaves_no_litter() {
         let folder = tempfile::tempdir().unwrap();

@@ -25,7 +25,7 @@ impl TryFrom<String> for Hash {
         if text.len() == 64 && text.bytes().all(digit) {
             Ok(Hash(text))
         } else {
-            // What stands there may be long; its beginning tells enough.
+            // The text may be long; its beginning suffices.
             Err(NotAHash(text.chars().take(80).collect()))
         }
     }

@@ -119,7 +119,7 @@ pub enum ManifestError {
     /// Not JSON, or not of this shape.
     #[error("{name} is not a manifest: {source}; make one with `twofold bless`")]
     Syntax {
-        /// Where it came from.
+        /// Origin of the manifest, such as its path.
         name: String,
         /// The parser's message.
         source: serde_json::Error,
@@ -130,7 +130,7 @@ pub enum ManifestError {
             anew with `twofold bless`, or use the release that made it"
     )]
     Version {
-        /// Where it came from.
+        /// Origin of the manifest, such as its path.
         name: String,
         /// Its version.
         found: u64,
@@ -141,7 +141,7 @@ pub enum ManifestError {
             most {LONGEST_NAME} of them, and does not begin with \".\""
     )]
     Name {
-        /// Where it came from.
+        /// Origin of the manifest, such as its path.
         name: String,
         /// The kind of thing named.
         bad: String,
@@ -149,7 +149,7 @@ pub enum ManifestError {
     /// Two entries for one picture.
     #[error("{name} lists {picture} twice; make it anew with `twofold bless`")]
     Twice {
-        /// Where it came from.
+        /// Origin of the manifest, such as its path.
         name: String,
         /// The picture.
         picture: String,

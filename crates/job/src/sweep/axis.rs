@@ -95,7 +95,7 @@ pub enum Values {
     Multiples {
         /// The number.
         of: f64,
-        /// How many.
+        /// Number of values.
         count: u64,
     },
     /// Evenly spaced, both ends included.
@@ -104,7 +104,7 @@ pub enum Values {
         from: f64,
         /// The last.
         to: f64,
-        /// How many.
+        /// Number of values.
         count: u64,
     },
     /// Evenly spaced in the logarithm, both ends included, rounded to 15 digits so that 1e-3..1 in
@@ -114,7 +114,7 @@ pub enum Values {
         from: f64,
         /// The last.
         to: f64,
-        /// How many.
+        /// Number of values.
         count: u64,
     },
     /// Drawn uniformly from [from, to), anew for every row.
@@ -137,7 +137,7 @@ pub enum Values {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Axis {
-    /// What varies.
+    /// The varied coordinate.
     pub coordinate: Coordinate,
     /// Its values.
     pub values: Values,
@@ -149,7 +149,7 @@ pub struct Axis {
 pub struct AxisError {
     /// The axis, as it was given.
     pub axis: String,
-    /// What is wrong, and what to do.
+    /// The problem, and its remedy.
     pub problem: String,
 }
 
@@ -584,7 +584,7 @@ mod tests {
         assert_eq!(values("params.beta=0.25,1e-5"), numbers(&[0.25, 1e-5]));
     }
 
-    /// What only a file or a program can say.
+    /// Values that only a file or a program can contain.
     #[test]
     fn values_that_do_not_fit_are_refused() {
         use Coordinate::{Method, Rtol, Seed};

@@ -20,11 +20,11 @@ use crate::table::{Column, Entry};
 const LONGER: f64 = 0.05;
 const STILL: f64 = 1e-6;
 
-/// What a run of a general system ends on. Fact: `ending` ([`GeneralEnding`]).
+/// Outcome of a run of a general system. Fact: `ending` ([`GeneralEnding`]).
 #[derive(Clone, Debug, PartialEq)]
 pub struct GeneralOutcome(pub GeneralRun);
 
-/// Where a run of a general system ends.
+/// End of a run of a general system.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GeneralEnding {
     /// The outcome: of a run that looks at a section or at multiples of a time what
@@ -144,7 +144,7 @@ impl GeneralOutcome {
 }
 
 impl GeneralEnding {
-    /// What a row says beside the outcome, in the order of [`columns`].
+    /// Cells of a row beside the outcome, in the order of [`columns`].
     pub(super) fn cells(&self) -> Vec<Entry> {
         let whole = |v: u64| Entry::Integer(i64::try_from(v).unwrap_or(i64::MAX));
         let state = self.state.iter().map(|v| Entry::Number(*v));
@@ -187,7 +187,7 @@ fn is_looked_at(options: &Options) -> bool {
     }
 }
 
-/// Where a run begins.
+/// Start of a run.
 pub(crate) fn start_of(run: &GeneralRun) -> Result<Vec<f64>, String> {
     let given =
         run.options.start.clone().map_or_else(|| run.model.start(), |start| Ok(Some(start)));

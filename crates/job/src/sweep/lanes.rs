@@ -51,7 +51,7 @@ impl Cell {
         &self.question.0.run
     }
 
-    /// What its section is taken at, if lanes compute it: a smoothed run by Dormand-Prince.
+    /// Section plane of a run that lanes can compute: a smoothed run by Dormand-Prince.
     fn plane(&self) -> Option<SectionPlane> {
         let run = self.run();
         let method = &run.method;
@@ -422,7 +422,7 @@ fn side_by_side<const N: usize>(
 
 /// A finished run, and the exponent that its verdict needs.
 struct Waiting {
-    /// Which of the cells.
+    /// Index of the cell.
     cell: usize,
     answer: Answer,
     exponent: Box<LargestExponent>,

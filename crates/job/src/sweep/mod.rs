@@ -129,7 +129,7 @@ impl Base {
         }
     }
 
-    /// Where runs begin, if that is given.
+    /// Start of runs, if it is given; otherwise empty.
     pub fn start(&self) -> Vec<f64> {
         match self {
             Base::Surfaces(run) => run.start.clone(),
@@ -149,11 +149,11 @@ impl Base {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sweep {
-    /// What all cells have in common.
+    /// The run that all cells vary.
     run: Base,
-    /// What varies. The last listed axis runs fastest; draws run slowest.
+    /// Varied axes. The last listed axis runs fastest; draws run slowest.
     over: Vec<Axis>,
-    /// How often random axes are drawn in each cell of the grid.
+    /// Draws of random axes in each cell of the grid.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     random: Option<Draws>,
     /// The limits by which runs are judged.
@@ -201,7 +201,7 @@ pub enum SweepError {
 /// A part of a sweep's rows: every `n`th, counted from the `k`th.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
-    /// Which part, from 1.
+    /// Number of the part, from 1.
     pub k: u64,
     /// Number of parts.
     pub n: u64,
@@ -326,7 +326,7 @@ impl Sweep {
         }
     }
 
-    /// What varies.
+    /// Varied axes.
     pub fn axes(&self) -> &[Axis] {
         &self.over
     }

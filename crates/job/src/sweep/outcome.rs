@@ -15,8 +15,8 @@ use twofold_analyse::attractor::{Evidence, Verdict};
 use twofold_analyse::lyapunov::Exponent;
 use twofold_integrate::Monitor;
 
-/// What a run settles on, as [`Classification`] has it, or that it ends at a rest ([`rest`]), or
-/// that it goes to the far state: the region that no orbit leaves. Fact: `outcome` ([`Outcome`]).
+/// Outcome of a run: the attractor that [`Classification`] finds, a rest ([`rest`]), or the far
+/// state: the region that no orbit leaves. Fact: `outcome` ([`Outcome`]).
 #[derive(Clone, Debug, PartialEq)]
 pub struct OutcomeQuestion(pub Classification);
 
@@ -220,7 +220,7 @@ impl OutcomeQuestion {
         self.judged(executor, &self.run(executor, monitor)?)
     }
 
-    /// What the answer to the run's question comes to.
+    /// Verdict on the answer to the run's question.
     ///
     /// # Errors
     ///
@@ -261,7 +261,7 @@ impl OutcomeQuestion {
         })
     }
 
-    /// What the answer comes to with the exponent that was awaited.
+    /// Verdict on the answer with the exponent that was awaited.
     ///
     /// # Errors
     ///

@@ -11,7 +11,7 @@ use crate::record::Hash;
 use crate::record::hash::canonical_json;
 use crate::table::{Column, ColumnKind, Entry, Table};
 
-/// What files of ours say they are.
+/// Name of the format in its files.
 const FORMAT: &str = "twofold-sweep";
 /// The version of that format. From version 2 on `data` is the digest of the heading, too.
 const VERSION: u64 = 2;
@@ -399,7 +399,8 @@ impl Rows {
     pub fn about(&self) -> Value {
         let mut about = self.heading();
         about["rows"] = json!(self.sweep.rows());
-        // Which version of the numerics computed the rows is as much a statement as the rows are.
+        // The version of the numerics that computed the rows is as much a statement as the rows
+        // are.
         let mut said = canonical_json(&about);
         said.extend(encode::bits(&[self.table()]));
         about["data"] = json!(Hash::of(&said));
