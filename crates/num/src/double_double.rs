@@ -653,7 +653,7 @@ mod tests {
         }
     }
 
-    /// Where everything large cancels, the errors of the low parts are what is left.
+    /// If all large terms cancel, the errors of the low parts remain.
     #[test]
     fn cancellation_leaves_every_bit() {
         let (a, b) = (
@@ -716,8 +716,8 @@ mod tests {
             (DoubleDouble::HALF_PI, -DoubleDouble::HALF_PI)
         );
         assert_eq!(dd(f64::NEG_INFINITY).atan(), -DoubleDouble::HALF_PI);
-        // Where the second term of a series is still within the digits: erf x = 2/sqrt(pi) (x -
-        // x^3/3).
+        // An argument for which the second term of a series is still within the digits: erf x =
+        // 2/sqrt(pi) (x - x^3/3).
         let x = dd(1e-10);
         let want = (x - x * x * x / dd(3.0)) * dd(2.0) / DoubleDouble::PI.sqrt();
         assert!(gap(x.erf(), want) < 1e-30);

@@ -9,8 +9,8 @@ use super::scalar::{Arithmetic, Elementary};
 #[derive(Clone, Copy, Debug)]
 pub struct Given<T = f64> {
     value: T,
-    /// That tanh, of no meaning in a constant, which has not been told. All that have been told
-    /// have been told the same.
+    /// The prescribed tanh, without meaning in a constant, which has none. All numbers that have
+    /// one have the same.
     tanh: T,
     // No option: a number in a register would be moved through memory for it.
     told: bool,

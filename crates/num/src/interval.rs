@@ -445,8 +445,8 @@ impl Arithmetic for Interval {
     }
 }
 
-/// Where the shortest decimal number that reads as an `f64` lies. It is never farther away than
-/// half the spacing to the next.
+/// Position of the shortest decimal number that reads as an `f64`, relative to it. It is never
+/// farther away than half the spacing to the next.
 pub(super) enum Side {
     Exact,
     Above,

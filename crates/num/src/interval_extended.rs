@@ -505,9 +505,10 @@ mod tests {
         name: &'static str,
         ball: fn(Ball) -> Ball,
         fine: fn(Fine) -> Fine,
-        /// What a radius about `x` may add to the result's, the value there being `y` in modulus.
+        /// Bound on the contribution of a radius about `x` to the result's, the value there being
+        /// `y` in modulus.
         spread: fn(x: f64, radius: f64, y: f64) -> f64,
-        /// What rounding may add to it, in units of 1e-30 y; `x` in modulus.
+        /// Bound on the contribution of rounding to it, in units of 1e-30 y; `x` in modulus.
         rounding: fn(x: f64, y: f64) -> f64,
         /// Arguments from which on it is given.
         from: f64,

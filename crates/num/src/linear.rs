@@ -317,7 +317,7 @@ mod tests {
         assert!(solve(matrix![f64::NAN, 2.0; 2.0, 4.0], vector![1.0, 1.0], 0.0).is_none());
     }
 
-    /// Whole numbers that look random.
+    /// Pseudo-random whole numbers from -3 to 3.
     fn digits(seed: u64) -> impl Iterator<Item = f64> {
         let mut state = seed;
         std::iter::repeat_with(move || {

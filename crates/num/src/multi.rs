@@ -281,7 +281,7 @@ impl<const L: usize> MultiFloat<L> {
     /// (sin, cos) by reduction modulo pi/2 and series.
     fn sin_cos(self) -> (Self, Self) {
         let quotient = self.to_f64() / std::f64::consts::FRAC_PI_2;
-        // What of pi/2 is missing beyond its last digit grows with the quadrant's number.
+        // The error from the digits of pi/2 that are missing grows with the quadrant's number.
         if quotient.is_nan() || quotient.abs() >= 1e15 {
             return (Self::NAN, Self::NAN);
         }
@@ -862,8 +862,8 @@ mod tests {
         }
     }
 
-    /// Whole numbers of 64 bits in one limb: sums are rounded as integers are, half away from zero,
-    /// differences are exact.
+    /// In one limb, whole numbers of 64 bits: sums are rounded as integers are, half away from
+    /// zero, differences are exact.
     #[test]
     fn one_limb_is_rounded_like_an_integer() {
         let integer = |x: MultiFloat<1>| {

@@ -60,7 +60,7 @@ impl Affine {
     }
 }
 
-/// What an equation outside its layer is, and where the layer is.
+/// An equation outside its layer, and the argument of the layer.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Reduced {
     /// The factors of each product.
@@ -267,8 +267,7 @@ impl Flow {
         if dimension + sums.len() > MANY {
             return Err(NotPolynomial::Size);
         }
-        // What is wanted of the series of an argument that is no sum of states are its own products
-        // too.
+        // A layer's argument that is no sum of states needs its own products for its series.
         let radial = Radial::new(&reduced).filter(|_| argument.is_none() || linear.is_some());
         Ok(Self { dimension, sums, derivatives, argument, linear, radial })
     }
@@ -315,7 +314,7 @@ impl Flow {
             }
             for s in 0..(self.dimension + self.sums.len()).min(MANY) {
                 forward[s][k % LONG] = now[s];
-                // What would be the coefficient 0 is never read.
+                // The entry of coefficient 0 is never read.
                 backward[s][(LONG - k.max(1)) % LONG] = now[s];
             }
             now[..x.len()].copy_from_slice(&next[..x.len()]);
@@ -502,7 +501,7 @@ mod tests {
             for degree in [7, 12, 13, 15, 16, 17, 31] {
                 let mut solution = Solution::new(degree, &tape, Constants::Binary);
                 for flow in [&flow, &by_sums] {
-                    // What an earlier expansion has left is not in the way.
+                    // Results of an earlier expansion have no effect.
                     for x in [[1e3, 7.0, -2.0], x] {
                         flow.expand(&x, degree, &mut found);
                         solution.expand(&x);
@@ -730,7 +729,7 @@ mod tests {
         assert_eq!(refused(|x| x[0] * x[0] / x[0]), Some(NotPolynomial::Operation("/")));
         assert_eq!(refused(|x| x[0].exp()), Some(NotPolynomial::Operation("exp")));
         assert_eq!(refused(|x| x[0].tanh() + (x[0] + x[0]).tanh()), Some(NotPolynomial::Layers));
-        // What no value needs may be anything.
+        // An operation that no value needs may be of any kind.
         let tape = Tape::record(1, |x| vec![x[0], x[0].exp()]);
         assert!(Flow::new(&tape.select([0]), 1.0).is_ok() && Flow::new(&tape, 1.0).is_err());
         // tanh of a number is a number.

@@ -199,7 +199,7 @@ impl Tape {
         Self { outputs: outputs.into_iter().map(|i| self.outputs[i]).collect(), ..self.clone() }
     }
 
-    /// Which operations the outputs need.
+    /// Whether the outputs need each operation.
     pub fn needed(&self) -> Vec<bool> {
         let mut needed = vec![false; self.operations.len()];
         for output in &self.outputs {

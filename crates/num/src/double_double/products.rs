@@ -16,7 +16,7 @@ use pulp::{Simd, WithSimd};
 use super::{DoubleDouble, SPLITTER, quick_two_sum, two_sum};
 use crate::Registers;
 
-/// How many sums side by side.
+/// Number of sums side by side.
 const LANES: usize = 8;
 
 /// Fewer terms than this are sooner added one after the other.

@@ -25,7 +25,7 @@ struct Table<const PER_UNIT: usize, const FIRST: usize, const LENGTH: usize>([En
 /// tanh about a: tanh(a + r) = value + value_rest + (slope + slope_rest) r + c2 r^2 + ... + c7 r^7,
 /// in one line of a cache.
 ///
-/// What multiplies r to a high power needs few bits. `slope` has six, so that its product with r,
+/// Coefficients of high powers of r need few bits. `slope` has six, so that its product with r,
 /// which has 47, is exact.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
@@ -40,7 +40,7 @@ struct Entry {
     c5: f32,
     c6: f32,
     c7: f32,
-    /// How far the sum above and the kernel's last sum, before it is rounded, may be apart.
+    /// Largest difference between the sum above and the kernel's last sum before it is rounded.
     apart: f32,
 }
 
@@ -217,8 +217,7 @@ mod tests {
         assert_eq!(quick.to_bits(), kernel.to_bits(), "{x:e}: {quick:e} and {kernel:e}");
     }
 
-    /// Where one entry, one table, one formula ends and the next begins, and around the kernel's
-    /// own changes.
+    /// Seams between entries, tables and formulas, and the kernel's own changes.
     #[test]
     fn the_kernels_bits_at_every_seam() {
         let seams =

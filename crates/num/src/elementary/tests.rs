@@ -43,7 +43,7 @@ struct Function {
     ours: fn(f64) -> f64,
     oracle: fn(DoubleDouble) -> DoubleDouble,
     range: (f64, f64),
-    /// Where the reduced argument starts again.
+    /// Period of the argument reduction.
     period: f64,
     /// A little above the worst found on 2^24 points (tanh 0.5307, exp 0.716).
     worst: f64,
@@ -224,9 +224,8 @@ fn tanh_is_odd_to_the_bit() {
 
 #[test]
 fn neighbours_are_in_order() {
-    // Where neighbouring results differ by less than their spacing only the last bit could break
-    // the order: all neighbours in stretches everywhere, and around the places where the reduction
-    // changes over.
+    // If neighbouring results differ by less than their spacing, only the last bit could break the
+    // order: all neighbours in stretches everywhere, and around the changes of the reduction.
     for f in [&TANH, &EXP] {
         for i in 0..1 << 13 {
             let mut x = argument(i, f.range, f.period);

@@ -34,7 +34,7 @@ impl Radial {
         if of.derivatives.len() != STATES {
             return None;
         }
-        // Which products are squares of states.
+        // Whether a product is the square of a state.
         let is_square = |quantity: usize, state: usize| {
             let square = |factor: &Affine| factor.single() == Some((state, 1.0));
             quantity

@@ -195,7 +195,7 @@ opening! {
 }
 
 shapes! {
-    /// Where tanh(x/eps) is +-1.
+    /// Outside the layer, where tanh(x/eps) is +-1.
     TwoFoldOutside derivatives [27, 16, 19] {
         Over(0; eps) -> 3,
         ThreeSquares(0, 1, 2) -> 13,

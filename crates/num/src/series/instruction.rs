@@ -4,7 +4,7 @@ use super::table::Table;
 use super::{Recurrence, Series, Weights};
 use crate::Elementary;
 
-/// What one instruction does at degree k >= 1. The current number is the result of the instruction
+/// Action of an instruction at degree k >= 1. The current number is the result of the instruction
 /// before.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Action<S> {
@@ -123,7 +123,7 @@ fn integral<S: Elementary>(table: &impl Table<S>, weights: Weights, b: Series) -
     table.products(weights, b, 1, k + 1).over(k as f64)
 }
 
-/// Which tanh of an equation are saturated, as far as they have been computed.
+/// Saturated tanh of an equation, as far as they have been computed.
 #[derive(Default)]
 pub(super) struct Saturated {
     /// A bit each.
@@ -147,7 +147,7 @@ pub(super) fn begin<S: Elementary>(
     table.set(to, value);
 }
 
-/// What it is, its arguments being `at` hand.
+/// Coefficient 0 of a recurrence; `at` gives those of its arguments.
 #[inline(always)]
 pub(super) fn start_of<S: Elementary>(recurrence: &Recurrence<S>, at: impl Fn(Series) -> S) -> S {
     match *recurrence {

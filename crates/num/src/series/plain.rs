@@ -124,7 +124,7 @@ pub(super) fn equation(variables: usize, operations: &[(u8, usize, usize, f64)])
         known.push(number(0.75));
         for &(kind, a, b, c) in operations {
             let (a, b) = (known[one_of(known.len(), a)], known[one_of(known.len(), b)]);
-            // Where a logarithm, a root or a quotient exists.
+            // An argument for which a logarithm, a root or a quotient exists.
             let positive = |a: Recorded| a.squared() + number(0.5);
             known.push(match kind {
                 0 => a + b,

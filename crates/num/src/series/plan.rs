@@ -94,10 +94,10 @@ pub(super) struct Equation<'a, S> {
 /// See the [module](self).
 #[derive(Clone, Debug)]
 pub(super) struct SeriesPlan<S> {
-    /// Which `tanh` are saturated, one bit each, in the order of their recurrences.
+    /// Saturated `tanh`, one bit each, in the order of their recurrences.
     pub saturated: u64,
     instructions: Vec<Instruction<S>>,
-    /// Where the coefficients of the components' derivatives are.
+    /// Series of the components' derivatives.
     derivatives: Vec<Series>,
     /// The same compiled, if that is so.
     pub compiled: Option<Compiled>,
@@ -169,7 +169,7 @@ impl Tails {
         self.of[series] == Tail::Zero
     }
 
-    /// Where coefficients equal to those of a series are, from degree 1 on.
+    /// Series whose coefficients equal those of `series`, from degree 1 on.
     fn place(&self, series: Series) -> Series {
         match self.of[series] {
             Tail::Same(other) => other,

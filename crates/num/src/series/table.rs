@@ -55,7 +55,7 @@ impl<S: Elementary> Table<S> for Columns<'_, S> {
     }
 }
 
-/// How many series fit in rows.
+/// Number of series that fit in rows.
 pub(super) const ROW: usize = 64;
 
 /// The highest degree for which there are rows.

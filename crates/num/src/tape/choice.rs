@@ -1,4 +1,4 @@
-//! Which operations of a tape become one instruction of a program.
+//! Choice of the operations of a tape that become one instruction of a program.
 //!
 //! Dispatching an instruction and storing its result takes longer than most operations. So one
 //! instruction performs all operations of one of the patterns below, the largest pattern first,
@@ -8,7 +8,7 @@
 
 use super::{Node, Operation, Tape};
 
-/// What an instruction does. `f` and `g` are its numbers: terms without variables, computed
+/// Operation of an instruction. `f` and `g` are its numbers: terms without variables, computed
 /// beforehand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Code {

@@ -15,7 +15,7 @@ pub(super) struct Instruction {
     pub g: f64,
 }
 
-/// Where a value of the function is found.
+/// Place of a value of the function.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Output {
     Register(u16),
@@ -281,7 +281,7 @@ mod tests {
     use crate::{Arithmetic, DoubleDouble};
     use proptest::prelude::*;
 
-    /// What is one instruction, in every order of its operands.
+    /// Expressions that become one instruction each, in every order of their operands.
     fn one_instruction<S: Elementary>(a: S, b: S, c: S) -> Vec<S> {
         let (k, m) = (S::from_f64(0.3), S::from_f64(1.7));
         vec![
@@ -313,8 +313,8 @@ mod tests {
         ]
     }
 
-    /// What looks like one and is not: a result used twice, by itself, wanted as a value, with
-    /// another in between, or with a number in the wrong place.
+    /// Expressions that resemble these and need several: a result used twice, by itself, wanted as
+    /// a value, with another in between, or with a number in the wrong place.
     fn several<S: Elementary>(a: S, b: S, c: S) -> Vec<S> {
         let (k, m) = (S::from_f64(0.3), S::from_f64(1.7));
         let (p, d, e, s) = (a * b, a - b, (a - c) * b, c * c);

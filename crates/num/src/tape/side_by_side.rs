@@ -17,7 +17,7 @@ use super::program::{Output, Program};
 /// Numbers in `K` registers.
 type Bundle<S, const K: usize> = [<S as Simd>::f64s; K];
 
-/// Where a program's numbers come from.
+/// Source of a program's numbers.
 trait Numbers<S: Simd, const K: usize> {
     /// The number in this place, which in the program itself is `own`.
     fn at(&self, set: S, place: usize, own: f64) -> Bundle<S, K>;
@@ -340,7 +340,7 @@ mod tests {
                 |lane: usize, i: usize| (lane as f64 - 0.4 * width as f64) * 0.37 + i as f64 * 0.21;
             let lanes = [0, 1].map(|i| (0..width).map(|lane| value(lane, i)).collect::<Vec<_>>());
             let x = lanes.each_ref().map(|lanes| Registers::<S, K>::load(set, lanes).parts());
-            // What an earlier evaluation left there must not matter.
+            // Results of an earlier evaluation must not matter.
             let mut scratch = vec![Aligned([set.splat_f64s(f64::NAN); K]); self.0.scratch_len()];
             let found = self.0.evaluate_in_registers(set, x, &mut scratch);
             for lane in 0..width {
