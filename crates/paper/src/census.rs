@@ -192,7 +192,7 @@ pub struct PanelShare {
     pub panel: String,
     /// The reading.
     pub reading: Reading,
-    /// What the paper says.
+    /// The paper's statement.
     pub said: Said,
     /// Runs.
     pub runs: u64,

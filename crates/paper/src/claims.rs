@@ -92,9 +92,9 @@ pub struct Sentence {
     pub id: String,
     /// The paper's words.
     pub quote: String,
-    /// What would count as true.
+    /// Condition under which the sentence counts as true.
     pub true_if: String,
-    /// How it is measured.
+    /// Method of measurement.
     pub measure: String,
     /// Quantities that decide it.
     #[serde(default)]

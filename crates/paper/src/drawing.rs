@@ -116,7 +116,7 @@ fn label(picture: &Picture, panel: &FigurePanel) -> String {
     if picture.panels.len() > 1 { format!("({})", panel.label) } else { String::new() }
 }
 
-/// Which half of a section is drawn.
+/// The half of a section that is drawn.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Half {
     Late,
@@ -179,8 +179,8 @@ fn section_panels(
     sheet
 }
 
-/// What stands below the title of each panel: the paper's claim, whether the panel's run supports
-/// it, and how many runs do.
+/// Notes below the title of each panel: the paper's claim, whether the panel's run supports it, and
+/// the number of runs that do.
 fn verdict_notes(
     picture: &Picture,
     verdicts: &[PanelVerdict],
@@ -358,7 +358,7 @@ const PASSAGE_ASPECT: f64 = 0.62;
 /// Cells of the switching surface along each side of the nearer view.
 const PASSAGE_CELLS: usize = 12;
 
-/// How many futures came back to the two-fold.
+/// Number of futures that came back to the two-fold, in words.
 fn returns(futures: &[Future]) -> String {
     let longest = futures
         .iter()
@@ -436,7 +436,7 @@ struct Curve {
     style: LineStyle,
 }
 
-/// What is drawn of a recording in space.
+/// Curves that are drawn of a recording in space.
 fn curves(data: &Data) -> Vec<Curve> {
     let points = |samples: &[Sample]| samples.iter().map(|s| s.x).collect::<Vec<_>>();
     let motion = |motion: &Motion, flight: LineStyle, sliding: LineStyle| -> Vec<Curve> {
@@ -463,7 +463,7 @@ fn curves(data: &Data) -> Vec<Curve> {
     }
 }
 
-/// Where a motion leaves repelling sliding.
+/// The points at which a motion leaves repelling sliding.
 fn exits(data: &Data) -> Vec<[f64; 3]> {
     let of = |motion: &Motion| -> Vec<[f64; 3]> {
         let leaves = |kind: &EventKind| {
@@ -481,7 +481,7 @@ fn exits(data: &Data) -> Vec<[f64; 3]> {
     }
 }
 
-/// What the colours of the surface mean.
+/// Legend of the surface's colours.
 fn region_legend(sheet: Sheet) -> Sheet {
     let area = |colour, text: &str| {
         LegendEntry::new(LegendKey::Area(colour, style::SURFACE_OPACITY), text)

@@ -63,7 +63,7 @@ use verdict::Claim;
 pub struct Figure {
     /// "fig7".
     pub id: Cow<'static, str>,
-    /// What it shows, in our own words.
+    /// Description of its subject.
     pub title: Cow<'static, str>,
     /// Its pictures: one per parameter reading, or one.
     pub pictures: Vec<Picture>,
@@ -80,12 +80,12 @@ pub struct Picture {
     pub title: Cow<'static, str>,
     /// The caption, in our own words.
     pub caption: String,
-    /// How panels are drawn.
+    /// View of the panels.
     pub view: View,
     /// The panels, in the paper's order.
     pub panels: Vec<FigurePanel>,
-    /// What sets this picture apart from the published one ("t = 500 instead of 200000"), empty for
-    /// the real thing.
+    /// Differences between this picture and the published one ("t = 500 instead of 200000"); empty
+    /// if there are none.
     pub alterations: Vec<String>,
 }
 
@@ -127,7 +127,7 @@ pub struct Support {
     pub runs: u64,
 }
 
-/// How the panels of a picture are drawn.
+/// View of a picture's panels.
 #[derive(Clone, Debug)]
 pub enum View {
     /// A Poincare section in the plane of two coordinates: the later half, and the early half below
@@ -161,7 +161,7 @@ pub enum View {
 /// An orthographic view of the state space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Which coordinate runs along each horizontal axis and which one points up.
+    /// Coordinates along the two horizontal axes and the vertical one.
     pub axes: [usize; 3],
     /// Azimuth, degrees.
     pub azimuth: f64,

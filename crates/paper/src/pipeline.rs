@@ -35,7 +35,7 @@ pub struct PictureRecord {
     pub reading: Option<Reading>,
     /// The caption.
     pub caption: String,
-    /// How it differs from the published picture; empty for the real thing.
+    /// Differences from the published picture; empty if there are none.
     pub alterations: Vec<String>,
     /// Its panels, if it is made of runs.
     pub panels: Vec<PanelRecord>,
@@ -132,7 +132,7 @@ pub fn pixel_hash(pixels: &Pixels) -> Hash {
     Hash::of_parts([&pixels.width.to_le_bytes()[..], &pixels.height.to_le_bytes(), &pixels.rgba])
 }
 
-/// What a picture's panels ask, label by label; a study's questions are named after their kind.
+/// Questions of a picture's panels, label by label; a study's questions are named after their kind.
 pub(super) fn parts(picture: &Picture) -> Vec<(String, AnyQuestion)> {
     match &picture.view {
         View::Study(study) => {

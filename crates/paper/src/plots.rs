@@ -19,7 +19,7 @@ use super::draw::plot::{self, Crossed, Frame, Look};
 /// The panels of a picture.
 #[derive(Clone, Debug)]
 pub struct Plots {
-    /// How many stand side by side.
+    /// Number of panels in a row.
     pub columns: usize,
     /// The panels, row by row.
     pub plots: Vec<Plot>,
@@ -34,13 +34,13 @@ pub struct Plot {
     pub title: String,
     /// The question.
     pub question: AnyQuestion,
-    /// How the answer is drawn.
+    /// Drawing of the answer.
     pub drawing: Drawing,
     /// Numbers of the paper that are drawn over it.
     pub points: Option<Points>,
 }
 
-/// How an answer is drawn.
+/// Drawing of an answer.
 #[derive(Clone, Debug)]
 pub enum Drawing {
     /// A run, as `twofold plot` draws it.
@@ -71,14 +71,14 @@ pub struct Columns {
     pub dots: bool,
     /// Titles of the axes as plain text, instead of the columns' names.
     pub labels: Option<[String; 2]>,
-    /// What the legend calls the vertical columns, as plain text, instead of their names.
+    /// Names of the vertical columns in the legend, as plain text, instead of the columns' own.
     pub names: Vec<String>,
 }
 
 /// Numbers read off a paper.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Points {
-    /// What they are, as plain text.
+    /// Name of the numbers, as plain text.
     pub name: String,
     /// Horizontal and vertical values.
     pub points: Vec<[f64; 2]>,

@@ -103,7 +103,7 @@ pub fn belongs(all: &[Compared], rules: &Rules) -> Vec<(Belongs, f64)> {
     let test = |counts: &[[u64; 2]; 2]| {
         let rows = counts.map(|[hits, of]| vec![hits, of - hits]);
         let p = homogeneity(&rows, rules.permutations, rules.permutation_seed).p_permutation;
-        // Where all runs are alike there is nothing to tell apart.
+        // If all runs are alike, there is nothing to tell apart.
         if p.is_nan() { 1.0 } else { p }
     };
     let adjusted = effects::holm(&counts.iter().map(test).collect::<Vec<_>>());

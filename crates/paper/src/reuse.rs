@@ -58,8 +58,8 @@ impl Question for Drawn<'_> {
             .map(|p| (&p.title, &p.claim, p.repeats.as_ref().map(|r| (&r.panel, r.reading))))
             .collect();
         let view = match view {
-            // Which function draws: how far it lies from another one, since a program is loaded now
-            // here, now there.
+            // The function that draws, by its offset from another one, since a program's address
+            // varies.
             View::Study(study) => {
                 let here = ReusablePictures::of as *const () as usize;
                 json!({ "study": (study.draw as *const () as usize).wrapping_sub(here) })
@@ -149,7 +149,7 @@ mod tests {
     use twofold_render::Sheet;
     use twofold_render::sheet::ColumnWidth;
 
-    /// What panels of runs say is part of what is asked.
+    /// Titles, labels and claims of panels of runs are part of the question.
     #[test]
     fn another_run_title_claim_or_view_is_another_picture() {
         let picture = figures::fig4::figure().pictures.remove(0);
@@ -260,7 +260,7 @@ mod tests {
         assert_eq!(ours.find(&picture, place.path()), None, "elsewhere there is nothing");
     }
 
-    /// What is remembered is what drawing it anew would answer.
+    /// A remembered answer equals that of drawing the picture anew.
     #[test]
     fn the_answer_is_that_of_the_question() {
         let picture = figures::fig1::figure().pictures.remove(0);

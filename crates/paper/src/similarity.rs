@@ -114,7 +114,7 @@ pub struct Score {
     pub yardstick: f64,
     /// The median distances of delayed runs from smoothing and from hysteresis.
     pub medians: [f64; 2],
-    /// What follows.
+    /// The conclusion.
     pub similar: Similar,
 }
 

@@ -48,7 +48,7 @@ pub struct PanelVerdict {
     pub claim: Claim,
     /// The claim in the paper's words, or close to them.
     pub claim_text: String,
-    /// What was found, in one line.
+    /// The finding, in one line.
     pub found: String,
     /// Whether they agree.
     pub agrees: bool,
@@ -68,7 +68,7 @@ pub enum Grounds {
     Paths {
         /// Share of strides into new places, of this panel's path and of the next one's.
         freshness: [f64; 2],
-        /// What they share.
+        /// Agreement of the two paths.
         shared: Shared,
     },
     /// Two panels were compared over starts that a reader could not tell apart.
@@ -95,7 +95,7 @@ impl Claim {
 
 /// Runs from neighbouring starts by which 6(i) and 6(ii) are compared.
 const NEIGHBOURS: usize = 12;
-/// How far apart those start.
+/// Distance between those starts.
 const NEIGHBOUR_SHIFT: f64 = 1e-10;
 /// 6(i) is less organised than 6(ii) if the means are so many standard errors of their difference
 /// apart.

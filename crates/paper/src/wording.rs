@@ -59,7 +59,7 @@ fn angle(radians: f64) -> String {
     fraction.map_or_else(|| number(radians), |n| format!("π/{n}"))
 }
 
-/// How the switch is modelled.
+/// Model of the switch, in words.
 pub fn switch(switch: &SwitchSpec) -> String {
     match switch {
         SwitchSpec::Smoothed { eps, transition: Transition::Tanh } => {
@@ -170,8 +170,8 @@ fn kicks(kick: &Kick) -> String {
     )
 }
 
-/// What all runs of a picture have in common and how they differ, one line per subject, for its
-/// foot.
+/// Settings that all runs of a picture have in common and those that differ, one line per subject,
+/// for its foot.
 pub fn small_print(reading: Option<Reading>, runs: &[&RunSpec]) -> Vec<String> {
     let all = |say: &dyn Fn(&RunSpec) -> Option<String>, join: &str| {
         let mut said: Vec<String> = Vec::new();

@@ -21,7 +21,7 @@ use serde::Serialize;
 use twofold_num::elementary::{exp, sqrt};
 use twofold_render::Pixels;
 
-/// How two pictures of the same size differ.
+/// Difference between two pictures of the same size.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Comparison {
     /// Width in pixels.

@@ -45,7 +45,7 @@ fn lie_of<'a>(system: &System) -> Option<Box<Lie<'a>>> {
     }
 }
 
-/// What happens where the Lie derivatives have these signs.
+/// Region of the surface with these signs of the Lie derivatives.
 fn region_of([p, q]: [f64; 2]) -> Region {
     match (p > 0.0, q > 0.0) {
         (false, true) => Region::Attracting,
@@ -122,7 +122,7 @@ impl<'a> Level<'a> {
         change(a, b, |p| self.h(p) >= 0.0)
     }
 
-    /// Where h vanishes on a line of the one state shown, within `range`.
+    /// Zeros of h on a line of the one state shown, within `range`.
     pub fn points(&self, range: (f64, f64)) -> Vec<f64> {
         let knots = lines(range, LINE_CELLS);
         let side = |x: f64| self.h(&[x]) >= 0.0;
@@ -237,7 +237,7 @@ impl<'a> Level<'a> {
             let positive = |p: &[f64; 3]| lie(&self.full(p))[derivative] > 0.0;
             parts = parts.iter().flat_map(|part| divided(part, positive)).collect();
         }
-        // Where f+ and f- agree on the surface their Lie derivatives change sign together but for
+        // If f+ and f- agree on the surface, their Lie derivatives change sign together but for
         // rounding, and leave slivers.
         let whole = area(&corners);
         for part in parts.into_iter().filter(|part| area(part) > SLIVER * whole) {
@@ -262,8 +262,8 @@ fn area(corners: &[[f64; 3]]) -> f64 {
 /// Parts of a triangle below this share of its area, squared, are not drawn.
 const SLIVER: f64 = 1e-12;
 
-/// Where a condition changes between two places, by bisection: nothing need be smooth. The same
-/// place from either end.
+/// Place between two others at which a condition changes, by bisection: nothing need be smooth. The
+/// same place from either end.
 fn change<const K: usize>(
     a: [f64; K],
     b: [f64; K],

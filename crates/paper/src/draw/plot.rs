@@ -35,7 +35,7 @@ pub struct Frame<'a> {
     pub times: (f64, f64),
 }
 
-/// What a section's orbit crosses.
+/// The surface that a section's orbit crosses.
 #[derive(Clone, Copy, Debug)]
 pub enum Crossed<'a> {
     /// The plane where a coordinate has a value.
@@ -45,7 +45,7 @@ pub enum Crossed<'a> {
 }
 
 impl<'a> Crossed<'a> {
-    /// What a section's equation crosses: the plane of a state, if it says no more than that.
+    /// The surface of a section's equation: the plane of a state, if it says no more than that.
     pub fn of(equation: &'a str, states: &[&str]) -> Self {
         let plane = equation.split_once('=').and_then(|(state, value)| {
             let coordinate = states.iter().position(|s| *s == state.trim())?;
@@ -109,8 +109,8 @@ impl PictureKind {
         }
     }
 
-    /// What suits a run: a section if passages were recorded, else by the number of axes that the
-    /// system suggests, or of its states.
+    /// The kind that suits a run: a section if passages were recorded, else by the number of axes
+    /// that the system suggests, or of its states.
     pub fn suiting(run: &Frame) -> Self {
         if run.section.is_some() {
             return PictureKind::Section;
@@ -123,7 +123,7 @@ impl PictureKind {
     }
 }
 
-/// How a run is drawn.
+/// Options for drawing a run.
 #[derive(Clone, Debug)]
 pub struct Look {
     /// The kind of picture.
@@ -144,9 +144,9 @@ pub enum PlotError {
     Axes {
         /// The kind.
         kind: &'static str,
-        /// What it needs.
+        /// The axes that it needs, in words.
         wanted: &'static str,
-        /// How many were given.
+        /// Number of axes given.
         given: usize,
     },
     /// Too few states.
@@ -157,9 +157,9 @@ pub enum PlotError {
     States {
         /// The kind.
         kind: &'static str,
-        /// How many it shows.
+        /// Number of states that it shows.
         wanted: usize,
-        /// How many there are.
+        /// Number of the system's states.
         states: usize,
     },
     /// A path where passages are needed, or the reverse.
@@ -262,7 +262,7 @@ fn describe(run: &Frame, kind: PictureKind, shown: &[usize]) -> String {
     }
 }
 
-/// What moves along a line.
+/// Kind of motion along a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Stroke {
     Smooth,
@@ -609,7 +609,7 @@ fn section(
     Ok(curve_legend(sheet, looks))
 }
 
-/// Where a motion leaves repelling sliding.
+/// The points at which a motion leaves repelling sliding.
 fn exits(answer: &Answer, run: &Frame) -> Vec<Vec<f64>> {
     let Some(events) = answer.table("events") else { return Vec::new() };
     let columns: Vec<&[f64]> = run.names().iter().map(|n| events.numbers(n)).collect();

@@ -73,7 +73,7 @@ pub fn diagram(
     let mut sheet = Sheet::new(ColumnWidth::Wide, 1, "orbit diagram")
         .title(markup::literal(title))
         .panel_aspect(0.55);
-    // Where both lie on each other the first is seen around the second.
+    // If both lie on each other, the first is seen around the second.
     let looks = if series.len() == 1 {
         [(style::INK, None); 2]
     } else {

@@ -13,7 +13,7 @@ use twofold_render::read_provenance;
 /// would make the bytes of this file differ from run to run.
 pub const RELEASE_DATE: &str = "2026-11-21";
 
-/// Where the program is documented, as Cargo.toml has it.
+/// Address of the program's documentation, as in Cargo.toml.
 const DOCUMENTATION: &str = "https://docs.rs/twofold-dynamics";
 
 /// The licence of program and pictures, either of two: address, name, what it allows in a line.
@@ -32,9 +32,9 @@ const LICENCES: [(&str, &str, &str); 2] = [
 ];
 /// The article, as its author's university lists it.
 const ARTICLE: &str = "https://research-information.bris.ac.uk/en/publications/singularities-that-induce-a-breakdown-of-determinism-in-mechanics";
-/// That university: address, name.
+/// The university: address, name.
 const AFFILIATION: (&str, &str) = ("https://www.bristol.ac.uk/", "University of Bristol");
-/// Where the article appeared, in that list's words.
+/// Proceedings in which the article appeared, in that list's words.
 pub(super) const PROCEEDINGS: &str =
     "Proc. 5th International Conference on Structural Dynamics SEMS, Cape Town";
 
@@ -84,7 +84,7 @@ pub fn archive(report: &Report, made: &[MadeFile], added: &[(&str, &[u8])]) -> V
             "@id": "#authors",
             "@type": "Organization",
             "name": "The twofold authors",
-            // Where they can be found: an organisation in RO-Crate should have an address.
+            // Address of the authors: an organisation in RO-Crate should have one.
             "url": DOCUMENTATION,
         }),
         json!({

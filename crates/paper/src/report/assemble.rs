@@ -47,7 +47,7 @@ pub struct MadeFile {
     pub size: u64,
     /// Its hash.
     pub sha256: Hash,
-    /// What is in it; nothing of a table that no view in space is drawn from, which is only listed.
+    /// Its content; empty for a table that no view in space is drawn from, which is only listed.
     pub bytes: Vec<u8>,
 }
 
@@ -80,7 +80,7 @@ impl MadeFile {
     }
 }
 
-/// What a report takes from the program that makes it.
+/// Data that a report takes from the program that makes it.
 #[derive(Clone, Copy, Debug)]
 pub struct Program<'a> {
     /// The figures that it knows.
@@ -129,7 +129,7 @@ pub fn assemble(made: &[MadeFile], committed: &[FileBytes], program: &Program<'_
     }
 }
 
-/// How the figures were made, as the folder says.
+/// Runs of the program that made the figures, as the folder records them.
 fn making(made: &[MadeFile], problems: &mut Vec<String>) -> Vec<Making> {
     let Some(file) = made.iter().find(|f| f.path == super::names::MAKING) else {
         return Vec::new();
@@ -149,7 +149,7 @@ fn making(made: &[MadeFile], problems: &mut Vec<String>) -> Vec<Making> {
 /// A picture as the page shows it.
 fn preview(pixels: &Pixels, how: Shrink) -> Option<Preview> {
     let small = shrunk(pixels, PREVIEW_WIDTH, how);
-    // What has no pixels is no picture, and there is nothing to show.
+    // A picture without pixels is not shown.
     let png = encode_preview(&small).ok()?;
     Some(Preview { png, size: [small.width, small.height] })
 }
@@ -459,7 +459,7 @@ const PATHS: &str = "paths compared";
 /// Kind of a verdict about a noisy section, as the classifier calls it.
 const NOISY: &str = "noisy";
 
-/// What was found, in a word or two, from the evidence.
+/// Kind of the finding, in a word or two, from the evidence.
 fn kind(verdict: &RecordedVerdict) -> String {
     let Some(section) = verdict.evidence.get("section") else { return PATHS.to_owned() };
     let name = section.get("name").and_then(Value::as_str).unwrap_or("section");

@@ -74,7 +74,7 @@ pub fn base64(bytes: &[u8]) -> String {
     STANDARD.encode(bytes)
 }
 
-/// What a link's target keeps as it is: RFC 3986's unreserved characters, and slashes.
+/// Characters that a link's target keeps as they are: RFC 3986's unreserved ones, and slashes.
 const KEPT: &AsciiSet =
     &NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b'_').remove(b'~').remove(b'/');
 

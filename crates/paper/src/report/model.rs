@@ -36,10 +36,10 @@ pub struct Report {
     pub making: Vec<Making>,
     /// Files that could not be read, a line each.
     pub problems: Vec<String>,
-    /// What docs/findings.md says was found, as HTML; for the page alone.
+    /// Findings of docs/findings.md, as HTML; for the page alone.
     #[serde(skip)]
     pub findings: Vec<String>,
-    /// What docs/census.md and docs/parameters.md say of the odds, as HTML; for the page alone.
+    /// Odds of docs/census.md and docs/parameters.md, as HTML; for the page alone.
     #[serde(skip)]
     pub odds: Vec<String>,
 }
@@ -78,14 +78,14 @@ pub struct Making {
     pub store: bool,
     /// From the first question to the last file, in seconds.
     pub seconds: f64,
-    /// What was computed, the longest first; what is missing here came from the store.
+    /// Computations, the longest first; what is missing here came from the store.
     pub computed: Vec<Timed>,
 }
 
 /// A computation and the time it took.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Timed {
-    /// What was computed.
+    /// Name of the computation.
     pub what: String,
     /// Seconds, beside whatever else was computed.
     pub seconds: f64,
@@ -157,7 +157,7 @@ pub struct ReadingSummary {
     pub claims: usize,
     /// Number of these that hold.
     pub agree: usize,
-    /// What was found, each with its number of panels, in order of appearance.
+    /// Kinds of findings, each with its number of panels, in order of appearance.
     pub found: Vec<Found>,
     /// Set if all noise-free sections of the reading end in the same way: then agreement with a
     /// claim of that way is no evidence for the reading.
@@ -200,9 +200,9 @@ pub struct PictureReport {
     pub reading: Option<Reading>,
     /// The caption, plain text.
     pub caption: String,
-    /// How it differs from the published picture.
+    /// Differences from the published picture.
     pub alterations: Vec<String>,
-    /// What the picture shows, for those who cannot see it.
+    /// Description of the picture, for readers who cannot see it.
     pub description: String,
     /// Width and height in pixels, if the PNG file could be read.
     pub size: Option<[u32; 2]>,
@@ -263,7 +263,7 @@ pub enum Reference {
         panels: Vec<String>,
         /// The committed hashes.
         expected: Box<PictureEntry>,
-        /// How the pixels differ, if both pictures are there and have the same size.
+        /// Difference of the pixels, if both pictures are there and have the same size.
         comparison: Option<Comparison>,
         /// Why there is no comparison, or what is to be known about it.
         note: Option<String>,
@@ -296,7 +296,7 @@ pub struct FileReport {
     pub integrity: Integrity,
 }
 
-/// What a file is for.
+/// Purpose of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Role {
@@ -368,11 +368,11 @@ pub struct VerdictReport {
     pub panel: String,
     /// The method.
     pub method: String,
-    /// What the paper says.
+    /// The paper's claim.
     pub claim: String,
-    /// What was found, in a word or two.
+    /// Kind of the finding, in a word or two.
     pub kind: String,
-    /// What was found, in one line.
+    /// The finding, in one line.
     pub found: String,
     /// Whether they agree.
     pub agrees: bool,
@@ -392,7 +392,7 @@ pub struct RecordedVerdict {
     pub method: String,
     /// The claim in words.
     pub claim_text: String,
-    /// What was found.
+    /// The finding.
     pub found: String,
     /// Whether they agree.
     pub agrees: bool,

@@ -8,7 +8,7 @@ use super::html::escape;
 use super::model::{Report, VerdictReport, of_the_paper};
 use crate::Reading;
 
-/// What this folder's verdicts say, a paragraph for each reading, as HTML.
+/// Verdicts of this folder, a paragraph for each reading, as HTML.
 pub fn of_this_folder(report: &Report) -> Vec<String> {
     let pictures = || {
         let figures = report.figures.iter().filter(|f| of_the_paper(&f.id));
@@ -74,8 +74,8 @@ fn panel_name(picture: &str, reading: Option<Reading>, panel: &str) -> String {
     }
 }
 
-/// What docs/findings.md and docs/theorems.md say: paragraphs that begin with a finding in bold,
-/// and the theorems, as HTML blocks.
+/// Statements of docs/findings.md and docs/theorems.md: paragraphs that begin with a finding in
+/// bold, and the theorems, as HTML blocks.
 pub fn of_the_project(findings: &str) -> Vec<String> {
     let mut blocks = Vec::new();
     let mut heading = "";
@@ -97,8 +97,7 @@ pub fn of_the_project(findings: &str) -> Vec<String> {
     blocks
 }
 
-/// What docs/census.md and docs/parameters.md say: their sections with paragraphs and tables, as
-/// HTML blocks.
+/// Sections of docs/census.md and docs/parameters.md with paragraphs and tables, as HTML blocks.
 pub fn of_the_odds(page: &str) -> Vec<String> {
     let mut heading = String::new();
     let mut tables = 0;

@@ -5,8 +5,8 @@ use serde_json::{Value, json};
 use super::model::Report;
 use twofold_analyse::attractor::Thresholds;
 
-/// How a claim is held against what was found: [`Claim::score`](crate::claim::Claim::score), and
-/// the two kinds of claim about paths in space.
+/// Rules by which a claim is held against a finding: [`Claim::score`](crate::claim::Claim::score),
+/// and the two kinds of claim about paths in space.
 pub const CLAIMS: [(&str, &str); 6] = [
     (
         "periodic, period k",
@@ -46,7 +46,7 @@ pub const CLAIMS: [(&str, &str); 6] = [
     ),
 ];
 
-/// What each threshold of a section's verdict is, in the order of [`Thresholds`]. Lengths are
+/// Meaning of each threshold of a section's verdict, in the order of [`Thresholds`]. Lengths are
 /// shares of the section's extent.
 const THRESHOLDS: [(&str, &str); 27] = [
     ("fewest_points", "fewest points of one direction that are judged at all"),

@@ -23,7 +23,7 @@ pub struct SpaceView {
     pub label: String,
     /// Its title, rich text.
     pub title: String,
-    /// What is drawn, as JSON.
+    /// Data to draw, as JSON.
     pub data: Value,
 }
 

@@ -99,7 +99,7 @@ fn oblique(lines: &[Line]) -> SpacePanel {
         .camera(-70.0, 32.0)
         .unboxed();
     for (name, points) in lines {
-        // What lies on the disc, and what at the height of the hub.
+        // Height of a line: the disc's at 0, others at that of the hub.
         let height = if matches!(name.as_str(), "disc" | "disc-turns" | "slip" | "rolling") {
             0.0
         } else {

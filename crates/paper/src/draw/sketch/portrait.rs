@@ -18,7 +18,7 @@ use twofold_system::Caricature;
 
 /// Half the width of the part of the surface that is shown.
 const REACH: f64 = 1.0;
-/// How far above and below the surface: flights between points so near are low.
+/// Height shown above and below the surface: flights between points so near are low.
 const HEIGHT: f64 = 0.1;
 
 /// The normal form (4): the caricature without re-injection.
@@ -145,7 +145,7 @@ pub fn draw(tables: &[Table], v: f64, w: f64) -> Sheet {
         ))
 }
 
-/// How many points make up the first `share` of the polyline's length.
+/// Number of points that make up the first `share` of the polyline's length.
 fn along(points: &[[f64; 3]], share: f64) -> usize {
     let length = |a: &[f64; 3], b: &[f64; 3]| {
         let d = vector![b[0] - a[0], b[1] - a[1], b[2] - a[2]];

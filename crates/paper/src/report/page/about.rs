@@ -1,4 +1,4 @@
-//! How to read the page: findings in sentences, the rules, how it was made, how to cite.
+//! Sections about the page: findings in sentences, the rules, how it was made, how to cite.
 
 use std::fmt::Write as _;
 
@@ -8,7 +8,7 @@ use super::super::model::*;
 use super::super::{names, prose, rules};
 use super::parts::*;
 
-/// What was found, in sentences.
+/// Section with the findings, in sentences.
 pub(super) fn findings(html: &mut String, report: &Report) {
     put!(
         html,
@@ -35,7 +35,7 @@ pub(super) fn findings(html: &mut String, report: &Report) {
     put!(html, "</div>\n</section>");
 }
 
-/// How likely each outcome is, and which parameters fit.
+/// Section with the odds of each outcome and the parameters that fit.
 pub(super) fn odds(html: &mut String, report: &Report) {
     if report.odds.is_empty() {
         return;
@@ -185,7 +185,7 @@ pub(super) fn making(html: &mut String, report: &Report) {
     put!(html, "</section>");
 }
 
-/// How to cite the software, the article, and these figures.
+/// Section on citing the software, the article, and these figures.
 pub(super) fn citing(html: &mut String, report: &Report) {
     let (a, version) = (&report.article, env!("CARGO_PKG_VERSION"));
     let year = RELEASE_DATE.split('-').next().unwrap_or_default();

@@ -105,7 +105,7 @@ pub(super) fn picture(html: &mut String, picture: &PictureReport, links: Links) 
     put!(html, "</article>");
 }
 
-/// What differs: the layer, the numbers, and ours | difference | theirs.
+/// Difference from the reference: the layer, the numbers, and ours | difference | theirs.
 pub(super) fn mismatch(html: &mut String, picture: &PictureReport) {
     let (layer, panels, comparison, note) = match &picture.reference {
         Reference::Different { layer, panels, comparison, note, .. } => {
@@ -179,7 +179,7 @@ pub(super) fn mismatch(html: &mut String, picture: &PictureReport) {
     }
 }
 
-/// What the page's script needs to turn a panel in space; without script nothing of it is seen.
+/// Data with which the page's script turns a panel in space; without script nothing of it is seen.
 pub(super) fn spaces(html: &mut String, picture: &PictureReport, id: &str) {
     for view in &picture.spaces {
         // Inside a script element no character reference is read, in HTML: what would end it or be
@@ -208,7 +208,7 @@ pub(super) fn spaces(html: &mut String, picture: &PictureReport, id: &str) {
     }
 }
 
-/// Which part of the program a layer points to.
+/// Cause of a difference that begins at a layer, in words.
 pub(super) fn meaning(layer: Layer) -> &'static str {
     match layer {
         Layer::Spec => "another question was asked",

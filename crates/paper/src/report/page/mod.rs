@@ -64,7 +64,7 @@ pub fn page(report: &Report, links: Links) -> Vec<u8> {
     html.into_bytes()
 }
 
-/// What a Content-Security-Policy calls an inline style or script.
+/// Source expression of a Content-Security-Policy for an inline style or script.
 fn source_hash(text: &str) -> String {
     format!("'sha256-{}'", base64(&Sha256::digest(text.as_bytes())))
 }

@@ -99,7 +99,7 @@ pub(super) fn decimal(value: f64, places: usize) -> String {
     format!("{value:.places$}").replace('-', "−")
 }
 
-/// What was found, and why that agrees or not; one of them where it says the other too.
+/// The finding, and why it agrees or not; only one of them if it contains the other.
 pub(super) fn reason(v: &VerdictReport) -> String {
     if v.because.contains(&v.found) {
         escape(&v.because)
