@@ -99,7 +99,7 @@ impl Ranged for Span {
     }
 }
 
-/// How text is set.
+/// Typesetting options of a text.
 #[derive(Clone, Copy)]
 pub struct TextFormat {
     /// Size in points.

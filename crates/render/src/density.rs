@@ -10,7 +10,7 @@ use twofold_num::elementary;
 pub struct Group {
     /// Colour.
     pub colour: Colour,
-    /// Which of the given points.
+    /// Indices of its points among those given.
     pub members: Vec<usize>,
 }
 
@@ -124,7 +124,7 @@ impl Bounds {
     }
 }
 
-/// How many points lie in each cell of side [`PLACE`].
+/// Number of points in each cell of side [`PLACE`].
 struct Counts {
     bounds: Option<Bounds>,
     cells: Vec<u32>,

@@ -86,7 +86,7 @@ pub enum RenderError {
     Number {
         /// Number of the panel, from one; zero for the sheet.
         panel: usize,
-        /// What it is.
+        /// Name of the quantity.
         what: &'static str,
         /// Its value.
         value: f64,
@@ -133,8 +133,8 @@ pub struct Rendered {
     pub pdf: Vec<u8>,
     /// The pixels of the PNG file.
     pub pixels: Pixels,
-    /// How many given positions were not finite numbers (or not positive on a logarithmic axis) and
-    /// were left out.
+    /// Number of given positions that were not finite numbers (or not positive on a logarithmic
+    /// axis) and were left out.
     pub left_out: usize,
 }
 

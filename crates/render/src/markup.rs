@@ -5,7 +5,7 @@
 //! backslash takes the next character literally. A hyphen before a number or inside a superscript
 //! or subscript is a minus sign.
 
-/// What a text is made of, in order.
+/// An element of a text, in order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Token {
     /// A character.
@@ -24,7 +24,7 @@ pub enum Token {
     End,
 }
 
-/// What is wrong with a text's markup.
+/// An error in a text's markup.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum MarkupError {
     /// Braces do not match, or a script has nothing in it to raise or lower.

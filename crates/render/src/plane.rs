@@ -24,7 +24,7 @@ pub struct Insets {
     pub bottom: i32,
 }
 
-/// How far letters reach below the baseline of an axis title.
+/// Depth of letters below the baseline of an axis title, in points.
 const DESCENT_PT: f64 = 2.2;
 
 /// The value on which an axis is linear: the value itself, or its decimal logarithm.

@@ -6,7 +6,7 @@ use png::{BitDepth, ColorType, Encoder, Info, chunk};
 use super::png_file::{image_stream_at, indexed, rgb};
 use super::{Pixels, RenderError};
 
-/// What a pixel of a smaller picture shows of those that it stands for.
+/// Value of a pixel of a smaller picture, from those that it stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shrink {
     /// Their mean, by area.

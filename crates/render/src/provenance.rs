@@ -93,7 +93,7 @@ fn find(bytes: &[u8], what: &[u8], from: usize) -> Option<usize> {
     bytes.get(from..)?.windows(what.len()).position(|w| w == what).map(|i| i + from)
 }
 
-/// Where the 64 characters of the seal begin.
+/// Position of the first of the seal's 64 characters.
 fn seal_position(file: &[u8], format: Format) -> Option<usize> {
     let (open, from) = match format {
         Format::Png => {

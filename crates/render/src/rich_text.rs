@@ -33,9 +33,9 @@ pub enum RichTextError {
 
 /// Size of superscripts and subscripts relative to the text around them.
 const SCRIPT_SIZE: f64 = 0.70;
-/// How far a superscript is raised, relative to the size of the text around it.
+/// Height by which a superscript is raised, relative to the size of the text around it.
 const RAISE: f64 = 0.36;
-/// How far a subscript is lowered.
+/// Depth by which a subscript is lowered, relative to the same size.
 const LOWER: f64 = 0.17;
 
 #[derive(Clone, Copy, Debug)]

@@ -50,9 +50,9 @@ pub struct Paint {
 pub struct Words {
     /// The text without markup.
     pub text: String,
-    /// Where the baseline begins.
+    /// Start of the baseline.
     pub from: Position,
-    /// Where it ends: to the right of its beginning, or above it.
+    /// End of the baseline: to the right of its start, or above it.
     pub to: Position,
     /// Font size in units.
     pub size: i32,
@@ -110,7 +110,7 @@ pub struct Scene {
     pub width_px: u32,
     /// Height in pixels.
     pub height_px: u32,
-    /// What is drawn, bottom to top.
+    /// Items to draw, bottom to top.
     pub items: Vec<Item>,
 }
 

@@ -5,7 +5,7 @@
 pub const SEAL_KEY: &str = "seal-sha256";
 /// Its characters.
 pub const SEAL_LENGTH: usize = 64;
-/// What stands in place of the seal while it is computed.
+/// Placeholder of the seal while it is computed.
 pub const BLANK: &str = "0000000000000000000000000000000000000000000000000000000000000000";
 
 /// Provenance with the blank seal, ready to be written.

@@ -37,10 +37,9 @@ pub struct Sheet {
     pub footer: Vec<String>,
     /// A visible warning above the panels, such as a shortened run.
     pub banner: Option<String>,
-    /// What the picture shows, for readers who cannot see it.
+    /// Description of the picture, for readers who cannot see it.
     pub description: String,
-    /// Where the picture comes from, as ordered (key, value) pairs; written into each file, not
-    /// drawn.
+    /// Provenance of the picture, as ordered (key, value) pairs; written into each file, not drawn.
     pub provenance: Vec<(String, String)>,
     /// Whether the SVG file says its words a second time as invisible text, which programs can
     /// search and copy. Outlines alone need no font anywhere and are the default; the PDF file
@@ -139,7 +138,7 @@ impl Sheet {
 pub struct SheetPanel {
     /// Its name, for example `(i)`.
     pub label: String,
-    /// What it shows, set beside the name.
+    /// Its subject, set beside the name.
     pub title: String,
     /// Small print below the title, a paragraph each.
     pub notes: Vec<String>,
@@ -147,7 +146,7 @@ pub struct SheetPanel {
     pub content: Content,
 }
 
-/// What a panel contains.
+/// Content of a panel.
 #[derive(Clone, Debug)]
 pub enum Content {
     /// A plane chart.
@@ -218,7 +217,7 @@ pub fn range_of(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     if range.0 <= range.1 { range } else { (0.0, 1.0) }
 }
 
-/// How a line is broken up.
+/// Dash pattern of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Dash {
     /// Unbroken.
@@ -330,7 +329,7 @@ impl MarkerStyle {
     }
 }
 
-/// Which point of a text lies at its position.
+/// Point of a text that lies at its position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Anchor {
     /// The text begins to the right of the position.
@@ -352,7 +351,7 @@ pub struct Note<P> {
     pub at: P,
     /// Rich text.
     pub text: String,
-    /// Which point of the text lies there.
+    /// Point of the text that lies at the position.
     pub anchor: Anchor,
     /// Colour.
     pub colour: Colour,
@@ -398,7 +397,7 @@ pub enum LegendKey {
     Area(Colour, u8),
 }
 
-/// Where a panel's own legend is set.
+/// Corner of a panel's own legend.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Corner {
     /// Upper left.
@@ -481,11 +480,11 @@ pub struct PlanePanel {
     pub grid: bool,
     /// Height divided by width of the drawing area; if absent, the sheet's.
     pub aspect: Option<f64>,
-    /// What is drawn, from bottom to top.
+    /// Layers to draw, from bottom to top.
     pub layers: Vec<PlaneLayer>,
     /// Legend inside the panel.
     pub legend: Vec<LegendEntry>,
-    /// Where that legend is set.
+    /// Corner of that legend.
     pub legend_corner: Corner,
 }
 
@@ -654,11 +653,11 @@ pub struct SpacePanel {
     /// Height divided by width of the drawing area; if absent, what the box needs, at most the
     /// sheet's.
     pub aspect: Option<f64>,
-    /// What is drawn.
+    /// Layers to draw.
     pub layers: Vec<SpaceLayer>,
     /// Legend inside the panel.
     pub legend: Vec<LegendEntry>,
-    /// Where that legend is set.
+    /// Corner of that legend.
     pub legend_corner: Corner,
 }
 

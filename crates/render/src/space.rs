@@ -1,9 +1,9 @@
 //! Charts in space: orthographic projection, box, surfaces, and curves ordered by depth.
 //!
-//! What hides what is decided by a depth buffer of the surfaces alone: a curve is cut into the
-//! parts in front of every surface and the parts behind one. Drawn are the far faces of the box,
-//! the hidden parts, the surfaces (translucent), the visible parts, and on top markers and text.
-//! Within each set, curves are drawn from far to near and faded towards the far side.
+//! Visibility is decided by a depth buffer of the surfaces alone: a curve is cut into the parts in
+//! front of every surface and the parts behind one. Drawn are the far faces of the box, the hidden
+//! parts, the surfaces (translucent), the visible parts, and on top markers and text. Within each
+//! set, curves are drawn from far to near and faded towards the far side.
 
 use plotters::style::text_anchor::{HPos, VPos};
 
