@@ -41,7 +41,7 @@ pub struct Return {
     pub plane: AxisPlane,
     /// The direction in which the plane is crossed at the start and at the end.
     pub upward: bool,
-    /// How many crossings a return takes, in both directions: an even number.
+    /// Number of crossings in a return, in both directions: an even number.
     pub crossings: usize,
     /// Upper bound on the duration of a return.
     pub longest: f64,

@@ -31,7 +31,7 @@ pub struct Cycle {
     pub image: [Interval; 2],
     /// The enclosure of the return map's value at the candidate's midpoint.
     pub value: [Interval; 2],
-    /// That of its derivative over the candidate.
+    /// The enclosure of the return map's derivative over the candidate.
     pub slope: [[Interval; 2]; 2],
     /// The approximate inverse used.
     pub preconditioner: [[f64; 2]; 2],
@@ -80,7 +80,7 @@ struct Turn {
     crossings: Vec<(Interval, [Interval; 2], bool)>,
 }
 
-/// Where [`prove_cycle`] searches for a closed orbit.
+/// Box in which [`prove_cycle`] searches for a closed orbit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Search {
     /// The plane; the orbit starts on it, upward.
