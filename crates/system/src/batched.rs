@@ -11,7 +11,7 @@ use twofold_num::{Aligned, Simd};
 pub trait BatchedField<const N: usize>: Sync {
     /// One run's.
     type One: VectorField<N>;
-    /// That of run `run`, counted from 0.
+    /// The equations of run `run`, counted from 0.
     fn of(&self, run: usize) -> &Self::One;
     /// The numbers in that of run `run`, as [`BatchedField::eval_in_registers`] wants them; none if
     /// all runs have the same.

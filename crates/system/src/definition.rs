@@ -261,7 +261,7 @@ impl Definition {
         &self.about
     }
 
-    /// Where the system comes from.
+    /// Sources of the system.
     pub fn references(&self) -> &[String] {
         &self.references
     }
@@ -286,7 +286,7 @@ impl Definition {
         self.start.as_deref()
     }
 
-    /// Which states a picture shows, at most three: horizontal, depth (of three), vertical. Empty:
+    /// States that a picture shows, at most three: horizontal, depth (of three), vertical. Empty:
     /// the first ones.
     pub fn axes(&self) -> &[usize] {
         &self.axes
@@ -331,7 +331,8 @@ impl Definition {
         Some(face)
     }
 
-    /// What decides the system's numbers, with these values of its parameters (in their order).
+    /// The data that determine the system's numbers, with these values of its parameters (in their
+    /// order).
     pub(super) fn canonical(&self, values: &[Decimal]) -> Canonical {
         let printed = |e: &[Expression]| e.iter().map(Expression::to_string).collect();
         Canonical {

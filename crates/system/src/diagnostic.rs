@@ -17,7 +17,7 @@ use std::ops::Range;
 pub struct Diagnostic {
     /// The message.
     pub message: String,
-    /// Where: a file's name, or words such as `component y of f+`.
+    /// A file's name, or words such as `component y of f+`.
     pub origin: String,
     /// Line, from 1.
     pub line: usize,

@@ -57,7 +57,7 @@ impl<'de, V: Deserialize<'de>> Deserialize<'de> for Ordered<V> {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct About {
-    /// What it is, in words.
+    /// Its meaning, in words.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub meaning: String,
     /// Its unit; empty if it has none.
@@ -78,7 +78,7 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// What a value must be, if it is not: "above 0".
+    /// The bound that a value violates, in words, such as "above 0"; none if it is allowed.
     pub fn refuse(&self, value: f64) -> Option<String> {
         let above =
             self.above.as_ref().filter(|b| value <= b.value()).map(|b| format!("above {b}"));
@@ -113,7 +113,7 @@ pub struct ParameterEntry {
 struct StateTable {
     /// The state's name, as expressions use it.
     name: String,
-    /// What it is, in words; appears on the axes of pictures.
+    /// Its meaning, in words; appears on the axes of pictures.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     meaning: String,
     /// Its unit; appears on the axes of pictures.
@@ -132,7 +132,7 @@ struct ParameterTable {
     /// Values that are not below this bound are refused.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     below: Option<Decimal>,
-    /// What it is, in words.
+    /// Its meaning, in words.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     meaning: String,
     /// Its unit.
@@ -247,15 +247,15 @@ pub struct Document {
     /// One line for headings of pictures.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub title: String,
-    /// What the system describes, in sentences.
+    /// Description of the system, in sentences.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub about: String,
-    /// Where the system comes from, a string each.
+    /// Sources of the system, a string each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub references: Vec<String>,
     /// One to sixteen states, in order: a name, or a table (below).
     pub states: Vec<StateEntry>,
-    /// Where runs begin unless `--start` says otherwise: a number for each state.
+    /// Start of runs without `--start`: a number for each state.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start: Option<Vec<Decimal>>,
     /// The two or three states that pictures show: horizontal, (depth,) vertical.
@@ -278,8 +278,8 @@ pub struct Document {
     pub terms: Ordered<String>,
 }
 
-/// What decides a system's numbers, and nothing else. Two systems with equal canonical forms
-/// compute the same bytes.
+/// The data that determine a system's numbers, and nothing else. Two systems with equal canonical
+/// forms compute the same bytes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Canonical {
     /// The states' names, in order.

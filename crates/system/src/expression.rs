@@ -170,7 +170,7 @@ impl General {
     }
 }
 
-/// What expressions may say.
+/// Dialect of expressions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Dialect {
     /// Of h, f+ and f-.
@@ -304,7 +304,7 @@ pub enum Expression {
 pub struct ExpressionError {
     /// The message.
     pub message: String,
-    /// Where: bytes of the expression's text.
+    /// Place of the error: bytes of the expression's text.
     pub span: Range<usize>,
     /// Advice.
     pub help: Option<String>,
@@ -1069,7 +1069,7 @@ impl Parser<'_> {
         Ok(Expression::Apply(function, list))
     }
 
-    /// How many arguments stand in the parentheses that open here; `None` if they are not closed.
+    /// Number of arguments in the parentheses that open here; `None` if they are not closed.
     fn arguments(&self) -> Option<usize> {
         let (mut depth, mut commas) = (0, 0);
         for (i, (token, _)) in self.tokens[self.at..].iter().enumerate() {

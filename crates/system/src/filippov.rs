@@ -55,7 +55,7 @@ pub fn gradient<P: PiecewiseSmooth<N>, S: Elementary, const N: usize>(
     SVector::from_fn(|i, _| h.partials[i])
 }
 
-/// Which region of the surface `x` lies in.
+/// Region of the surface in which `x` lies.
 pub fn region<P: PiecewiseSmooth<N>, const N: usize>(system: &P, x: &SVector<f64, N>) -> Region {
     let (plus, minus) = lie_derivatives(system, x);
     match (plus.partial_cmp(&0.0), minus.partial_cmp(&0.0)) {

@@ -227,7 +227,7 @@ impl System {
         &self.functions.tape
     }
 
-    /// What decides the system's numbers, and nothing else: this is hashed.
+    /// The data that determine the system's numbers, and nothing else: they are hashed.
     pub fn canonical(&self) -> Canonical {
         self.definition.canonical(&self.values)
     }

@@ -102,7 +102,7 @@ fn too_large(tape: &Tape, node: Node) -> String {
     format!("{} is beyond the range of numbers", written(tape, node))
 }
 
-/// Where an operation has no value, in words.
+/// Condition under which an operation has no value, in words.
 fn without_value(tape: &Tape, node: Node) -> String {
     let text = |node| written(tape, node);
     match tape.operations()[node] {
@@ -150,9 +150,9 @@ impl Ends {
         (!ends.is_empty()).then_some(Self { tape, ends })
     }
 
-    /// Where the domain ends first on a path of states, between neighbouring `places`, and which
-    /// operation has no value there, in words. A zero of a divisor is no end where the equation is
-    /// bounded about it.
+    /// First end of the domain on a path of states, between neighbouring `places`, and the
+    /// operation that has no value there, in words. A zero of a divisor is no end where the
+    /// equation is bounded about it.
     pub fn first(&self, path: &dyn Fn(f64) -> Vec<f64>, places: &[f64]) -> Option<(f64, String)> {
         let at = |place: f64| self.tape.values(&path(place));
         let mut before = at(*places.first()?);
