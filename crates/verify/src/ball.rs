@@ -19,7 +19,7 @@ const PLACES: u32 = 192;
 /// A unit in the last of them: 2^-192.
 const UNIT: f64 = 1.593_091_911_132_452_3e-58;
 
-/// What a Taylor series is made of.
+/// Coefficient type of a Taylor series.
 pub(super) trait Number: Clone {
     /// An enclosure of a range.
     fn of(range: &Range) -> Self;

@@ -379,7 +379,7 @@ fn equation(p: &Parameters, alpha: &str) -> Check<Caricature> {
     })
 }
 
-/// What is claimed of a closed orbit.
+/// Stability that a certificate claims of a closed orbit.
 #[derive(Clone, Copy, PartialEq)]
 enum CycleStability {
     Attracts,
@@ -444,7 +444,7 @@ fn cycle(
     }
     let (trace, determinant) =
         (&d[0][0] + &d[1][1], &(&d[0][0] * &d[1][1]) - &(&d[0][1] * &d[1][0]));
-    // What was rounded were these products.
+    // Rounding errors are relative to these products.
     let products = &(&d[0][0] * &d[1][1]).magnitude() + &(&d[0][1] * &d[1][0]).magnitude();
     let scale = &Rational::whole(4) + &products;
     tight(&range(c.trace)?, &trace, &scale, &named("the trace"))?;
@@ -596,7 +596,7 @@ fn orbit(
     name: &str,
 ) -> Check<Rc<Vec<Crossing>>> {
     let at = |n: usize, what: &str| format!("{name}, crossing {}: {what}", n + 1);
-    // What can be refused without an orbit comes first.
+    // Claims that can be refused without an orbit come first.
     let mut claimed = Vec::new();
     for (n, row) in rows.iter().enumerate() {
         for (b, axis, what) in
@@ -755,7 +755,7 @@ fn contraction(known: &Known, c: &Contraction) -> Check<Vec<String>> {
     Ok(said)
 }
 
-/// Where u lies: before the set (-1), beyond it (1), or neither (0).
+/// Position of u: before the set (-1), beyond it (1), or neither (0).
 fn side(u: &Range) -> i32 {
     let one = Rational::whole(1);
     i32::from(u.low > one) - i32::from(u.high < -&one)

@@ -31,14 +31,14 @@ mod strict;
 
 pub use certificate::{Checker, verify};
 
-/// What a certificate shows.
+/// Result of a verified certificate.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Verified {
     /// The theorem's name.
     pub theorem: String,
     /// Its statement.
     pub statement: String,
-    /// What was verified, a line each.
+    /// Verified facts, a line each.
     pub findings: Vec<String>,
 }
 
@@ -53,7 +53,7 @@ pub enum Refused {
     Wrong {
         /// The theorem.
         theorem: String,
-        /// What should hold.
+        /// The condition that should hold.
         what: String,
     },
 }

@@ -187,7 +187,7 @@ struct Step {
     last: [Dual; 3],
 }
 
-/// Where a set crosses the plane.
+/// Crossing of the plane by a set.
 pub(super) struct Crossing {
     pub upward: bool,
     pub time: Range,
@@ -218,7 +218,7 @@ impl Set {
         self.frame.map(|row| row.map(Ball::exactly))
     }
 
-    /// How far its points are from its centre.
+    /// Largest distance of its points from its centre, by coordinate.
     fn reach(&self) -> [f64; 3] {
         self.frame().map(|row| {
             (0..3).map(|j| row[j].magnitude() * self.radii[j]).sum::<f64>() * (1.0 + 1e-14)

@@ -1,4 +1,4 @@
-//! What the certificates claim, computed anew from their starting points alone.
+//! Recomputation of the certificates' claims from their starting points alone.
 
 use std::cell::RefCell;
 use std::collections::HashMap;
