@@ -68,7 +68,7 @@ pub enum Grounds {
     Paths {
         /// Share of strides into new places, of this panel's path and of the next one's.
         freshness: [f64; 2],
-        /// Agreement of the two paths.
+        /// Overlap of the two paths.
         shared: Shared,
     },
     /// Two panels were compared over starts that a reader could not tell apart.
