@@ -1,5 +1,5 @@
-//! What `--version` says of a build: commit, compiler, target. Nothing here needs git or a clock;
-//! the same sources built by the same compiler get the same words.
+//! Description of a build for `--version`: commit, compiler, target. Nothing here needs git or a
+//! clock; the same sources built by the same compiler get the same words.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -59,7 +59,7 @@ fn commit() -> String {
     if changed { format!("{hash}, with changes") } else { hash }
 }
 
-/// What a command prints, if it can be run and succeeds.
+/// Standard output of a command, if it can be run and succeeds.
 fn said(command: &mut Command) -> Option<String> {
     let output = command.output().ok().filter(|o| o.status.success())?;
     Some(String::from_utf8_lossy(&output.stdout).trim().to_owned())

@@ -1,6 +1,6 @@
-//! What a unit of time costs: the caricature, smoothed and hysteretic, both readings, by each
-//! method, as the figures run it (tolerances 10^-7.97727, restart after each 100, step cap 10).
-//! Prints the counts of work first, then times.
+//! Cost of a unit of time: the caricature, smoothed and hysteretic, both readings, by each method,
+//! as the figures run it (tolerances 10^-7.97727, restart after each 100, step cap 10). Prints the
+//! counts of work first, then times.
 //!
 //! `cargo bench -p twofold-benches --bench steppers`; with `-- --counts` the counts only.
 

@@ -21,7 +21,8 @@ use twofold::system::{
 
 const TOLERANCE: Tolerance = Tolerance { rtol: 1.0536712e-8, atol: 1.0536712e-8 };
 
-/// What Hairer & Wanner's program, and others after it, make of [`TOLERANCE`]: 0.1 rtol^(2/3).
+/// The tolerance into which Hairer & Wanner's program, and others after it, convert [`TOLERANCE`]:
+/// 0.1 rtol^(2/3).
 const REPLACED: Tolerance = Tolerance { rtol: 4.806217345097476e-07, atol: 4.806217345097476e-07 };
 
 /// With which Radau IIA's error at the end of W0 is below that of the crate

@@ -1,6 +1,6 @@
-//! How a disturbance grows in one passage of the two-fold when the switch acts late or has a
-//! memory, and where the two-fold is left in dependence on the chatter's phase: the data of
-//! figures/delay.
+//! Growth of a disturbance in one passage of the two-fold when the switch acts late or has a
+//! memory, and the place where the two-fold is left in dependence on the chatter's phase: the data
+//! of figures/delay.
 //!
 //! `cargo run --release --example delay_growth growth > figures/delay/growth.csv`, and the same
 //! with `exits`
@@ -72,7 +72,7 @@ pub fn start_at(rule: LateRule, phase: f64) -> [f64; 3] {
     [0.0, y + later * (z + v_minus * y), z + later * (y + v_plus * z)]
 }
 
-/// Where the two-fold is left, in inner scales.
+/// Point at which the two-fold is left, in inner scales.
 ///
 /// # Errors
 ///

@@ -92,7 +92,7 @@ pub fn shift(run: u64) -> [f64; 3] {
     if run == 0 { [0.0; 3] } else { [draw(), draw(), draw()] }
 }
 
-/// What has captured the run by the time from which its section is shown.
+/// The attractor that has captured the run by the time from which its section is shown, and when.
 pub fn settles(crossings: &[Crossing], t_end: f64) -> (String, f64) {
     let point = |c: &Crossing| SectionPoint {
         t: c.t,

@@ -33,7 +33,7 @@ impl PiecewiseSmooth<2> for Refuge {
 ///
 /// If the orbit cannot be followed.
 pub fn follow() -> Result<Vec<ModeEvent<2>>, FilippovError> {
-    // What to do where the future is not unique: must be chosen.
+    // Continuation where the future is not unique: must be chosen.
     let rule = ExitRule::AtOnce { side: Side::Plus };
     let mut record = Trajectory::new(4);
     let _ = run(

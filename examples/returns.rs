@@ -1,7 +1,7 @@
-//! How many orbits that leave the repelling sliding region of the paper's caricature come back to
-//! its two-fold: starts drawn evenly from a box of that region, left at once to either side in
-//! turn, followed for 300 units of time or until they are back. (The paper says that all come
-//! back.)
+//! Number of orbits that come back to the two-fold of the paper's caricature after they leave its
+//! repelling sliding region: starts drawn evenly from a box of that region, left at once to either
+//! side in turn, followed for 300 units of time or until they are back. (The paper says that all
+//! come back.)
 //!
 //! `make returns`, or `cargo run --release --example returns`
 
@@ -15,7 +15,7 @@ use twofold::integrate::{Flow, Step, Tolerance};
 use twofold::num::random::RandomStream;
 use twofold::system::Caricature;
 
-/// How long an orbit may take.
+/// Longest time that an orbit may take.
 const WITHIN: f64 = 300.0;
 
 /// Ends the run where the orbit comes to a two-fold.
@@ -33,8 +33,8 @@ impl FilippovObserver<3> for Back {
     }
 }
 
-/// How many of `starts` orbits come back: y and z down to `-box_size`, where both fields point away
-/// from x = 0.
+/// Number of orbits, of `starts`, that come back: y and z down to `-box_size`, where both fields
+/// point away from x = 0.
 ///
 /// # Errors
 ///

@@ -25,7 +25,7 @@ caught = "prey*predator"
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let system = System::new(Definition::from_toml(REFUGE, "refuge.toml")?).with("refuge", 1.0)?;
-    // What to do where the future is not unique: must be chosen.
+    // Continuation where the future is not unique: must be chosen.
     let rule = ExitRule::AtOnce { side: Side::Plus };
     let mut record = Trajectory::new(4);
     let end = run(

@@ -1,6 +1,6 @@
-//! How often runs of fig. 6(i) visit the singularity by t = 150, at each candidate for alpha and
-//! beta: 30 starts within 1e-9 of the paper's. A visit comes within 0.1 of the origin after more
-//! than 0.4 away. CSV on standard output, a row a run.
+//! Number of visits to the singularity by runs of fig. 6(i) until t = 150, at each candidate for
+//! alpha and beta: 30 starts within 1e-9 of the paper's. A visit comes within 0.1 of the origin
+//! after more than 0.4 away. CSV on standard output, a row a run.
 //!
 //! `make capture`, or `cargo run --release --example visits > figures/capture/visits.csv`
 

@@ -1,7 +1,7 @@
-//! What is fuzzed: every reader of foreign bytes. A reader may refuse; it must not panic, hang, or
-//! take memory that its input does not pay for. Where something is read that can be written again,
-//! it must come back the same. Two drivers make the inputs: tests/it/fuzz.rs, which needs no tool,
-//! and libFuzzer (fuzz/Cargo.toml), which sees what an input runs through.
+//! Targets of fuzzing: every reader of foreign bytes. A reader may refuse; it must not panic, hang,
+//! or take memory that its input does not pay for. Where something is read that can be written
+//! again, it must come back the same. Two drivers make the inputs: tests/it/fuzz.rs, which needs no
+//! tool, and libFuzzer (fuzz/Cargo.toml), which sees what an input runs through.
 
 use twofold::job::spec::{FunnelSpec, Observation, RunSpec, SwitchSpec};
 use twofold::job::sweep::Rows;
@@ -14,7 +14,7 @@ use twofold::system::{Definition, PiecewiseSmooth, System};
 /// new are worth changing further.
 pub type Target = fn(&[u8]) -> String;
 
-/// What came of reading something.
+/// Outcome of a read, in words.
 fn said<T, E: std::fmt::Display>(found: &Result<T, E>) -> String {
     match found {
         Ok(_) => "read".into(),
@@ -51,8 +51,7 @@ pub fn spec(bytes: &[u8]) -> String {
     if let Err(error) = spec.validate() {
         return error.to_string();
     }
-    // What a sound spec may ask for is limited by time only: so few steps and points that the
-    // fuzzer goes on.
+    // The work of a valid spec is bounded, so that the fuzzer goes on: few steps and points.
     spec.t_end = spec.t_end.min(1.0);
     spec.method.max_steps = spec.method.max_steps.min(50);
     spec.schedule.restart_every = spec.schedule.restart_every.map(|t| t.max(0.1));

@@ -1,4 +1,4 @@
-//! What a run costs against how long it is, how thin the layer is and how small the tolerance:
+//! Cost of a run against its length, the thickness of its layer and its tolerance:
 //! `make bench-cost`.
 //!
 //! Prints a CSV: what is varied, its value, method, threads, processor seconds of one run
