@@ -19,7 +19,7 @@ const STATEMENT: &str = "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh t
 pass the two-fold singularity at their third crossing of y = 0, and the fourth crossings of the \
 second and third are less than 0.0005 from that of the first.";
 
-/// Where the orbits start: x and z on y = 0, as decimal numbers.
+/// Starts of the orbits: x and z on y = 0, as decimal numbers.
 const STARTS: [[f64; 2]; 3] = [[0.2, -1.0], [0.21, -1.0], [0.2, -0.99]];
 
 fn main() {

@@ -17,8 +17,8 @@
 //! choose, the next set is one of two that are disjoint. So chains of n sets, of which there are
 //! about lambda^n with lambda^-2 + lambda^-14 = 1, are told apart by orbits, and lambda > 1.12.
 //!
-//! Where the parallelograms lie is found by following plain points and is no part of the proof:
-//! what the coverings say of them is.
+//! The parallelograms are placed by following plain points, which is no part of the proof: the
+//! coverings' statements about them are.
 
 use nalgebra::SVector;
 use serde_json::{Value, json};
@@ -43,7 +43,7 @@ const HUB: [[f64; 2]; 2] = [
 ];
 /// The direction of its unstable manifold there.
 const UNSTABLE: [f64; 2] = [-0.650591069181416, -0.7594282459201673];
-/// How far from the hub, along it, the homoclinic orbit begins.
+/// Distance from the hub, along it, at which the homoclinic orbit begins.
 const OFFSET: f64 = 5.8051217418726e-15;
 /// Returns from there until it is back at the hub.
 const RETURNS: usize = 14;
@@ -76,7 +76,8 @@ fn follow(flow: &mut Flow<Ball, 3>, [x, z]: Point) -> (Point, [[f64; 2]; 2]) {
     ([set.centre()[0], set.centre()[2]], [[at(0, 0), at(0, 2)], [at(2, 0), at(2, 2)]])
 }
 
-/// Where sets are to lie: their middles, their directions, how much the map stretches them.
+/// Intended places of sets: their middles, their directions, the factors by which the map stretches
+/// them.
 struct Place {
     centre: [f64; 2],
     along: [f64; 2],
@@ -126,7 +127,7 @@ fn main() {
     }
     let mut sets = vec![hset(&saddle[0], HUB_SIZE), hset(&saddle[1], OTHER_SIZE)];
     sets.extend((1..RETURNS).map(|i| hset(&orbit[i], sizes[i])));
-    // Where a chain can choose, its two ways are told apart: the sets' extents in x do not meet.
+    // The two ways of a chain that can choose are told apart: the sets' extents in x do not meet.
     let extent = |s: &HSet| {
         let reach = Interval::between(-1.0, 1.0)
             * (Interval::from_f64(s.unstable[0].abs()) + Interval::from_f64(s.stable[0].abs()));

@@ -123,7 +123,7 @@ fn equation() -> Tape {
     })
 }
 
-/// What is needed of F and of the speed of s where |p| is small.
+/// Bounds on F and on the speed of s where |p| is small.
 struct Near {
     least: Interval,
     slow: Interval,

@@ -19,7 +19,7 @@ use twofold::record::Hash;
 use twofold::render::sheet::*;
 use twofold::render::style;
 
-/// What is made for this figure: the candidates, one exponent changed, by LSODA as the figures are;
+/// Data made for this figure: the candidates, one exponent changed, by LSODA as the figures are;
 /// and fig. 7's intervals, fig. 8's sigmas and fig. 9's hysteretic switch over alpha and beta by
 /// Dormand-Prince at NDSolve's tolerance, which docs/parameters.md compares with LSODA's map.
 pub const DATA: &[(&str, &[u8])] = &[
@@ -101,7 +101,7 @@ pub fn candidates_in(
     }
 }
 
-/// How many runs of 9(i) support what the paper says of it.
+/// Number of runs of 9(i) that support the paper's claim about it.
 ///
 /// # Errors
 ///

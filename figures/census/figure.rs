@@ -70,7 +70,7 @@ fn question(reading: Reading) -> AnyQuestion {
     })
 }
 
-/// What the committed data say in a reading.
+/// Findings of the committed data in a reading.
 ///
 /// # Errors
 ///
@@ -79,7 +79,7 @@ pub fn found(reading: Reading) -> Result<Found, JobError> {
     found_in(reading, &committed)
 }
 
-/// What the files that `read` gives for the names in [`DATA`] say in a reading.
+/// Findings, in a reading, of the files that `read` gives for the names in [`DATA`].
 ///
 /// # Errors
 ///
@@ -130,7 +130,7 @@ pub fn runs(panel: &str, reading: Reading) -> Result<Vec<census::CensusRun>, Job
     Ok(census::PANELS[at].runs(&table, vec![("params.alpha", reading.caricature().alpha.into())]))
 }
 
-/// How many of these runs support what the paper says of the panel.
+/// Number of these runs that support the paper's claim about the panel.
 ///
 /// # Errors
 ///

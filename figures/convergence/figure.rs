@@ -81,7 +81,7 @@ fn after_question() -> AfterVisitQuestion {
     }
 }
 
-/// What the figure asks: before the visit, after it.
+/// Questions of the figure: before the visit, after it.
 fn questions(reading: Reading) -> Vec<AnyQuestion> {
     let system = System::from(reading.caricature());
     vec![
@@ -188,7 +188,7 @@ fn approach(before: &[Vec<Entry>], expected: LineStyle) -> (PlanePanel, Vec<Stri
     (panel.legend_at(Corner::LowerRight), rates)
 }
 
-/// Where members of the funnel and smoothed orbits cross after the visit.
+/// Crossings of members of the funnel and of smoothed orbits after the visit.
 fn crossings(members: &[Vec<Entry>], after: &[Vec<Entry>]) -> PlanePanel {
     let of = |name: &'static str| -> Vec<[f64; 2]> {
         let rows = members.iter().filter(|r| r[1] == Entry::from(name));

@@ -331,7 +331,7 @@ fn section_panel(
     }
 }
 
-/// What became of sentence 4.8 in this figure's words.
+/// Verdict on sentence 4.8 in this figure's words.
 fn verdict(scores: &Table) -> String {
     let column = |name: &str| -> Vec<&str> { scores.words(name).collect() };
     let [way, reading, delayed, hysteresis, outcome] =
@@ -526,8 +526,8 @@ fn growth_panel(table: &Table) -> (PlanePanel, String) {
     for ((kind, _, colour), power) in
         KINDS.into_iter().zip([law.across(), law.along(), law.carried()])
     {
-        // Where smoothing's line lies says nothing here, how steep it is does: it begins at 10, or
-        // 1, at 10^-2 and ends at the panel's edge.
+        // The line of smoothing shows a slope, not a level: it begins at 10, or 1, at 10^-2 and
+        // ends at the panel's edge.
         let log_at = |p: f64| power * (log10(p) + 2.0) + if power < 0.0 { 1.0 } else { 0.0 };
         let end = if power < 0.0 { exp10(-2.0 - 11.0 / -power) } else { 1e-6 };
         let ends = [1e-2, end].map(|p| [p, exp10(log_at(p))]);

@@ -35,7 +35,7 @@ const NEAR: f64 = 0.05;
 const MAX_STEP: f64 = 2.0;
 /// Most steps of a compared method.
 const MAX_STEPS: u64 = 10_000_000;
-/// Where the axis of digits ends: above the seventeen that two equal numbers count for.
+/// Upper end of the axis of digits: above the seventeen that two equal numbers count for.
 const TOP: f64 = 18.0;
 /// When disturbances are made, relative to the passage, in units of sqrt(eps).
 const OFFSETS: [f64; 3] = [-3.0, 0.0, 3.0];
@@ -95,7 +95,7 @@ fn growth_question() -> PassageQuestion {
     }
 }
 
-/// What the figure asks: the digits first, then the growth for each eps.
+/// Questions of the figure: the digits first, then the growth for each eps.
 fn questions(reading: Reading) -> Vec<AnyQuestion> {
     let system = System::from(reading.caricature());
     let digits = MethodDigits { system: system.clone(), eps: EPS, compared: digits_question() };
@@ -110,7 +110,7 @@ fn value(entry: &Entry) -> f64 {
     entry.value()
 }
 
-/// Where a disturbance is made and in which direction: one series of the right panel.
+/// Place and direction of a disturbance: one series of the right panel.
 struct Series {
     words: &'static str,
     colour: Colour,
@@ -252,7 +252,7 @@ fn draw(reading: Reading, answers: &[Arc<Answer>]) -> Sheet {
     footer(rows, visits, &series).into_iter().fold(sheet, Sheet::footer)
 }
 
-/// What the tables say, in words.
+/// Statements about the tables, in words.
 fn footer(rows: &Table, visits: &Table, series: &[Series; 3]) -> Vec<String> {
     let mut lines =
         vec![

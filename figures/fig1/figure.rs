@@ -8,7 +8,7 @@ use twofold::paper::study::Computed;
 use twofold::paper::{Figure, Picture, Study, View};
 use twofold::system::Wheel;
 
-/// Where on its line the wheel is drawn.
+/// Position of the wheel on its line.
 const R: f64 = 0.69267;
 
 /// The figure's specification.

@@ -41,7 +41,7 @@ const PER_DECADE: usize = 10;
 const DECADES: f64 = 4.6;
 /// Steps of the ladder that hold a jump are divided into so many.
 const FINER: usize = 8;
-/// Which steps: found by looking.
+/// Indices of these steps, found by inspection.
 const JUMPS: [usize; 3] = [6, 22, 36];
 /// Decades for other transition functions.
 const DECADES_OTHERS: f64 = 3.0;
@@ -222,7 +222,7 @@ fn period(law: &Predicted, slope: f64, at: (f64, f64)) -> f64 {
     (0..50).fold(squared, |r, _| squared * grown(law, slope, at, at.0 / r) / at.1)
 }
 
-/// Where the far exit jumps: the two eps between which |y| grows by more than a quarter at once, as
+/// Jumps of the far exit: the two eps between which |y| grows by more than a quarter at once, as
 /// eps falls.
 fn jumps(rows: &[Row]) -> Vec<(f64, f64)> {
     let jump = |w: &&[Row]| w[1].far[0].abs() > 1.25 * w[0].far[0].abs();
@@ -430,8 +430,8 @@ fn far_panel(ladder: &[Row], law: &Predicted, tanh: f64) -> (PlanePanel, String)
     (panel.legend_at(Corner::UpperRight), text)
 }
 
-/// How near the canard an orbit comes in, up to a constant: d = eps^(1/(2 mu))-less part of the
-/// deviation, from the growth that it causes.
+/// Signed distance of the incoming orbit from the canard, up to a constant: d = eps^(1/(2 mu))-less
+/// part of the deviation, from the growth that it causes.
 fn nearness(row: &Row, law: &Predicted) -> f64 {
     let size = exp(law.across() * ln(row.eps)) / (row.growth[0] * sqrt(row.z2));
     if row.minus { size } else { -size }
@@ -537,7 +537,7 @@ fn exponents_panel(rows: &[Row]) -> (PlanePanel, String) {
     (panel.legend_at(Corner::LowerRight), text)
 }
 
-/// What the second picture asks: passages by transition, then leaving by rule.
+/// Questions of the second picture: passages by transition, then leaving by rule.
 fn selection_questions() -> Vec<AnyQuestion> {
     let paper = Reading::Reconstructed.caricature();
     let mut all: Vec<AnyQuestion> = Vec::new();
@@ -562,7 +562,7 @@ fn selection_questions() -> Vec<AnyQuestion> {
     all
 }
 
-/// What else can decide how an orbit leaves.
+/// Another rule that can decide how an orbit leaves.
 #[derive(Clone, Copy, PartialEq)]
 enum Rule {
     Literal,

@@ -29,7 +29,7 @@ pub struct ReferenceProblem {
     pub atol_over_rtol: f64,
     /// The solution at `t_end`.
     pub reference: Vec<f64>,
-    /// How well it is known.
+    /// Uncertainty of that solution, by component.
     pub uncertainty: Vec<f64>,
     /// ODEPACK's runs, loosest first.
     pub runs: Vec<ReferenceRun>,
@@ -167,7 +167,7 @@ pub fn rows() -> Vec<Row> {
     collect.rows
 }
 
-/// What our methods are asked about a problem: what ODEPACK was.
+/// The question to our methods about a problem: the one that ODEPACK was given.
 fn question(known: &ReferenceProblem) -> WorkPrecisionQuestion {
     WorkPrecisionQuestion {
         start: known.start.clone(),

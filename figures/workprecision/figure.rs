@@ -130,7 +130,7 @@ fn draw(tables: &[Table]) -> Sheet {
     footer(&runs).into_iter().fold(sheet, Sheet::footer)
 }
 
-/// What the tables say, in words.
+/// Statements about the tables, in words.
 fn footer(runs: &[(&str, &str, [f64; 5])]) -> Vec<String> {
     let of = |method: &'static str| runs.iter().filter(move |r| r.1 == method);
     let pairs: Vec<_> = of("odepack-lsoda")

@@ -1,4 +1,4 @@
-//! What the proofs share: the equation, the printing of intervals, and certificates.
+//! Code that the proofs share: the equation, the printing of intervals, and certificates.
 
 use std::fs;
 use std::path::Path;

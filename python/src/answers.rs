@@ -110,7 +110,7 @@ pub fn handed<'py>(
     Ok(result)
 }
 
-/// What a command with these flags computes.
+/// Answer to the question of a command with these flags.
 #[pyfunction]
 #[pyo3(signature = (command, flags, threads, show=None))]
 pub fn ask<'py>(
@@ -185,7 +185,7 @@ pub fn written(
     })
 }
 
-/// What a run settles on: the evidence as JSON.
+/// Attractor of a run: the evidence as JSON.
 #[pyfunction]
 #[pyo3(signature = (text, show=None))]
 pub fn classify(py: Python<'_>, text: &str, show: Option<&Bound<'_, PyAny>>) -> PyResult<String> {
@@ -227,7 +227,8 @@ pub fn sweep<'py>(
     Ok((arrays(py, rows.table())?, rows.csv()))
 }
 
-/// Where runs from these starts end, in their order: a JSON object each, with "outcome" or "error".
+/// Outcomes of runs from these starts, in their order: a JSON object each, with "outcome" or
+/// "error".
 #[pyfunction]
 #[pyo3(signature = (text, starts, threads, show=None))]
 pub fn fates(

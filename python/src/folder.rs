@@ -23,7 +23,7 @@ fn executor<'a>(folder: &Folder, keep: bool, work: &'a Work) -> Executor<'a> {
     Executor::new(keep.then(|| Store::new(folder.out().join(".store"))), work)
 }
 
-/// What a folder says, as JSON.
+/// Content of a folder, as JSON.
 #[pyfunction]
 pub fn paper(folder: &str) -> PyResult<String> {
     let folder = read(folder)?;
@@ -77,7 +77,7 @@ pub fn paper_answer<'py>(
     handed(py, hash.as_str(), &json!(answer.facts), answer.tables.clone())
 }
 
-/// What the claims come to, as a JSON list.
+/// Verdicts on the claims, as a JSON list.
 #[pyfunction]
 #[pyo3(signature = (folder, threads, keep, show=None))]
 pub fn paper_claims(

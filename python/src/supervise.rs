@@ -15,22 +15,22 @@ use twofold::job::{JobError, JobMonitor, Progress};
 
 use crate::errors;
 
-/// How often Ctrl-C is looked for and progress is shown.
+/// Interval at which Ctrl-C is looked for and progress is shown.
 const TICK: Duration = Duration::from_millis(100);
-/// How long a computation may take to stop when it is asked to. One that takes longer is left to
-/// end by itself.
+/// Longest time that a computation may take to stop when it is told to. One that takes longer is
+/// left to end by itself.
 const PATIENCE: Duration = Duration::from_secs(2);
 /// The same as the main thread's on most systems: the debug profile needs more than a thread has by
 /// itself.
 const STACK: usize = 8 << 20;
 
-/// What both sides of a computation see.
+/// State that both sides of a computation share.
 #[derive(Default)]
 pub struct Work {
     stop: AtomicBool,
     /// Bits of the share that is done, from 0 to 1.
     share: AtomicU64,
-    /// What is being computed.
+    /// Label of the present computation.
     label: Mutex<String>,
     /// Whether shares are counted by [`Work::finished`] instead of by what single jobs report.
     counted: AtomicBool,
@@ -48,7 +48,7 @@ impl Work {
         self.share.store((done as f64 / all.max(1) as f64).to_bits(), Ordering::Relaxed);
     }
 
-    /// What is being computed, from now on.
+    /// Sets the label of the present computation.
     pub fn says(&self, label: &str) {
         label.clone_into(&mut self.label.lock().unwrap_or_else(PoisonError::into_inner));
     }
@@ -124,7 +124,7 @@ pub fn supervise<T: Send + 'static>(
         });
         if let Err(error) = heard {
             work.stop.store(true, Ordering::Relaxed);
-            // What it says in the end is of no interest.
+            // The result of a stopped computation is of no interest.
             py.detach(move || drop(receiver.recv_timeout(PATIENCE)));
             return Err(error);
         }

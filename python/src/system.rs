@@ -84,7 +84,7 @@ impl Definition {
         self.0.clone().with_all(values).map(Self).map_err(|e| errors::parameter(&e))
     }
 
-    /// What decides the system's numbers, and its name.
+    /// The data that determine the system's numbers, and its name.
     fn to_json(&self) -> String {
         serde_json::to_string(&self.0).expect("systems are plain data")
     }
