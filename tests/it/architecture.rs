@@ -52,7 +52,7 @@ const CRATES: [(&str, &[&str], &[&str]); 14] = [
 /// Packages that hold only data, with the crate that embeds each.
 const DATA: [(&str, &str); 2] = [("systems", "system"), ("jeffrey-2013", "paper")];
 
-/// What no crate below the command may name: flags and terminals.
+/// Crates that no crate below the command may name: flags and terminals.
 const COMMAND: [&str; 5] = ["clap", "clap_complete", "clap_mangen", "indicatif", "signal-hook"];
 
 /// Crates that serve any system and any paper, and parts of crates that do. `system` holds the
@@ -76,7 +76,7 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// What a manifest names in `[dependencies]`.
+/// Names in a manifest's `[dependencies]`.
 fn dependencies(manifest: &str) -> BTreeSet<String> {
     let manifest: toml::Table = manifest.parse().unwrap();
     manifest

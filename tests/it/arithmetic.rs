@@ -1,7 +1,7 @@
-//! What every hash rests on and no source can say: that the compiler carries out the arithmetic
-//! that is written. Nothing fused, nothing reordered, no reciprocals for divisions, no subnormals
-//! flushed, no intermediate results of more digits than f64 has (the x87 unit's habit). The idea of
-//! such a test: REBOUND (Rein & Tamayo 2017).
+//! Premise of every hash that no source can state: the compiler carries out the arithmetic that is
+//! written. Nothing fused, nothing reordered, no reciprocals for divisions, no subnormals flushed,
+//! no intermediate results of more digits than f64 has (the x87 unit's habit). The idea of such a
+//! test: REBOUND (Rein & Tamayo 2017).
 #![allow(clippy::disallowed_methods)]
 // the fused product is called to show that it differs
 // a loop by index is one of the shapes that compilers like to turn into lanes

@@ -1,5 +1,5 @@
-//! What the programs take from the platform's library of mathematics: nothing at all. Names that
-//! dependencies ask for are defined in `src/bin/twofold/mathematics.rs`, the one file in which
+//! Symbols that the programs take from the platform's library of mathematics: none at all. Names
+//! that dependencies ask for are defined in `src/bin/twofold/mathematics.rs`, the one file in which
 //! anything unsafe is allowed. `cargo test` looks at the command; `make symbols` builds all
 //! programs and the Python module, and looks at those too.
 

@@ -12,7 +12,7 @@ use std::process::Command;
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 
-/// What a chapter asks to be done.
+/// An action that a chapter asks for.
 #[derive(Debug, PartialEq)]
 enum Action {
     Write { file: String, text: String },
@@ -108,8 +108,7 @@ fn every_command_of_the_book_does_what_it_says() {
                         chapter.file_name().unwrap().to_string_lossy()
                     );
                     if let Some(target) = command.strip_prefix("make ") {
-                        // What make does is tested where it is done; here, that it can be done at
-                        // all.
+                        // The targets of make are tested elsewhere; here, that they exist.
                         let target = target.split_whitespace().next().unwrap();
                         assert!(
                             makefile.lines().any(|l| l.starts_with(&format!("{target}:"))),

@@ -182,7 +182,7 @@ fn committed_rows_of_the_study_come_out_the_same() {
     }
 }
 
-/// What the project says of the methods follows from the runs.
+/// The project's statement about the printed numbers follows from the runs.
 #[test]
 fn the_likelihood_of_the_printed_numbers_is_bounded_without_a_prior() {
     let candidates = candidates();

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use regex::RegexBuilder;
 use serde_json::Value;
 
-/// What a command printed.
+/// Exit code and output of a command.
 struct Answer {
     code: i64,
     out: String,

@@ -135,8 +135,8 @@ impl FilippovObserver<3> for Visits {
     }
 }
 
-/// How often an orbit comes to the two-fold within 300, at most `wanted` times; it leaves at once
-/// to x > 0.
+/// Number of visits of an orbit to the two-fold within t = 300, at most `wanted`; at each it slides
+/// for 0.3 and leaves to x > 0.
 fn visits<P: PiecewiseSmooth<3> + Clone>(system: &P, start: SVector<f64, 3>, wanted: usize) -> usize
 where
     for<'a> twofold::integrate::filippov::SlidingFlow<'a, P, 3>: VectorField<4>,

@@ -1,4 +1,4 @@
-//! What every stepper promises, checked on every stepper.
+//! Contract of a stepper, checked on every stepper.
 #![allow(clippy::disallowed_methods)] // exact solutions are compared to tolerances, not hashed
 
 use nalgebra::{SVector, vector};

@@ -446,7 +446,7 @@ fn committed_exponents_come_out_the_same() {
     }
 }
 
-/// What is wrong is said before anything is computed, with exit code 2.
+/// Wrong questions are refused before anything is computed, with exit code 2.
 #[test]
 fn wrong_questions_are_refused() {
     let told = |arguments: &str| {
@@ -477,7 +477,7 @@ fn wrong_questions_are_refused() {
         assert!(code == Some(2) && said.contains(word), "{arguments}: {code:?} {said}");
     }
     assert_eq!(told("--delay 0.1").0, Some(0));
-    // Where an axis varies eps, --eps says that the switch is the smooth one.
+    // In a sweep over eps, --eps selects the smooth switch.
     let sweep = |eps: &str| {
         self::told(
             &["sweep", "--switch", "delayed", "--delay", "0.1", "--t-end", "1", "--quiet"],

@@ -1,5 +1,5 @@
-//! What carries the project to others: workflows are pinned and may do little, versions agree, the
-//! package holds what it embeds.
+//! Distribution of the project: workflows are pinned and may do little, versions agree, the package
+//! holds what it embeds.
 //!
 //! A package made of this repository has no workflows; there nothing is tested here.
 

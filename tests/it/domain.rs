@@ -71,8 +71,8 @@ fn the_end_of_a_domain_is_named_by_every_switch() {
     }
 }
 
-/// Where a divisor is zero and the equation is bounded, the motion goes on: z' = sin(y)/y has z(2)
-/// = 1 + 2 Si(1).
+/// At a zero of a divisor the motion goes on if the equation is bounded: z' = sin(y)/y has z(2) = 1
+/// + 2 Si(1).
 #[test]
 fn a_zero_of_a_divisor_need_not_be_the_end() {
     const SI: f64 = 0.946_083_070_367_183;

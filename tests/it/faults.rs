@@ -196,7 +196,7 @@ fn a_finished_file_replaces_its_predecessor_whole() {
     assert_eq!(files(folder.path()), ["run.csv", "run.csv.part"]);
 }
 
-/// What each exit code stands for, on the real programs. 130 and 143:
+/// Meaning of each exit code, on the real programs. 130 and 143:
 /// `signals_leave_at_once_and_keep_what_is_finished`.
 #[test]
 fn exit_codes_are_those_of_the_help() {
@@ -322,8 +322,8 @@ fn a_full_disk_is_an_error() {
     let path = folder.path().join("run.csv");
     fs::write(&path, "old").unwrap();
     let program = assert_cmd::cargo::cargo_bin("twofold");
-    // Where the tests run, the signal that goes with it may be ignored already (Python's children):
-    // then it proves nothing.
+    // The signal may be ignored already where the tests run (by Python's children): then it proves
+    // nothing.
     for disposition in ["", "env --default-signal=XFSZ "] {
         let script =
             format!("ulimit -f 16; exec {disposition}\"$0\" run --quiet --t-end 100 --out \"$1\"");
@@ -480,7 +480,7 @@ fn an_interrupted_sweep_keeps_its_rows() {
     assert_eq!(sweep.output().status.code(), Some(130), "{rest:?}");
     assert!(rest.last().unwrap().contains("runs are finished"), "{rest:?}");
     assert_eq!(files(folder.path()), ["sweep.csv.journal"]);
-    // What is there can be looked at, and a sweep that was not told to go on leaves it alone.
+    // The rows so far can be read, and a sweep without --resume leaves them alone.
     let journal = folder.path().join("sweep.csv.journal");
     let part = twofold(&["sweep", "merge", journal.to_str().unwrap(), "--quiet"]);
     assert!(String::from_utf8(part.stdout).unwrap().lines().count() >= 5);

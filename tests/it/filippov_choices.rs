@@ -1,4 +1,4 @@
-//! What a Filippov run decides, and what it leaves to the user: values known in closed form.
+//! Decisions of a Filippov run, and those that it leaves to the user: values known in closed form.
 
 use assert_cmd::Command;
 

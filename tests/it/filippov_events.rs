@@ -95,8 +95,8 @@ fn near_grazing_pairs_do_not_accumulate() {
     }
 }
 
-/// Where both fields vanish on the surface the motion stays: u' = -|u|^p with p < 1 comes to rest
-/// in finite time.
+/// If both fields vanish on the surface, the motion stays: u' = -|u|^p with p < 1 comes to rest in
+/// finite time.
 #[test]
 fn motion_comes_to_rest_on_the_surface() {
     for (speed, power) in

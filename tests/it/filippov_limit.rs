@@ -97,7 +97,7 @@ fn smoothed_orbits_leave_inside_the_funnel() {
         // above and the end are certain.
         let distance = |i: usize| found.rows[i].distance;
         assert!((0..4).all(|i| distance(4) < distance(i)), "nearest at the smallest eps");
-        // Which member it follows depends on eps.
+        // The member that it follows depends on eps.
         let times: Vec<_> = found.rows.iter().map(|r| r.nearest.exit_time).collect();
         assert!(times.windows(2).all(|t| (t[0] / t[1] - 1.0).abs() > 0.1), "{times:?}");
     }

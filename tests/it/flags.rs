@@ -9,7 +9,7 @@ use std::path::Path;
 
 use assert_cmd::Command;
 
-/// What a call leaves behind.
+/// Result of a call.
 #[derive(Debug, PartialEq, Eq)]
 struct Outcome {
     code: Option<i32>,
@@ -57,7 +57,7 @@ fn words(text: &str) -> Vec<String> {
     text.split_whitespace().map(|w| w.replace("REPOSITORY", repository)).collect()
 }
 
-/// What to do before, the call, and flags to be added to it one at a time ("--flag value").
+/// Commands to run before, the call, and flags to be added to it one at a time ("--flag value").
 const TABLE: &[(&str, &str, &[&str])] = &[
     (
         "",
@@ -382,7 +382,7 @@ fn the_table_knows_every_command_and_flag() {
         .filter(|c| c != "help")
         .collect();
     assert!(commands.len() >= 15, "{commands:?}");
-    // What `lyapunov` and `orbit` both have beside their own, `run` has too: the flags of runs.
+    // The flags that `lyapunov` and `scan` share are those of runs: `run` has them too.
     let of = |command: &str| flags(&help(&[command]));
     let shared: BTreeSet<String> = of("lyapunov")
         .intersection(&of("scan"))

@@ -24,7 +24,7 @@ const MOST_MEMORY: u64 = 3_000_000;
 /// Inputs that are changed further.
 const POOL: usize = 1500;
 
-/// What makes readers stumble: numbers at the edges, brackets, names of other things.
+/// Words that provoke errors in readers: numbers at the edges, brackets, names of other things.
 const WORDS: [&[u8]; 44] = [
     b"0",
     b"-0",
@@ -137,7 +137,7 @@ impl Maker {
     }
 }
 
-/// What is said, without the numbers and names in it.
+/// A message without the numbers and names in it.
 fn kind(said: &str) -> String {
     let mut quoted = false;
     let plain = said.chars().filter(|c| {
@@ -211,7 +211,7 @@ fn search(
             if count < committed { pool[count as usize].clone() } else { maker.make(&pool) };
         count += 1;
         if seconds.is_some() {
-            // What ends the process at once is found here afterwards.
+            // An input that ends the process at once is found here afterwards.
             fs::write(folder.join(format!("{name}-now")), &bytes).unwrap();
         }
         let one = Instant::now();

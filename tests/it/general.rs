@@ -543,7 +543,7 @@ fn a_sweep_has_a_row_a_run() {
     assert_eq!(code, 0, "{err}");
 }
 
-/// What is looked at by --section and --period: events are no multiples of the period.
+/// Outcomes with --section and with --period: events are no multiples of the period.
 #[test]
 fn a_sweep_says_what_runs_settle_on() {
     let folder = tempfile::tempdir().unwrap();
@@ -589,7 +589,7 @@ fn a_sweep_says_what_runs_settle_on() {
     assert!(table.numbers("x").iter().all(|x| (x - 0.3).abs() < 1e-9 || (x - 0.8).abs() < 1e-9));
 }
 
-/// What is not decided, and the end of a domain: exit code 3, and the rows so far.
+/// Motion that is not decided, and the end of a domain: exit code 3, and the rows so far.
 #[test]
 fn runs_that_fail_keep_their_rows() {
     let folder = tempfile::tempdir().unwrap();
@@ -642,7 +642,7 @@ fn runs_that_fail_keep_their_rows() {
     near(table.numbers("x")[3], 2.0, 1e-9);
 }
 
-/// Who reads no more wants no error.
+/// A closed pipe is no error.
 #[test]
 fn a_reader_may_go_away() {
     for system in ["bouncing-ball", "stick-slip"] {
@@ -793,7 +793,7 @@ fn scans_follow_attractors_up_and_down() {
     assert_eq!(names(&up), ["params.belt", "follow", "t", "x", "v"]);
     let sliding = scanned(at, &[&slip[..], &["--follow", "down", "--switch", "filippov"]].concat());
     assert_eq!(sliding.numbers("params.belt").first(), Some(&0.4));
-    // What has a memory beside its coordinates is not handed on.
+    // The state of a switch with a memory beside the coordinates is not handed on.
     let memory =
         [&["scan", "--quiet", "--follow", "up", "--switch", "hysteretic"][..], &slip].concat();
     refused(at, &memory, 2, &["of a switch with a memory"]);

@@ -9,7 +9,7 @@ use std::fs;
 use assert_cmd::Command;
 use regex::Regex;
 
-/// What `twofold` prints of a system with these equations on both sides of h = 0.
+/// Output of `twofold` for a system with these equations on both sides of h = 0.
 fn printed(states: &str, h: &str, fields: [&str; 2], parameters: &str, command: &str) -> String {
     let folder = tempfile::tempdir().unwrap();
     let list = |text: &str| {

@@ -20,7 +20,7 @@ use twofold::integrate::{
     DriveOptions, Ignore, Radau5, Statistics, StepCap, Stepper, Tolerance, drive,
 };
 
-/// What our LSODA did.
+/// Error and work of our LSODA.
 struct Ours {
     error: f64,
     statistics: Statistics,

@@ -47,7 +47,7 @@ fn checks() -> Vec<(String, Vec<String>)> {
         .collect()
 }
 
-/// What a check is, from the documentation of its variant.
+/// Description of a check, from the documentation of its variant.
 fn about_check(kind: &str) -> String {
     let text = source("src/folder/check.rs");
     let (_, body) = text.split_once("enum Check {").unwrap();
@@ -268,8 +268,8 @@ fn papers_follow_the_schemas() {
     }
 }
 
-/// What a schema refuses, the reader refuses, and the other way round: unknown keys, keys that are
-/// missing, values of another type.
+/// A schema and its reader refuse the same: unknown keys, keys that are missing, values of another
+/// type.
 #[test]
 fn a_schema_and_its_reader_refuse_the_same() {
     let changes: [(&str, &str, &str, &str); 8] = [

@@ -66,7 +66,7 @@ fn a_new_paper_is_made_blessed_checked_and_reported() {
     );
 }
 
-/// Where a paper lies, how many threads make it, and whether a store helps, changes no byte.
+/// A paper's bytes depend neither on its place nor on the number of threads or a store.
 #[test]
 fn a_paper_is_the_same_bytes_wherever_it_lies() {
     let (here, there) = (small(), small());

@@ -9,7 +9,7 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// Where Rust is.
+/// Folders with Rust sources.
 const RUST: [&str; 10] = [
     "crates", "src", "figures", "tests", "proofs", "examples", "benches", "fuzz", "python", "tools",
 ];
@@ -272,8 +272,8 @@ fn running_text(text: &str) -> String {
     joined.split('`').step_by(2).collect()
 }
 
-/// Where `term`, or its plural, first stands in `text` outside the texts of links, unless a link to
-/// the glossary comes before.
+/// Whether `term`, or its plural, stands in `text` outside the texts of links, before any link to
+/// the glossary.
 fn first_unlinked(text: &str, term: &str) -> bool {
     let (text, term) = (text.to_lowercase(), term.to_lowercase());
     let target = format!("](glossary.md#{})", term.replace(' ', "-"));

@@ -66,7 +66,7 @@ fn flag(arg: &Arg) -> String {
     }
 }
 
-/// What a flag's help says, its choices and its default.
+/// Help text of a flag, with its choices and its default.
 pub fn meaning(arg: &Arg) -> String {
     let help = arg.get_long_help().or(arg.get_help()).map(ToString::to_string).unwrap_or_default();
     let mut text = help.trim_end_matches('.').to_owned();
@@ -342,7 +342,7 @@ fn twofold(folder: &Path, arguments: &[&str]) -> std::process::Output {
         .unwrap()
 }
 
-/// What each column holds. A column without a line here fails the test.
+/// Content of each column. A column without a line here fails the test.
 const COLUMNS: [(&str, &str); 46] = [
     ("t", "time"),
     ("x", "the first state; likewise each other state under its name"),

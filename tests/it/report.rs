@@ -333,8 +333,8 @@ fn a_mismatch_shows_ours_difference_and_theirs() {
     }
 }
 
-/// What a referee looks for: findings in sentences, rules with every threshold, how it was made,
-/// how to cite; and a page that is light.
+/// Parts that a referee looks for: findings in sentences, rules with every threshold, how it was
+/// made, how to cite; and a page that is light.
 #[test]
 fn a_referee_finds_findings_rules_making_and_citation() {
     let bench = Bench::new();

@@ -68,8 +68,8 @@ fn committed_rows_come_out_the_same() {
     ]);
 }
 
-/// What the page says of whose the outcomes are, and that the two resolving methods do not agree in
-/// the printed reading, follows from the runs.
+/// The page's statements about whose the outcomes are, and that the two resolving methods do not
+/// agree in the printed reading, follow from the runs.
 #[test]
 fn outcomes_belong_to_whom_the_page_says() {
     use Belongs::{Neither, OtherOdds, System};

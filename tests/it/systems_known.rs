@@ -239,7 +239,7 @@ fn friction_pair_loses_amplitude_linearly_and_sticks() {
     );
 }
 
-/// Where three lags are as the relay turns to -1 in a symmetric cycle of half period h, from the
+/// State of three lags as the relay turns to -1 in a symmetric cycle of half period h, from the
 /// output: x(h) = E x + (1 - E)(-1, -1, -1) with E = e^(A h), and x(h) = -x.
 fn lags_start(h: f64) -> [f64; 3] {
     let e = (-h).exp();

@@ -24,7 +24,7 @@ const NAMES: [&str; 8] = [
     "crossings",
     "horseshoe",
 ];
-/// What the debug profile verifies in seconds: the orbits are short.
+/// Certificates that the debug profile verifies in seconds: the orbits are short.
 const QUICK: [&str; 1] = ["sensitivity"];
 
 fn text(name: &str) -> String {
@@ -295,7 +295,7 @@ fn no_certificate_is_forged() {
     println!("\n{HEAD}\n{}", rows.join("\n"));
 }
 
-/// What was accepted when a certificate's numbers were only compared with each other.
+/// Forgeries that were accepted when a certificate's numbers were only compared with each other.
 mod coordinated {
     use super::*;
 

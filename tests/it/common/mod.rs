@@ -1,4 +1,4 @@
-//! What several tests share: a small figure, made once, and references for it.
+//! Fixtures that several tests share: a small figure, made once, and references for it.
 #![allow(dead_code)] // each test uses its part
 
 pub mod schema;

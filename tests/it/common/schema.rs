@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-/// What is wrong with `value`, a line each.
+/// Violations of the schema by `value`, a line each.
 pub fn violations(schema: &Value, value: &Value) -> Vec<String> {
     let validator = jsonschema::draft202012::new(schema).expect("the schema is a schema");
     validator.iter_errors(value).map(|e| format!("{}: {e}", e.instance_path())).collect()
