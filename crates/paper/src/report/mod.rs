@@ -39,8 +39,8 @@ pub mod names {
     pub const REPORT: &str = "report.json";
     /// All verdicts with their evidence.
     pub const VERDICTS: &str = "verdicts.json";
-    /// File that records how the figures were made: program, machine, times. Written by `twofold
-    /// figure`.
+    /// File that records how the figures were made: program, machine, times. Written by
+    /// `twofold figure`.
     pub const MAKING: &str = "making.json";
     /// RO-Crate metadata.
     pub const ARCHIVE: &str = "ro-crate-metadata.json";
