@@ -9,10 +9,15 @@ import subprocess
 
 HERE = pathlib.Path(__file__).parent
 rows = list(csv.DictReader(open(HERE / "cost.csv")))
-model = next((line.split(":")[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")), "?")
+model = next(
+    (line.split(":")[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")),
+    "?",
+)
 rust = subprocess.run(["rustc", "--version"], capture_output=True, text=True).stdout.strip()
 text = [
-    f"`make bench-cost`, {datetime.date.today()}, {model}, {os.cpu_count()} cores; {rust}. Set B of W1, every y = 0 crossing located; a run of less than a quarter of a second is repeated, and the mean told.",
+    f"`make bench-cost`, {datetime.date.today()}, {model}, {os.cpu_count()} cores; {rust}. Set B "
+    "of W1, every y = 0 crossing located; a run of less than a quarter of a second is repeated, "
+    "and the mean told.",
     "",
 ]
 text += ["| " + " | ".join(rows[0]) + " |", "|" + "---|" * len(rows[0])]
@@ -42,7 +47,9 @@ def mark(x, y, kind, colour):
         return f'<path d="M{x:.1f} {y - 5:.1f}l5 5-5 5-5-5z" fill="{colour}"/>'
     if kind == "triangle":
         return f'<path d="M{x:.1f} {y - 5:.1f}l5 8.5h-10z" fill="{colour}"/>'
-    fill, ring = (colour, "") if kind == "circle" else ("#ffffff", f' stroke="{colour}" stroke-width="1.6"')
+    fill, ring = (
+        (colour, "") if kind == "circle" else ("#ffffff", f' stroke="{colour}" stroke-width="1.6"')
+    )
     return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="{fill}"{ring}/>'
 
 
@@ -52,7 +59,8 @@ def power(k):
 
 
 def numbers(row):
-    """Of a run that came to its end: what was varied, and the seconds. None of one that was given up: that stands in the table."""
+    """Of a run that came to its end: what was varied, and the seconds. None of one that was given
+    up: that stands in the table."""
     try:
         return float(row["value"]), float(row["seconds"])
     except ValueError:
@@ -64,7 +72,9 @@ seconds = [math.log10(numbers(row)[1]) for row in shown]
 y0, y1 = math.floor(min(seconds)), math.ceil(max(seconds))
 parts = []
 for panel, (varied, title) in enumerate(PANELS):
-    points = [(*map(math.log10, numbers(row)), row["method"]) for row in shown if row["varied"] == varied]
+    points = [
+        (*map(math.log10, numbers(row)), row["method"]) for row in shown if row["varied"] == varied
+    ]
     left = LEFT + panel * (SIZE + GAP)
     xs = sorted({x for x, _, _ in points})
     x0, x1 = xs[0] - 0.3, xs[-1] + 0.3
@@ -80,20 +90,35 @@ for panel, (varied, title) in enumerate(PANELS):
     for x in range(math.ceil(x0), math.floor(x1) + 1, 2 if x1 - x0 > 6 else 1):
         at = place(x, y0)[0]
         parts.append(f'<path d="M{at:.1f} {TOP}v{SIZE}" stroke="#eeeeee"/>')
-        parts.append(f'<text x="{at:.1f}" y="{TOP + SIZE + 18}" text-anchor="middle">{power(x)}</text>')
-    parts.append(f'<rect x="{left}" y="{TOP}" width="{SIZE}" height="{SIZE}" fill="none" stroke="#404040"/>')
-    parts.append(f'<text x="{left + SIZE / 2}" y="{TOP + SIZE + 42}" text-anchor="middle">{title}</text>')
+        parts.append(
+            f'<text x="{at:.1f}" y="{TOP + SIZE + 18}" text-anchor="middle">{power(x)}</text>'
+        )
+    parts.append(
+        f'<rect x="{left}" y="{TOP}" width="{SIZE}" height="{SIZE}" fill="none" stroke="#404040"/>'
+    )
+    parts.append(
+        f'<text x="{left + SIZE / 2}" y="{TOP + SIZE + 42}" text-anchor="middle">{title}</text>'
+    )
     for method, (colour, kind) in STYLES.items():
         line = [place(x, y) for x, y, m in sorted(points) if m == method]
         path = " ".join(f"{x:.1f},{y:.1f}" for x, y in line)
-        parts.append(f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="1.5"/>')
+        parts.append(
+            f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="1.5"/>'
+        )
         parts += [mark(x, y, kind, colour) for x, y in line]
 middle = TOP + SIZE / 2
-parts.append(f'<text transform="rotate(-90 18 {middle})" x="18" y="{middle}" text-anchor="middle">processor seconds of one run</text>')
+parts.append(
+    f'<text transform="rotate(-90 18 {middle})" x="18" y="{middle}" text-anchor="middle">processor '
+    'seconds of one run</text>'
+)
 for i, (method, (colour, kind)) in enumerate(STYLES.items()):
-    parts.append(mark(LEFT + 100 * i + 6, 28, kind, colour) + f'<text x="{LEFT + 100 * i + 18}" y="32">{method}</text>')
+    parts.append(
+        mark(LEFT + 100 * i + 6, 28, kind, colour)
+        + f'<text x="{LEFT + 100 * i + 18}" y="32">{method}</text>'
+    )
 width, height = LEFT + 3 * (SIZE + GAP) - GAP + 20, TOP + SIZE + 60
-head = f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" font-family="sans-serif" font-size="12">'
+head = (f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" '
+        'font-family="sans-serif" font-size="12">')
 # A page may be dark, and the words are black.
 white = '<rect width="100%" height="100%" fill="#ffffff"/>'
 (HERE / "cost.svg").write_text(head + white + "\n".join(parts) + "</svg>\n")

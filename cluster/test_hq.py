@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Kill a sweep on HyperQueue: tasks at random, then the whole cluster, then go on; the merged file must be the single process's, byte for byte.
+"""Kill a sweep on HyperQueue: tasks at random, then the whole cluster, then go on; the merged file
+must be the single process's, byte for byte.
 
     test_hq.py TWOFOLD FOLDER
 """
@@ -44,7 +45,9 @@ def tasks_of(parent: int) -> list[int]:
             continue
         try:
             # The name in parentheses may hold blanks.
-            parents[int(entry.name)] = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
+            parents[int(entry.name)] = int(
+                (entry / "stat").read_text().rpartition(")")[2].split()[1]
+            )
             if b"\0sweep\0" in (entry / "cmdline").read_bytes():
                 programs.add(int(entry.name))
         except (FileNotFoundError, ProcessLookupError):
@@ -75,7 +78,9 @@ class Cluster:
     def __init__(self, folder: Path):
         folder.mkdir()
         self.folder = folder
-        self.process = subprocess.Popen([sys.executable, "-c", CLUSTER, str(folder)], stdout=subprocess.PIPE, text=True)
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", CLUSTER, str(folder)], stdout=subprocess.PIPE, text=True
+        )
         # The server says first where it is.
         assert any(line == "ready\n" for line in self.process.stdout), "the cluster did not start"
 
@@ -99,12 +104,23 @@ def main() -> int:
     print(f"single process: {time.time() - started:.0f} s, sha256 {digest(single)}", flush=True)
 
     driver = Path(__file__).with_name("hq_sweep.py")
-    command = [sys.executable, str(driver), "--parts", str(PARTS), "--out", str(merged), "--twofold", twofold]
+    command = [
+        sys.executable,
+        str(driver),
+        "--parts",
+        str(PARTS),
+        "--out",
+        str(merged),
+        "--twofold",
+        twofold,
+    ]
     deadline = time.time() + 1200
 
     def begin(cluster: Cluster) -> subprocess.Popen:
         log = open(folder / f"driver-{cluster.folder.name}.log", "w")
-        return subprocess.Popen([*command, "--server-dir", str(cluster.folder), "--", *SWEEP], stderr=log, stdout=log)
+        return subprocess.Popen(
+            [*command, "--server-dir", str(cluster.folder), "--", *SWEEP], stderr=log, stdout=log
+        )
 
     def torment(cluster: Cluster, run: subprocess.Popen, wanted: int) -> int:
         killed = 0
@@ -116,7 +132,9 @@ def main() -> int:
         return killed
 
     def finished() -> int:
-        return sum(1 for k in range(1, PARTS + 1) if (folder / f"merged.csv.parts/{k}.csv").exists())
+        return sum(
+            1 for k in range(1, PARTS + 1) if (folder / f"merged.csv.parts/{k}.csv").exists()
+        )
 
     first = Cluster(folder / "first")
     run = begin(first)
@@ -130,8 +148,14 @@ def main() -> int:
     except subprocess.TimeoutExpired:
         run.kill()
         code = run.wait()
-    print(f"{killed} tasks killed, then the whole cluster with {lost} tasks at work and {done} of {PARTS} parts finished; driver ended with {code}", flush=True)
-    assert killed == KILLS and 0 < done < PARTS and not merged.exists(), "the cluster was to be killed in the middle"
+    print(
+        f"{killed} tasks killed, then the whole cluster with {lost} tasks at work and {done} of "
+        f"{PARTS} parts finished; driver ended with {code}",
+        flush=True,
+    )
+    assert killed == KILLS and 0 < done < PARTS and not merged.exists(), (
+        "the cluster was to be killed in the middle"
+    )
 
     second = Cluster(folder / "second")
     run = begin(second)
@@ -139,7 +163,11 @@ def main() -> int:
     code = run.wait(timeout=max(1.0, deadline - time.time()))
     second.kill()
     rounds = (folder / "driver-second.log").read_text().count("round ")
-    print(f"resumed on a new cluster: {killed} more tasks killed, {rounds} rounds, driver ended with {code}", flush=True)
+    print(
+        f"resumed on a new cluster: {killed} more tasks killed, {rounds} rounds, driver ended with "
+        f"{code}",
+        flush=True,
+    )
     print(f"merged: sha256 {digest(merged)}", flush=True)
     same = merged.read_bytes() == single.read_bytes()
     print("the same bytes" if same else "OTHER BYTES", flush=True)

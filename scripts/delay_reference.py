@@ -1,13 +1,15 @@
 #!/usr/bin/env python3
-"""Makes tests/data/delay-smooth.csv: the caricature with a smooth delayed switch, by a method of steps of SciPy's.
+"""Makes tests/data/delay-smooth.csv: the caricature with a smooth delayed switch, by a method of
+steps of SciPy's.
 
 Frozen: run by hand, committed with the version used, never run by the tests.
 
     pip install scipy==1.17.1 && python3 scripts/delay_reference.py
 
-Each interval between two multiples of the delay is an ordinary differential equation, whose right-hand side asks for the
-orbit one delay earlier: the dense output (order 7) of DOP853 on the interval before. Nothing is shared with this project
-but the equation. Tolerances are 1e-13; a run with intervals of half the length shows how far the numbers are good.
+Each interval between two multiples of the delay is an ordinary differential equation, whose
+right-hand side asks for the orbit one delay earlier: the dense output (order 7) of DOP853 on the
+interval before. Nothing is shared with this project but the equation. Tolerances are 1e-13; a run
+with intervals of half the length shows how far the numbers are good.
 """
 
 import pathlib
@@ -58,7 +60,11 @@ for delay, eps in CASES:
     for t, (a, b) in enumerate(zip(one, two), 1):
         rows.append([delay, eps, t, *map(float, a), float(f"{np.abs(a - b).max():.1e}")])
 with OUT.open("w") as out:
-    print(f"# scripts/delay_reference.py with SciPy {scipy.__version__}: caricature, alpha 0.1, beta 1e-5, tanh, from (0.2, 0, -1)", file=out)
+    print(
+        f"# scripts/delay_reference.py with SciPy {scipy.__version__}: caricature, alpha 0.1, beta "
+        "1e-5, tanh, from (0.2, 0, -1)",
+        file=out,
+    )
     print("delay,eps,t,x,y,z,uncertainty", file=out)
     for row in rows:
         print(",".join(map(repr, row)), file=out)

@@ -1,10 +1,27 @@
 #!/usr/bin/env python3
 """The polynomials of crates/num/src/elementary/kernels.rs, computed with 300 bits (needs mpmath).
 
-Each interpolates its function at Chebyshev nodes; printed with the largest error of the rounded coefficients, relative to
-what the kernel adds it to, as a power of two.
+Each interpolates its function at Chebyshev nodes; printed with the largest error of the rounded
+coefficients, relative to what the kernel adds it to, as a power of two.
 """
-from mpmath import atanh, cos, exp, floor, frexp, ldexp, log, lu_solve, matrix, mp, mpf, nstr, pi, polyval, sqrt, tanh
+from mpmath import (
+    atanh,
+    cos,
+    exp,
+    floor,
+    frexp,
+    ldexp,
+    log,
+    lu_solve,
+    matrix,
+    mp,
+    mpf,
+    nstr,
+    pi,
+    polyval,
+    sqrt,
+    tanh,
+)
 
 mp.prec = 300
 
@@ -43,12 +60,28 @@ def near_zero(value, function):
 ln2 = log(2)
 wider = mpf(1.0001)
 s = ln2 / 4 * wider
-report("P (tanh)", near_zero(mpf(-1) / 3, lambda u: (tanh(sqrt(u)) - sqrt(u)) / sqrt(u) ** 3), mpf(0), s**2, 6, lambda u: u)
+report(
+    "P (tanh)",
+    near_zero(mpf(-1) / 3, lambda u: (tanh(sqrt(u)) - sqrt(u)) / sqrt(u) ** 3),
+    mpf(0),
+    s**2,
+    6,
+    lambda u: u,
+)
 r = ln2 / 2 * wider
-report("Q (exp)", near_zero(mpf(1) / 2, lambda x: (exp(x) - 1 - x) / x**2), -r, r, 10, lambda x: x * x)
+report(
+    "Q (exp)", near_zero(mpf(1) / 2, lambda x: (exp(x) - 1 - x) / x**2), -r, r, 10, lambda x: x * x
+)
 h = wider / 2
 report("G (2^x)", near_zero(ln2, lambda x: (mpf(2) ** x - 1) / x), -h, h, 9, abs)
 m = (sqrt(2) - 1) / (sqrt(2) + 1) * wider
-report("L (log2)", near_zero(2 / ln2, lambda u: 2 * atanh(sqrt(u)) / ln2 / sqrt(u)), mpf(0), m**2, 6, sqrt)
+report(
+    "L (log2)",
+    near_zero(2 / ln2, lambda u: 2 * atanh(sqrt(u)) / ln2 / sqrt(u)),
+    mpf(0),
+    m**2,
+    6,
+    sqrt,
+)
 split("ln(2)/2", ln2 / 2, 44)
 split("ln 2", ln2, 41)

@@ -1,21 +1,24 @@
 #!/usr/bin/env python3
-"""Makes figures/workprecision/odepack/: what ODEPACK's LSODA, as SciPy carries it, does on the test problems.
+"""Makes figures/workprecision/odepack/: what ODEPACK's LSODA, as SciPy carries it, does on the test
+problems.
 
 Frozen: run by hand, committed with the versions used, never run by the tests.
 
     pip install scipy==1.14.1 && python3 scripts/odepack_reference.py
 
-SciPy 1.14 is among the last that compile ODEPACK's own Fortran (SciPy 1.17's translation to C gives the same counts
-in 60 of the 62 runs, and in all those that rounding does not decide). Every run is made with analytic Jacobians and one
-step at a time (solve_ivp's LSODA class: ITASK = 5, the end of the run is a wall), so that steps, evaluations,
-orders and switches are ODEPACK's own counters (IWORK, RWORK), not a wrapper's.
+SciPy 1.14 is among the last that compile ODEPACK's own Fortran (SciPy 1.17's translation to C gives
+the same counts in 60 of the 62 runs, and in all those that rounding does not decide). Every run is
+made with analytic Jacobians and one step at a time (solve_ivp's LSODA class: ITASK = 5, the end of
+the run is a wall), so that steps, evaluations, orders and switches are ODEPACK's own counters
+(IWORK, RWORK), not a wrapper's.
 
-The reference solutions are Radau's at its tightest; the distance from LSODA's at its tightest is recorded as the
-uncertainty.
+The reference solutions are Radau's at its tightest; the distance from LSODA's at its tightest is
+recorded as the uncertainty.
 
-Step control magnifies rounding: the same code started 1e-12 away makes other decisions sooner or later. So each run is
-also made from four starts with the first component shifted by that much ("shifted"). Where these agree with each other on every count, a
-faithful implementation must agree too; elsewhere their spread is the yardstick.
+Step control magnifies rounding: the same code started 1e-12 away makes other decisions sooner or
+later. So each run is also made from four starts with the first component shifted by that much
+("shifted"). Where these agree with each other on every count, a faithful implementation must agree
+too; elsewhere their spread is the yardstick.
 """
 
 import csv
@@ -137,7 +140,9 @@ def hysteretic(alpha):
         return (x[0] + (2 * x[3] - 1) * EPS) / width
 
     def f(x):
-        return np.append(caricature(x, x[3], alpha)[0], ((1 + np.tanh(argument(x))) / 2 - x[3]) / prime)
+        return np.append(
+            caricature(x, x[3], alpha)[0], ((1 + np.tanh(argument(x))) / 2 - x[3]) / prime
+        )
 
     def jac(x):
         t = np.tanh(argument(x))
@@ -156,16 +161,96 @@ def hysteretic(alpha):
 HIRES_0 = [1, 0, 0, 0, 0, 0, 0, 0.0057]
 # name, (f, jacobian), start, end, step cap, tolerances, atol over rtol
 PROBLEMS = [
-    ("robertson", (robertson, robertson_jac), [1, 0, 0], 4e5, np.inf, [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10], 1e-4),
-    ("van-der-pol-1", van_der_pol(1), [2, 0], 20, np.inf, [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10], 1),
-    ("van-der-pol-1000", van_der_pol(1000), [2, 0], 2000, np.inf, [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10], 1),
-    ("oregonator", (oregonator, oregonator_jac), [1, 2, 3], 360, np.inf, [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10], 1),
-    ("hires", (hires, hires_jac), HIRES_0, 321.8122, np.inf, [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10], 1e-2),
-    ("lorenz", (lorenz, lorenz_jac), [1, 1, 1], 10, np.inf, [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10], 1),
-    ("smoothed-printed", smoothed(1e-3), [0.2, 0, -1], 10, 0.25, [1e-6, 1e-7, 10**-7.97727, 1e-9, 1e-10], 1),
-    ("smoothed-reconstructed", smoothed(1e-1), [0.2, 0, -1], 10, 0.25, [1e-6, 1e-7, 10**-7.97727, 1e-9, 1e-10], 1),
-    ("hysteretic-printed", hysteretic(1e-3), [0.2, 0, -1, 1], 10, 0.25, [1e-6, 1e-7, 10**-7.97727, 1e-9, 1e-10], 1),
-    ("hysteretic-reconstructed", hysteretic(1e-1), [0.2, 0, -1, 1], 10, 0.25, [1e-6, 1e-7, 10**-7.97727, 1e-9, 1e-10], 1),
+    (
+        "robertson",
+        (robertson, robertson_jac),
+        [1, 0, 0],
+        4e5,
+        np.inf,
+        [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10],
+        1e-4,
+    ),
+    (
+        "van-der-pol-1",
+        van_der_pol(1),
+        [2, 0],
+        20,
+        np.inf,
+        [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10],
+        1,
+    ),
+    (
+        "van-der-pol-1000",
+        van_der_pol(1000),
+        [2, 0],
+        2000,
+        np.inf,
+        [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10],
+        1,
+    ),
+    (
+        "oregonator",
+        (oregonator, oregonator_jac),
+        [1, 2, 3],
+        360,
+        np.inf,
+        [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10],
+        1,
+    ),
+    (
+        "hires",
+        (hires, hires_jac),
+        HIRES_0,
+        321.8122,
+        np.inf,
+        [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10],
+        1e-2,
+    ),
+    (
+        "lorenz",
+        (lorenz, lorenz_jac),
+        [1, 1, 1],
+        10,
+        np.inf,
+        [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10],
+        1,
+    ),
+    (
+        "smoothed-printed",
+        smoothed(1e-3),
+        [0.2, 0, -1],
+        10,
+        0.25,
+        [1e-6, 1e-7, 10**-7.97727, 1e-9, 1e-10],
+        1,
+    ),
+    (
+        "smoothed-reconstructed",
+        smoothed(1e-1),
+        [0.2, 0, -1],
+        10,
+        0.25,
+        [1e-6, 1e-7, 10**-7.97727, 1e-9, 1e-10],
+        1,
+    ),
+    (
+        "hysteretic-printed",
+        hysteretic(1e-3),
+        [0.2, 0, -1, 1],
+        10,
+        0.25,
+        [1e-6, 1e-7, 10**-7.97727, 1e-9, 1e-10],
+        1,
+    ),
+    (
+        "hysteretic-reconstructed",
+        hysteretic(1e-1),
+        [0.2, 0, -1, 1],
+        10,
+        0.25,
+        [1e-6, 1e-7, 10**-7.97727, 1e-9, 1e-10],
+        1,
+    ),
 ]
 
 
@@ -179,8 +264,16 @@ def lsoda(f, jac, x0, t_end, cap, rtol, atol):
         evaluations[0] += 1
         return np.asarray(f(x), dtype=float)
 
-    solver = LSODA(counted, 0.0, np.array(x0, dtype=float), t_end, max_step=cap, rtol=rtol, atol=atol,
-                   jac=lambda t, x: np.asarray(jac(x), dtype=float))
+    solver = LSODA(
+        counted,
+        0.0,
+        np.array(x0, dtype=float),
+        t_end,
+        max_step=cap,
+        rtol=rtol,
+        atol=atol,
+        jac=lambda t, x: np.asarray(jac(x), dtype=float),
+    )
     work = solver._lsoda_solver._integrator
     method, switches, orders, stiff = 1, [], {1: [0] * 13, 2: [0] * 6}, 0
     before = 0.0
@@ -211,11 +304,21 @@ def lsoda(f, jac, x0, t_end, cap, rtol, atol):
 
 
 def reference(f, jac, x0, t_end, factor, cap):
-    """Two independent methods at their tightest; the first is the reference, their distance its uncertainty."""
+    """Two independent methods at their tightest; the first is the reference, their distance its
+    uncertainty."""
     fun = lambda t, x: np.asarray(f(x), dtype=float)
     jacobian = lambda t, x: np.asarray(jac(x), dtype=float)
     cap = min(cap, 0.02) if np.isfinite(cap) else cap
-    radau = solve_ivp(fun, (0, t_end), x0, method="Radau", jac=jacobian, rtol=3e-14, atol=3e-14 * factor, max_step=cap)
+    radau = solve_ivp(
+        fun,
+        (0, t_end),
+        x0,
+        method="Radau",
+        jac=jacobian,
+        rtol=3e-14,
+        atol=3e-14 * factor,
+        max_step=cap,
+    )
     other = lsoda(f, jac, x0, t_end, cap, 2e-13, 2e-13 * factor)
     assert radau.success
     a, b = radau.y[:, -1], np.array(other["x"])
@@ -246,14 +349,43 @@ def main():
             error = distance(run["x"])
             run["shifted"] = []
             for shift in SHIFTS:
-                moved = lsoda(f, jac, np.array([x0[0] * (1 + shift), *x0[1:]], dtype=float), t_end, cap, rtol, rtol * factor)
+                moved = lsoda(
+                    f,
+                    jac,
+                    np.array([x0[0] * (1 + shift), *x0[1:]], dtype=float),
+                    t_end,
+                    cap,
+                    rtol,
+                    rtol * factor,
+                )
                 run["shifted"].append(
-                    {key: moved[key] for key in ("steps", "evaluations", "jacobians", "stiff_steps", "switches")}
+                    {
+                        key: moved[key]
+                        for key in ("steps", "evaluations", "jacobians", "stiff_steps", "switches")
+                    }
                     | {"error": distance(moved["x"])}
                 )
             runs.append(run)
-            rows.append([name, "odepack-lsoda", rtol, error, run["evaluations"], run["jacobians"], run["steps"]])
-            print(name, rtol, f"{error:.2e}", run["steps"], run["evaluations"], run["jacobians"], len(run["switches"]))
+            rows.append(
+                [
+                    name,
+                    "odepack-lsoda",
+                    rtol,
+                    error,
+                    run["evaluations"],
+                    run["jacobians"],
+                    run["steps"],
+                ]
+            )
+            print(
+                name,
+                rtol,
+                f"{error:.2e}",
+                run["steps"],
+                run["evaluations"],
+                run["jacobians"],
+                len(run["switches"]),
+            )
         print("   uncertainty", uncertainty)
         document["problems"].append(
             {
@@ -270,7 +402,9 @@ def main():
     (OUT / "reference.json").write_text(json.dumps(document, indent=1) + "\n")
     with open(OUT / "work_precision.csv", "w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["problem", "method", "tolerance", "error", "evaluations", "jacobians", "steps"])
+        writer.writerow(
+            ["problem", "method", "tolerance", "error", "evaluations", "jacobians", "steps"]
+        )
         writer.writerows(rows)
 
 

@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
-"""Runs a job of a workflow on this machine: `make rehearse JOB=ci.yml/package`, or with a row of its matrix,
-`make rehearse JOB=release.yml/program MATRIX=target=x86_64-unknown-linux-gnu`.
+"""Runs a job of a workflow on this machine: `make rehearse JOB=ci.yml/package`, or with a row of
+its matrix, `make rehearse JOB=release.yml/program MATRIX=target=x86_64-unknown-linux-gnu`.
 
-What GitHub's runners do with a job's own lines is done here, in a fresh clone: each `run` in a shell of its own with the variables, expressions of the matrix and
-conditions that stand there. Other people's actions (`uses`) are named and passed over; checkout is the clone, and setup-python a virtual environment. It stops
-where a step fails, as the job would. Steps that a failed one would set off (`if: failure()`), and those that need a tag, are passed over.
+What GitHub's runners do with a job's own lines is done here, in a fresh clone: each `run` in a
+shell of its own with the variables, expressions of the matrix and conditions that stand there.
+Other people's actions (`uses`) are named and passed over; checkout is the clone, and setup-python a
+virtual environment. It stops where a step fails, as the job would. Steps that a failed one would
+set off (`if: failure()`), and those that need a tag, are passed over.
 """
 
 import os
@@ -19,7 +21,8 @@ SHELL = ["bash", "--noprofile", "--norc", "-e", "-o", "pipefail", "-c"]
 
 
 def expanded(text, matrix):
-    """The text with the expressions that a rehearsal knows: values of the matrix, and a default beside one."""
+    """The text with the expressions that a rehearsal knows: values of the matrix, and a default
+    beside one."""
 
     def value(found):
         expression = found.group(1).strip()
@@ -28,7 +31,9 @@ def expanded(text, matrix):
             name, default = with_default.groups()
             return str(matrix.get(name, default or ""))
         # On a push, the figures that take seconds.
-        on_push = re.fullmatch(r"\(github\.event_name == .*\) && '[^']*' \|\| '([^']*)'", expression)
+        on_push = re.fullmatch(
+            r"\(github\.event_name == .*\) && '[^']*' \|\| '([^']*)'", expression
+        )
         if on_push:
             return on_push.group(1)
         raise SystemExit(f"rehearse: no value is known for {expression!r}")
@@ -77,7 +82,9 @@ def main():
         os.mkdir(temporary)
         subprocess.run(["git", "clone", "--quiet", ".", tree], check=True)
         # Where the tree is, and nothing of what was built before, except for crates.
-        environment = {k: v for k, v in os.environ.items() if not k.startswith(("CARGO_TARGET", "MAKE"))}
+        environment = {
+            k: v for k, v in os.environ.items() if not k.startswith(("CARGO_TARGET", "MAKE"))
+        }
         environment |= {
             "CI": "true",
             "RUNNER_OS": "Linux",
@@ -93,14 +100,22 @@ def main():
             elif "uses" in step and step["uses"].startswith("actions/setup-python@"):
                 print(f"-- {title}", flush=True)
                 subprocess.run(["python3", "-m", "venv", os.path.join(place, "python")], check=True)
-                environment["PATH"] = os.path.join(place, "python", "bin") + os.pathsep + environment["PATH"]
+                environment["PATH"] = (
+                    os.path.join(place, "python", "bin") + os.pathsep + environment["PATH"]
+                )
             elif "uses" in step:
-                done = "the clone" if step["uses"].startswith("actions/checkout@") else "passed over, another's action"
+                done = (
+                    "the clone"
+                    if step["uses"].startswith("actions/checkout@")
+                    else "passed over, another's action"
+                )
                 print(f"-- {done}: {step['uses']}", flush=True)
             else:
                 print(f"-- {title}", flush=True)
                 own = environment | {k: expanded(v, matrix) for k, v in step.get("env", {}).items()}
-                status = subprocess.run([*SHELL, expanded(step["run"], matrix)], cwd=tree, env=own).returncode
+                status = subprocess.run(
+                    [*SHELL, expanded(step["run"], matrix)], cwd=tree, env=own
+                ).returncode
                 if status:
                     raise SystemExit(f"rehearse: {source}: step {title!r} ended with {status}")
         if os.path.exists(environment["GITHUB_STEP_SUMMARY"]):

@@ -1,4 +1,5 @@
-"""Runs a WASI program under wasmtime (pip install wasmtime) with its arguments, and exits as it does."""
+"""Runs a WASI program under wasmtime (pip install wasmtime) with its arguments, and exits as it
+does."""
 
 import os
 import sys

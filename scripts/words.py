@@ -25,8 +25,9 @@ def pages():
 
 
 def public_items():
-    """Counts of public items of the library: all, documented, with an example of their own; of these
-    the types, traits and free functions: all, with an example of their own, or of their module's too."""
+    """Counts of public items of the library: all, documented, with an example of their own; of
+    these the types, traits and free functions: all, with an example of their own, or of their
+    module's too."""
     items = documented = shown = main = main_shown = main_near = 0
     for file in [*ROOT.glob("crates/**/*.rs"), *ROOT.glob("src/**/*.rs")]:
         text = file.read_text().split("#[cfg(test)]")[0]
@@ -37,7 +38,9 @@ def public_items():
             if bare.startswith("///"):
                 doc, example = True, example or "```" in bare
             elif not bare.startswith(("#[", ")]")):
-                if match := re.match(r"pub (?:const |unsafe )*(fn|struct|enum|trait|type|const|static)\b", bare):
+                if match := re.match(
+                    r"pub (?:const |unsafe )*(fn|struct|enum|trait|type|const|static)\b", bare
+                ):
                     items, documented, shown = items + 1, documented + doc, shown + example
                     if not line[0].isspace() and match[1] not in ("const", "static"):
                         main, main_shown = main + 1, main_shown + example
@@ -48,7 +51,12 @@ def public_items():
 
 def subjects():
     """Share of the last 100 commits with a subject of at most 72 characters."""
-    log = subprocess.run(["git", "log", "-100", "--no-merges", "--format=%s"], cwd=ROOT, capture_output=True, text=True)
+    log = subprocess.run(
+        ["git", "log", "-100", "--no-merges", "--format=%s"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+    )
     lines = log.stdout.splitlines()
     return f"{sum(len(line) <= 72 for line in lines)} of {len(lines)}"
 
@@ -59,12 +67,27 @@ def main():
     for kind in KINDS:
         texts = [text for k, text in pages() if k == kind]
         counts = [words(text) for text in texts]
-        rows.append((f"docs, {kind}: pages, words, longest page", f"{len(texts)}, {sum(counts)}, {max(counts)}"))
+        rows.append(
+            (
+                f"docs, {kind}: pages, words, longest page",
+                f"{len(texts)}, {sum(counts)}, {max(counts)}",
+            )
+        )
     notes = [path.read_text() for path in (ROOT / "notes").glob("*.md")]
     rows.append(("notes: pages, words", f"{len(notes)}, {sum(map(words, notes))}"))
     items, documented, shown, main, main_shown, main_near = public_items()
-    rows.append(("public items: all, documented, with an example of their own", f"{items}, {documented}, {shown}"))
-    rows.append(("types, traits, free functions: all, with an example, or in a module with one", f"{main}, {main_shown}, {main_near}"))
+    rows.append(
+        (
+            "public items: all, documented, with an example of their own",
+            f"{items}, {documented}, {shown}",
+        )
+    )
+    rows.append(
+        (
+            "types, traits, free functions: all, with an example, or in a module with one",
+            f"{main}, {main_shown}, {main_near}",
+        )
+    )
     rows.append(("last 100 commits with a subject of at most 72 characters", subjects()))
     print("| measure | value |\n|---|---|")
     for row in rows:

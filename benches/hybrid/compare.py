@@ -1,4 +1,5 @@
-"""Hybrid systems by `twofold run`, SciPy, CVODE and nosnoc beside each other (make bench-hybrid): results.json, and the tables in README.md.
+"""Hybrid systems by `twofold run`, SciPy, CVODE and nosnoc beside each other (make bench-hybrid):
+results.json, and the tables in README.md.
 
     python compare.py               TWOFOLD names the program [target/release/twofold]
     python compare.py --no-times    values and lines only; seconds are marked as not measured
@@ -162,7 +163,9 @@ def peer(name, method):
     if written(name, method) is None:
         return {"none": getattr(systems.SYSTEMS[name], "why", "no resets, no modes")}
     try:
-        done = subprocess.run([sys.executable, __file__, name, method], capture_output=True, text=True, timeout=LIMIT)
+        done = subprocess.run(
+            [sys.executable, __file__, name, method], capture_output=True, text=True, timeout=LIMIT
+        )
     except subprocess.TimeoutExpired:
         return {"failed": f"not done in {LIMIT} s"}
     if done.returncode != 0:
@@ -175,7 +178,17 @@ def ours(name):
     system = systems.SYSTEMS[name]
     with tempfile.TemporaryDirectory() as folder:
         out = pathlib.Path(folder) / "run.csv"
-        command = [TWOFOLD, "run", "--system", HERE / f"{name}.toml", "--t-end", str(system.t_end), "--out", out, "--quiet"]
+        command = [
+            TWOFOLD,
+            "run",
+            "--system",
+            HERE / f"{name}.toml",
+            "--t-end",
+            str(system.t_end),
+            "--out",
+            out,
+            "--quiet",
+        ]
         last = []
 
         def run():
@@ -205,7 +218,9 @@ def lines(name, method):
             return None
         # The line `def plain(solve)` belongs to the comparison.
         text, skipped = inspect.getsource(function).split("\n", 1)[1], "#"
-    return sum(1 for line in text.splitlines() if line.strip() and not re.match(skipped, line.strip()))
+    return sum(
+        1 for line in text.splitlines() if line.strip() and not re.match(skipped, line.strip())
+    )
 
 
 def wrapper(function):
@@ -224,7 +239,10 @@ def judge(name, cell):
     if reference is None:
         return cell | {"verdict": "wrong"}
     error = abs(cell["value"] - reference)
-    return cell | {"error": error, "verdict": "right" if error <= RIGHT * max(1, abs(reference)) else "wrong"}
+    return cell | {
+        "error": error,
+        "verdict": "right" if error <= RIGHT * max(1, abs(reference)) else "wrong",
+    }
 
 
 def answer_of(cell):
@@ -234,10 +252,16 @@ def answer_of(cell):
     if "failed" in cell:
         return f"**{cell['failed'].splitlines()[0][:60]}**"
     if "refused" in cell:
-        return "refused, with the reason" if cell["verdict"] == "right" else "**stops, with the reason**"
+        return (
+            "refused, with the reason"
+            if cell["verdict"] == "right"
+            else "**stops, with the reason**"
+        )
     if "error" not in cell:
         return f"**does not say: {cell['value']:.2g}**"
-    said = f"{cell['error']:.1e}" + (f" ({cell['unsolved']} steps not solved)" if "unsolved" in cell else "")
+    said = f"{cell['error']:.1e}" + (
+        f" ({cell['unsolved']} steps not solved)" if "unsolved" in cell else ""
+    )
     return said if cell["verdict"] == "right" else f"**wrong: {said}**"
 
 
@@ -279,7 +303,10 @@ def sundials():
 
 def table(results, columns, cell_of, first=lambda name: f"`{name}`"):
     head = "| system | " + " | ".join(columns.values()) + " |"
-    body = [f"| {first(name)} | " + " | ".join(cell_of(cells, m) for m in columns) + " |" for name, cells in results.items()]
+    body = [
+        f"| {first(name)} | " + " | ".join(cell_of(cells, m) for m in columns) + " |"
+        for name, cells in results.items()
+    ]
     return [head, "|---" * (len(columns) + 1) + "|", *body]
 
 
@@ -292,41 +319,68 @@ def page(record):
     counts = ["| right | " + " | ".join(
         f"{sum(r[m]['verdict'] == 'right' for r in results.values())} of {len(results)}"
         + (f" ({stated[m]} stated)" if stated[m] < len(results) else "") for m in METHODS) + " |"]
-    total = ["| lines in all | " + " | ".join(str(sum(r[m]["lines"] or 0 for r in results.values())) for m in METHODS) + " |"]
-    both = [n for n, r in results.items() if all(r[m].get("seconds") and r[m]["verdict"] == "right" for m in ("twofold", "scipy"))]
+    total = [
+        "| lines in all | "
+        + " | ".join(str(sum(r[m]["lines"] or 0 for r in results.values())) for m in METHODS)
+        + " |"
+    ]
+    both = [
+        n
+        for n, r in results.items()
+        if all(r[m].get("seconds") and r[m]["verdict"] == "right" for m in ("twofold", "scipy"))
+    ]
     slower = [n for n in both if results[n]["twofold"]["seconds"] > results[n]["scipy"]["seconds"]]
-    equal = [n for n, r in results.items() if r["scipy"]["verdict"] == r["twofold"]["verdict"] == "right"]
-    closer = [n for n in equal if results[n]["scipy"].get("error", 0) < results[n]["twofold"].get("error", 0)]
+    equal = [
+        n for n, r in results.items() if r["scipy"]["verdict"] == r["twofold"]["verdict"] == "right"
+    ]
+    closer = [
+        n
+        for n in equal
+        if results[n]["scipy"].get("error", 0) < results[n]["twofold"].get("error", 0)
+    ]
     names = lambda some: ", ".join(f"`{n}`" for n in some) or "none"
     if record["times"]:
-        speed = f"Of the {len(both)} that both do, `twofold` is slower than SciPy by hand in {len(slower)}: {names(slower)}."
+        speed = (f"Of the {len(both)} that both do, `twofold` is slower than SciPy by hand in "
+                 f"{len(slower)}: {names(slower)}.")
     else:
         speed = "Seconds are not measured in this run: `make bench-hybrid` fills them in."
-    return "\n".join([
-        f"{made['date']}, {made['machine']}; {made['twofold']}, SciPy {made['scipy']}, SUNDIALS {made['sundials']} (scikit-sundae",
-        f"{made['scikit-sundae']}), nosnoc {made['nosnoc']} (CasADi {made['casadi']}), NumPy {made['numpy']}, Python {made['python']};",
-        f"`{made['command']}`.",
-        "",
-        "Error of each program; what is not right is bold.",
-        "",
-        *table(results, METHODS, lambda cells, m: answer_of(cells[m]), lambda n: f"`{n}`: {asked[n]}".replace("|", "\\|")),
-        *counts,
-        "",
-        f"`twofold run` is not right in {len(results) - sum(r['twofold']['verdict'] == 'right' for r in results.values())}:",
-        f"{names([n for n, r in results.items() if r['twofold']['verdict'] != 'right'])}.",
-        f"SciPy by hand is as right as `twofold` in {len(equal)} systems:",
-        f"{names(equal)}.",
-        f"Of these it has the smaller error in {len(closer)}: {names(closer)}.",
-        "",
-        "Milliseconds / lines that the user writes; of SciPy and CVODE by hand without the wrapper of one integration,",
-        f"`by_scipy` ({wrapper(by_scipy)} lines) or `by_cvode` ({wrapper(by_cvode)}), and of nosnoc without its options and loop,",
-        f"`by_nosnoc` ({wrapper(by_nosnoc)}).",
-        "",
-        *table(results, METHODS, lambda cells, m: cost_of(cells[m])),
-        *total,
-        "",
-        speed,
-    ])
+    return "\n".join(
+        [
+            f"{made['date']}, {made['machine']}; {made['twofold']}, SciPy {made['scipy']}, "
+            f"SUNDIALS {made['sundials']} (scikit-sundae",
+            f"{made['scikit-sundae']}), nosnoc {made['nosnoc']} (CasADi {made['casadi']}), NumPy "
+            f"{made['numpy']}, Python {made['python']};",
+            f"`{made['command']}`.",
+            "",
+            "Error of each program; what is not right is bold.",
+            "",
+            *table(
+                results,
+                METHODS,
+                lambda cells, m: answer_of(cells[m]),
+                lambda n: f"`{n}`: {asked[n]}".replace("|", "\\|"),
+            ),
+            *counts,
+            "",
+            "`twofold run` is not right in "
+            f"{len(results) - sum(r['twofold']['verdict'] == 'right' for r in results.values())}:",
+            f"{names([n for n, r in results.items() if r['twofold']['verdict'] != 'right'])}.",
+            f"SciPy by hand is as right as `twofold` in {len(equal)} systems:",
+            f"{names(equal)}.",
+            f"Of these it has the smaller error in {len(closer)}: {names(closer)}.",
+            "",
+            "Milliseconds / lines that the user writes; of SciPy and CVODE by hand without the "
+            "wrapper of one integration,",
+            f"`by_scipy` ({wrapper(by_scipy)} lines) or `by_cvode` ({wrapper(by_cvode)}), and of "
+            "nosnoc without its options and loop,",
+            f"`by_nosnoc` ({wrapper(by_nosnoc)}).",
+            "",
+            *table(results, METHODS, lambda cells, m: cost_of(cells[m])),
+            *total,
+            "",
+            speed,
+        ]
+    )
 
 
 def main(times):
@@ -337,9 +391,23 @@ def main(times):
             cell["lines"] = lines(name, m)
             if not times:
                 cell["seconds"] = None
-        results[name] = {"asked": system.asked, "reference": system.reference(), "t_end": system.t_end} | cells
-        print(name, *(answer_of(c) + (f" [{1e3 * c['seconds']:.3g} ms]" if c.get("seconds") else "") for c in cells.values()), sep=" | ", flush=True)
-    said = subprocess.run([TWOFOLD, "--version"], capture_output=True, text=True, check=True).stdout.split("\n")[0]
+        results[name] = {
+            "asked": system.asked,
+            "reference": system.reference(),
+            "t_end": system.t_end,
+        } | cells
+        print(
+            name,
+            *(
+                answer_of(c) + (f" [{1e3 * c['seconds']:.3g} ms]" if c.get("seconds") else "")
+                for c in cells.values()
+            ),
+            sep=" | ",
+            flush=True,
+        )
+    said = subprocess.run(
+        [TWOFOLD, "--version"], capture_output=True, text=True, check=True
+    ).stdout.split("\n")[0]
     made = {
         "date": datetime.date.today().isoformat(),
         "machine": f"{cpu()}, {os.cpu_count()} processors, {platform.system()}",
@@ -353,7 +421,14 @@ def main(times):
         "numpy": version("numpy"),
         "python": platform.python_version(),
     }
-    record = {"made": made, "times": times, "rtol": RTOL, "atol": ATOL, "right": RIGHT, "systems": results}
+    record = {
+        "made": made,
+        "times": times,
+        "rtol": RTOL,
+        "atol": ATOL,
+        "right": RIGHT,
+        "systems": results,
+    }
     (HERE / "results.json").write_text(json.dumps(record, indent=1, ensure_ascii=False) + "\n")
     write(record)
 

@@ -1,10 +1,14 @@
-"""The systems of the comparison: what is asked, its reference, and how a user of each program gets it.
+"""The systems of the comparison: what is asked, its reference, and how a user of each program gets
+it.
 
-Every system has a file NAME.toml for `twofold run`. `ours` takes the number from the rows that it writes. `plain` hands the discontinuous right-hand
-side to a solver. `by_hand` is a program with events and modes of the user's own; `until` is one integration that ends at its first event, by SciPy or
-by CVODE (compare.py): until(f, t, y, end, (g, direction), ...) gives the time, the state, and the number of the event or None. `nosnoc` hands a
-Filippov system to FESD: run(x, x0, c, F, end, steps) gives the states at the ends of the finite elements and their times. Column 1 of F[i] is added
-where c[i] > 0, column 2 where c[i] < 0; `signs` of run names the sides if c[i] is a vector. `why` says why nosnoc cannot state a system.
+Every system has a file NAME.toml for `twofold run`. `ours` takes the number from the rows that it
+writes. `plain` hands the discontinuous right-hand side to a solver. `by_hand` is a program with
+events and modes of the user's own; `until` is one integration that ends at its first event, by
+SciPy or by CVODE (compare.py): until(f, t, y, end, (g, direction), ...) gives the time, the state,
+and the number of the event or None. `nosnoc` hands a Filippov system to FESD: run(x, x0, c, F, end,
+steps) gives the states at the ends of the finite elements and their times. Column 1 of F[i] is
+added where c[i] > 0, column 2 where c[i] < 0; `signs` of run names the sides if c[i] is a vector.
+`why` says why nosnoc cannot state a system.
 """
 
 import contextlib
@@ -270,7 +274,8 @@ class ThreeRelays:
         signs = [1, 1, 1]
         zero = [(lambda t, s, i=i: s[i], -1) for i in range(3)]
         t, s, hit = until(f, 0, [0.7, 0.7, 0.7, 0], 3, *zero)
-        signs = [0 if abs(x) < 1e-8 else 1 for x in s[:3]]  # that all three may slide is decided by hand
+        # That all three may slide is decided by hand.
+        signs = [0 if abs(x) < 1e-8 else 1 for x in s[:3]]
         return until(f, t, s, 3)[1][3]
 
     def nosnoc(run):
@@ -632,7 +637,8 @@ class TwoGene:
         to = lambda t, x, rest, rate: rest + (x - rest) * math.exp(-rate * t)
         when = lambda x, end, rest, rate: math.log((x - rest) / (end - rest)) / rate
         area = lambda t, x, rest, rate: rest * t + (x - rest) * (1 - math.exp(-rate * t)) / rate
-        # y grows to 8, where it slides; x falls until y = 4, grows from then on to 8, where it slides.
+        # y grows to 8, where it slides; x falls until y = 4, grows from then on to 8, where it
+        # slides.
         grown, four = when(3, 8, 80 / 3, 1.5), when(3, 4, 80 / 3, 1.5)
         low = to(four, 9, 0, 4.5)
         back = when(low, 8, 80 / 9, 4.5)

@@ -2,10 +2,12 @@
 
     python heyoka_taylor.py [resolved] W1 A 5
 
-Terminal events at the layer's edge, x = +-20 eps, and at x = 0 end the steps there; every y = 0 crossing is an event. That is not enough for the
-layer to be seen: far from its middle tanh's series has no terms large enough for the step control to notice, and a step goes from the edge to the middle as if
-tanh were constant. With `resolved`, events in between make the error what was asked for; W0 says how large it is either way.
-Prints: peer, unit, set, the least seconds of processor time of the given number of runs, steps, crossings, final state of the last run.
+Terminal events at the layer's edge, x = +-20 eps, and at x = 0 end the steps there; every y = 0
+crossing is an event. That is not enough for the layer to be seen: far from its middle tanh's series
+has no terms large enough for the step control to notice, and a step goes from the edge to the
+middle as if tanh were constant. With `resolved`, events in between make the error what was asked
+for; W0 says how large it is either way. Prints: peer, unit, set, the least seconds of processor
+time of the given number of runs, steps, crossings, final state of the last run.
 """
 
 import math
@@ -68,7 +70,10 @@ def main():
             steps += outcome[3]
         best = min(best, time.process_time() - start)
     s = ta.state
-    print(f"heyoka-taylor {unit} {which} {best:.6f} {steps} {crossings} {s[0]:.17g} {s[1]:.17g} {s[2]:.17g}")
+    print(
+        f"heyoka-taylor {unit} {which} {best:.6f} {steps} {crossings} {s[0]:.17g} {s[1]:.17g} "
+        f"{s[2]:.17g}"
+    )
 
 
 main()

@@ -1,11 +1,13 @@
-"""Runs the peers and our methods beside each other (make bench-peers): one table with ratios, and its picture.
+"""Runs the peers and our methods beside each other (make bench-peers): one table with ratios, and
+its picture.
 
     python run.py BUILD [ROUNDS]
     python run.py draw
 
-BUILD holds the programs (run.sh makes them). Every program is run in each round, one after the other, and of each the least processor time is
-taken: other work on the machine then costs little. A program that is not there is said to be not run. Writes results.csv, results.md, results.svg
-beside this file. `draw` makes the picture anew of the table.
+BUILD holds the programs (run.sh makes them). Every program is run in each round, one after the
+other, and of each the least processor time is taken: other work on the machine then costs little. A
+program that is not there is said to be not run. Writes results.csv, results.md, results.svg beside
+this file. `draw` makes the picture anew of the table.
 """
 
 import csv
@@ -23,7 +25,8 @@ ROUNDS = int(sys.argv[2]) if len(sys.argv) > 2 else 3
 PYTHON = BUILD / "python/bin/python"
 OURS = BUILD / "units"
 
-# The commands that are timed: name, command, units of work, the row that it is compared with, and the limit of the ratio.
+# The commands that are timed: name, command, units of work, the row that it is compared with, and
+# the limit of the ratio.
 W1 = ["W1 A", "W1 B"]
 W3 = ["W3 A", "W3 B"]
 CRATES = BUILD / "crates-units"
@@ -34,9 +37,14 @@ PEERS = [
     # Its Radau IIA replaces the tolerance by 0.1 tol^(2/3); so does our row "radau5-replaced".
     ("differential-equations Radau5", [CRATES, "radau5"], W1),
     ("differential-equations dopri5", [CRATES, "dopri5"], W1),
-    # Its steps do not see the layer (heyoka_taylor.py): the second row has as many events as make its error what was asked for.
+    # Its steps do not see the layer (heyoka_taylor.py): the second row has as many events as make
+    # its error what was asked for.
     ("heyoka Taylor, layer's edge as event", [PYTHON, HERE / "heyoka_taylor.py"], W1),
-    ("heyoka Taylor, layer resolved by events", [PYTHON, HERE / "heyoka_taylor.py", "resolved"], W1),
+    (
+        "heyoka Taylor, layer resolved by events",
+        [PYTHON, HERE / "heyoka_taylor.py", "resolved"],
+        W1,
+    ),
     ("__float128 Taylor", [BUILD / "quad_taylor"], W3),
 ]
 METHODS = {
@@ -96,15 +104,30 @@ def error(command):
 
 
 def main():
-    jobs = [(name, arguments(command, unit), unit, False) for name, command, units in PEERS for unit in units]
+    jobs = [
+        (name, arguments(command, unit), unit, False)
+        for name, command, units in PEERS
+        for unit in units
+    ]
     errors = {}
     for name, command, units in PEERS:
-        errors |= {(name, unit): error(arguments(command, unit.replace("W1", "W0"))) for unit in units if unit in W1}
+        errors |= {
+            (name, unit): error(arguments(command, unit.replace("W1", "W0")))
+            for unit in units
+            if unit in W1
+        }
     for method, (units, _, _) in METHODS.items():
         if not method.endswith("-file"):
-            errors |= {(f"ours, {method}", unit): error([OURS, *unit.replace("W1", "W0").split(), method, "1"])
-                       for unit in units if unit in W1}
-        jobs += [(f"ours, {method}", [OURS, *unit.split(), method, "1"], unit, True) for unit in units]
+            errors |= {
+                (f"ours, {method}", unit): error(
+                    [OURS, *unit.replace("W1", "W0").split(), method, "1"]
+                )
+                for unit in units
+                if unit in W1
+            }
+        jobs += [
+            (f"ours, {method}", [OURS, *unit.split(), method, "1"], unit, True) for unit in units
+        ]
     best, missing = {}, {}
     for _ in range(ROUNDS):
         for name, command, unit, ours in jobs:
@@ -112,34 +135,85 @@ def main():
             if words is None:
                 missing[name, unit] = seconds
                 continue
-            # Ours whole, from start to exit, and the crates' program, whose own clock counts hundredths; the others by their own
-            # clock, without compilation at run time.
+            # Ours whole, from start to exit, and the crates' program, whose own clock counts
+            # hundredths; the others by their own clock, without compilation at run time.
             seconds = seconds if ours or command[0] == CRATES else float(words[3])
             if (name, unit) not in best or seconds < best[name, unit][0]:
                 best[name, unit] = (seconds, int(words[4]), int(words[5]))
     rows = []
     for name, _, unit, ours in jobs:
         if (name, unit) not in best:
-            rows.append([unit, name, "", "", "", "", "", "", "not run: " + missing.get((name, unit), ""), ""])
+            rows.append(
+                [
+                    unit,
+                    name,
+                    "",
+                    "",
+                    "",
+                    "",
+                    "",
+                    "",
+                    "not run: " + missing.get((name, unit), ""),
+                    "",
+                ]
+            )
             continue
         seconds, steps, crossings = best[name, unit]
         boost = best.get(("Boost.odeint dopri5", unit))
         against, target = METHODS[name.removeprefix("ours, ")][1:] if ours else (None, None)
         other = best.get((against, unit))
         ratio = seconds / other[0] if other else None
-        verdict = "" if ratio is None or target is None else ("met" if ratio <= target else "missed")
+        verdict = (
+            "" if ratio is None or target is None else ("met" if ratio <= target else "missed")
+        )
         to_boost = f"{seconds / boost[0]:.2f}" if boost else ""
-        rows.append([unit, name, f"{seconds:.3f}", to_boost, against or "", f"{ratio:.3f}" if ratio else "",
-                     f"{target:.3f}" if target else "", verdict, f"{steps} steps, {crossings} crossings", errors.get((name, unit), "")])
+        rows.append(
+            [
+                unit,
+                name,
+                f"{seconds:.3f}",
+                to_boost,
+                against or "",
+                f"{ratio:.3f}" if ratio else "",
+                f"{target:.3f}" if target else "",
+                verdict,
+                f"{steps} steps, {crossings} crossings",
+                errors.get((name, unit), ""),
+            ]
+        )
     rows.sort(key=lambda row: ["W1 A", "W1 B", "W2 B", *W3].index(row[0]))
-    head = ["unit", "program", "seconds", "to Boost", "against", "ratio", "target", "verdict", "work", "error at t = 10 (W0)"]
+    head = [
+        "unit",
+        "program",
+        "seconds",
+        "to Boost",
+        "against",
+        "ratio",
+        "target",
+        "verdict",
+        "work",
+        "error at t = 10 (W0)",
+    ]
     with open(HERE / "results.csv", "w", newline="") as file:
         csv.writer(file, lineterminator="\n").writerows([head, *rows])
-    model = next((line.split(":")[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")), "?")
-    compiler = subprocess.run(["g++", "--version"], capture_output=True, text=True).stdout.splitlines()[0]
+    model = next(
+        (
+            line.split(":")[1].strip()
+            for line in open("/proc/cpuinfo")
+            if line.startswith("model name")
+        ),
+        "?",
+    )
+    compiler = subprocess.run(
+        ["g++", "--version"], capture_output=True, text=True
+    ).stdout.splitlines()[0]
     rust = subprocess.run(["rustc", "--version"], capture_output=True, text=True).stdout.strip()
-    text = [f"{datetime.date.today()}, {model}, {os.cpu_count()} cores, {platform.system()} {platform.machine()}; {compiler}; {rust}. "
-            f"Least processor seconds of {ROUNDS} rounds, every program in each.", ""]
+    text = [
+        f"{datetime.date.today()}, {model}, {os.cpu_count()} cores, {platform.system()} "
+        f"{platform.machine()}; {compiler}; {rust}. "
+        f"Least processor seconds of {ROUNDS} rounds, every program in each.",
+        "",
+    ]
     text += ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     text += ["| " + " | ".join(row) + " |" for row in rows]
     (HERE / "results.md").write_text("\n".join(text) + "\n")
@@ -169,7 +243,10 @@ def draw(rows):
         x = at(float(row[2]))
         colour = "#b03060" if row[1].startswith("ours") else "#607080"
         parts.append(f'<text x="{left - 10}" y="{y}" text-anchor="end">{row[1]}</text>')
-        parts.append(f'<line x1="{left}" y1="{y - 4}" x2="{x:.1f}" y2="{y - 4}" stroke="{colour}" stroke-opacity="0.35"/>')
+        parts.append(
+            f'<line x1="{left}" y1="{y - 4}" x2="{x:.1f}" y2="{y - 4}" stroke="{colour}" '
+            'stroke-opacity="0.35"/>'
+        )
         parts.append(f'<circle cx="{x:.1f}" cy="{y - 4}" r="4.5" fill="{colour}"/>')
         # To the left of its dot where the right is too narrow.
         side = (x - 9, "end") if x > width - 90 else (x + 9, "start")
@@ -177,11 +254,23 @@ def draw(rows):
     decades = []
     for k in range(low, high + 1):
         x = at(10.0 ** k)
-        decades.append(f'<line x1="{x:.1f}" y1="{top - 8}" x2="{x:.1f}" y2="{y + 6}" stroke="#d8d8d8"/>')
-        decades.append(f'<text x="{x:.1f}" y="{top - 12}" text-anchor="middle" fill="#606060">{10.0 ** k:g} s</text>')
-    decades.append(f'<text x="8" y="{top - 12}" fill="#606060">processor seconds; ours in red</text>')
+        decades.append(
+            f'<line x1="{x:.1f}" y1="{top - 8}" x2="{x:.1f}" y2="{y + 6}" stroke="#d8d8d8"/>'
+        )
+        decades.append(
+            f'<text x="{x:.1f}" y="{top - 12}" text-anchor="middle" fill="#606060">{10.0**k:g} '
+            's</text>'
+        )
+    decades.append(
+        f'<text x="8" y="{top - 12}" fill="#606060">processor seconds; ours in red</text>'
+    )
     style = 'font-family="sans-serif" font-size="12"'
-    svg = f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{y + 20}" {style}>' + WHITE + "\n".join(decades + parts) + "</svg>\n"
+    svg = (
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{y + 20}" {style}>'
+        + WHITE
+        + "\n".join(decades + parts)
+        + "</svg>\n"
+    )
     (HERE / "results.svg").write_text(svg)
 
 

@@ -1,9 +1,11 @@
-"""Units of work W0 and W1 (benches/README.md) with SciPy's LSODA (ODEPACK) and a right-hand side compiled by Numba.
+"""Units of work W0 and W1 (benches/README.md) with SciPy's LSODA (ODEPACK) and a right-hand side
+compiled by Numba.
 
     python scipy_lsoda.py W1 A 5
 
-Crossings are not located: odeint cannot, and SciPy's interface that can takes a Python step at a time. So this does less than the others.
-Prints: peer, unit, set, the least seconds of processor time of the given number of runs, steps, crossings, final state of the last run.
+Crossings are not located: odeint cannot, and SciPy's interface that can takes a Python step at a
+time. So this does less than the others. Prints: peer, unit, set, the least seconds of processor
+time of the given number of runs, steps, crossings, final state of the last run.
 """
 
 import math
@@ -38,8 +40,20 @@ for _ in range(repeats):
     start = time.process_time()
     state, steps = np.array([0.2, 0.0, -1.0]), 0
     for _ in range(segments):
-        states, info = odeint(field, state, [0.0, length], parameters, rtol=tolerance, atol=tolerance, hmax=10.0,
-                              mxstep=10**8, full_output=True)
+        states, info = odeint(
+            field,
+            state,
+            [0.0, length],
+            parameters,
+            rtol=tolerance,
+            atol=tolerance,
+            hmax=10.0,
+            mxstep=10**8,
+            full_output=True,
+        )
         state, steps = states[-1], steps + info["nst"][-1]
     best = min(best, time.process_time() - start)
-print(f"scipy-lsoda {unit} {which} {best:.6f} {steps} 0 {state[0]:.17g} {state[1]:.17g} {state[2]:.17g}")
+print(
+    f"scipy-lsoda {unit} {which} {best:.6f} {steps} 0 {state[0]:.17g} {state[1]:.17g} "
+    f"{state[2]:.17g}"
+)

@@ -1,4 +1,5 @@
-"""What the tests share. They need the package installed: `make python-test` does that in an environment of its own."""
+"""What the tests share. They need the package installed: `make python-test` does that in an
+environment of its own."""
 
 import os
 import subprocess
@@ -13,7 +14,9 @@ def program():
     """The command line's program."""
     program = os.environ.get("TWOFOLD_PROGRAM")
     if not program:
-        pytest.skip("TWOFOLD_PROGRAM does not name the program `twofold`, with which answers are compared")
+        pytest.skip(
+            "TWOFOLD_PROGRAM does not name the program `twofold`, with which answers are compared"
+        )
     return program
 
 

@@ -1,4 +1,5 @@
-"""What else goes on while something is computed: other threads, Ctrl-C, progress; and the package's own promises."""
+"""What else goes on while something is computed: other threads, Ctrl-C, progress; and the package's
+own promises."""
 
 import doctest
 import importlib
@@ -53,7 +54,9 @@ def test_ctrl_c_stops_within_a_moment(call):
     # A shell starts background jobs with Ctrl-C ignored, and children inherit that.
     heard = "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
     program = f"{heard}import twofold\nLONG = {LONG!r}\nprint('begun', flush=True)\n{call}\n"
-    child = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    child = subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
     assert child.stdout.readline().strip() == b"begun"
     time.sleep(1.0)
     assert child.poll() is None, child.stderr.read().decode()
@@ -67,8 +70,16 @@ def test_ctrl_c_stops_within_a_moment(call):
 
 def test_a_callable_is_told_how_far_it_is(caricature):
     told = []
-    twofold.section(caricature, START, 1e5, plane="y=0", progress=lambda share, label: told.append((share, label)))
-    assert told and all(0 <= share <= 1 and label == "dopri5 to t = 100000" for share, label in told)
+    twofold.section(
+        caricature,
+        START,
+        1e5,
+        plane="y=0",
+        progress=lambda share, label: told.append((share, label)),
+    )
+    assert told and all(
+        0 <= share <= 1 and label == "dopri5 to t = 100000" for share, label in told
+    )
     assert [s for s, _ in told] == sorted(s for s, _ in told)
 
     def fails(share, label):
@@ -84,7 +95,11 @@ def test_the_progress_line():
     line(0.0, "dopri5 to t = 10")
     line(0.5, "dopri5 to t = 10")
     shown = stream.getvalue()
-    assert "\rdopri5 to t = 10:  50 % |############............|" in shown and "? left" in shown and "\x1b" not in shown
+    assert (
+        "\rdopri5 to t = 10:  50 % |############............|" in shown
+        and "? left" in shown
+        and "\x1b" not in shown
+    )
     line.close()
     assert stream.getvalue().endswith(" \r")
     quiet = io.StringIO()
@@ -108,22 +123,37 @@ def test_everything_public_is_documented():
         thing = getattr(twofold, name)
         if inspect.isclass(thing):
             for member, value in inspect.getmembers(thing):
-                if not member.startswith("_") and (inspect.isfunction(value) or isinstance(value, property)):
+                if not member.startswith("_") and (
+                    inspect.isfunction(value) or isinstance(value, property)
+                ):
                     assert inspect.getdoc(value), f"{name}.{member}"
         if inspect.isclass(thing) or inspect.isfunction(thing):
             assert inspect.getdoc(thing), name
-    for word in ("solve", "section", "funnel", "classify", "sweep", "spec", "run_spec", "panels", "verdicts"):
+    for word in (
+        "solve",
+        "section",
+        "funnel",
+        "classify",
+        "sweep",
+        "spec",
+        "run_spec",
+        "panels",
+        "verdicts",
+    ):
         assert f":func:`{word}`" in twofold.__doc__
 
 
-@pytest.mark.parametrize("module", ["twofold", "twofold._system", "twofold._runs", "twofold._paper"])
+@pytest.mark.parametrize(
+    "module", ["twofold", "twofold._system", "twofold._runs", "twofold._paper"]
+)
 def test_examples_in_docstrings(module):
     failed, tried = doctest.testmod(importlib.import_module(module))
     assert failed == 0
 
 
 def test_types_are_sound(tmp_path):
-    """The package under mypy, strictly, the stub of its native half against that, and a user's program."""
+    """The package under mypy, strictly, the stub of its native half against that, and a user's
+    program."""
     where = Path(twofold.__file__).parent
     assert (where / "py.typed").exists() and (where / "_native.pyi").exists()
     program = tmp_path / "program.py"
@@ -135,7 +165,8 @@ def test_types_are_sound(tmp_path):
             import twofold
 
             def norm(system: twofold.System) -> NDArray[np.float64]:
-                run: twofold.Solution = twofold.solve(system, [0.2, 0, -1], 10.0, eps=1e-2, progress=True)
+                start = [0.2, 0, -1]
+                run: twofold.Solution = twofold.solve(system, start, 10.0, eps=1e-2, progress=True)
                 passages = twofold.section(system, None, 5, plane=("y", 0.0))
                 return np.concatenate([run.y[0], passages.t])
 
@@ -145,8 +176,14 @@ def test_types_are_sound(tmp_path):
         encoding="utf-8",
     )
     settings = ["--strict", "--cache-dir", str(tmp_path / "cache")]
-    for arguments in [["mypy", *settings, "-p", "twofold"], ["mypy", *settings, str(program)], ["mypy.stubtest", "twofold._native"]]:
-        done = subprocess.run([sys.executable, "-m", *arguments], cwd=tmp_path, capture_output=True, text=True)
+    for arguments in [
+        ["mypy", *settings, "-p", "twofold"],
+        ["mypy", *settings, str(program)],
+        ["mypy.stubtest", "twofold._native"],
+    ]:
+        done = subprocess.run(
+            [sys.executable, "-m", *arguments], cwd=tmp_path, capture_output=True, text=True
+        )
         assert done.returncode == 0, done.stdout + done.stderr
 
 

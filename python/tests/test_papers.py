@@ -17,7 +17,11 @@ def folder(program, tmp_path):
 
 
 def test_claims_are_the_commands(program, folder):
-    said = subprocess.run([program, "paper", "make", str(folder), "--quiet", "--json"], check=True, capture_output=True)
+    said = subprocess.run(
+        [program, "paper", "make", str(folder), "--quiet", "--json"],
+        check=True,
+        capture_output=True,
+    )
     commands = {claim["claim"]: claim for claim in json.loads(said.stdout)["claims"]}
     paper = twofold.Paper(folder)
     claims = paper.claims()
@@ -25,7 +29,9 @@ def test_claims_are_the_commands(program, folder):
     for claim in claims:
         assert claim.agrees == (commands[claim.id]["outcome"] == "agrees")
         assert claim.found == commands[claim.id]["found"]
-    assert [claim.agrees for claim in twofold.Paper(folder, keep=False).claims(threads=2)] == [c.agrees for c in claims]
+    assert [claim.agrees for claim in twofold.Paper(folder, keep=False).claims(threads=2)] == [
+        c.agrees for c in claims
+    ]
 
 
 def test_answers_are_arrays(folder):

@@ -16,8 +16,16 @@ def test_a_path(caricature):
     assert run.t[0] == 0 and run.t[-1] == run.t_final == 20.0 and np.all(np.diff(run.t) > 0)
     np.testing.assert_array_equal(run.y[:, 0], START)
     np.testing.assert_array_equal(run.y[:, -1], run.y_final)
-    assert run.success and run.status == 0 and run.stop == "finished" and "reached its end" in run.message
-    assert run.nfev == run.statistics["evaluations"] > run.statistics["steps"] > 0 and run.njev == run.nlu == 0
+    assert (
+        run.success
+        and run.status == 0
+        and run.stop == "finished"
+        and "reached its end" in run.message
+    )
+    assert (
+        run.nfev == run.statistics["evaluations"] > run.statistics["steps"] > 0
+        and run.njev == run.nlu == 0
+    )
     assert run.mode is None and run.piece is None and run.events is None
     assert run.system is caricature and len(run.hash) == 64
     # The field at the start is what the first points say.
@@ -30,7 +38,9 @@ def test_a_path(caricature):
 def test_points_at_fixed_times(caricature):
     run = twofold.solve(caricature, START, 10.0, every=0.5)
     np.testing.assert_array_equal(run.t, np.arange(21) * 0.5)
-    sliding = twofold.solve(caricature, START, 10.0, every=0.5, switch="filippov", exit="at-once:plus")
+    sliding = twofold.solve(
+        caricature, START, 10.0, every=0.5, switch="filippov", exit="at-once:plus"
+    )
     assert set(np.arange(21) * 0.5) <= set(sliding.t) and len(sliding.mode) == len(sliding)
 
 
@@ -77,11 +87,15 @@ def test_filippov_motion(caricature):
 
 
 def test_a_funnel(caricature):
-    funnel = twofold.funnel(caricature, START, 100.0, times=3, shortest=0.1, longest=1.0, horizon=10.0)
+    funnel = twofold.funnel(
+        caricature, START, 100.0, times=3, shortest=0.1, longest=1.0, horizon=10.0
+    )
     assert funnel.stop == "set-valued" and not funnel.success and funnel.status == 1
     np.testing.assert_allclose(funnel.point, 0.0, atol=1e-6)
     assert len(funnel.futures) == 6
-    np.testing.assert_allclose(sorted({f.exit_time for f in funnel.futures}), [0.1, np.sqrt(0.1), 1.0])
+    np.testing.assert_allclose(
+        sorted({f.exit_time for f in funnel.futures}), [0.1, np.sqrt(0.1), 1.0]
+    )
     assert [f.side for f in funnel.futures] == ["plus", "minus"] * 3
     total = 0
     for future in funnel.futures:
@@ -131,7 +145,11 @@ def test_a_spec_asks_the_same(caricature):
     answer = twofold.section(caricature, START, 30.0, plane="y=0", eps=1e-2, restart=10.0)
     for form in [asked, json.dumps(asked), json.dumps(asked).encode()]:
         again = twofold.run_spec(form)
-        assert type(again) is twofold.Section and again.hash == answer.hash and again.question == answer.question
+        assert (
+            type(again) is twofold.Section
+            and again.hash == answer.hash
+            and again.question == answer.question
+        )
     assert answer.spec == asked
     assert type(twofold.run_spec(twofold.spec(caricature, START, 1.0))) is twofold.Solution
 
@@ -211,7 +229,13 @@ def test_wrong_planes_funnels_and_specs(caricature):
         assert caught.value.field == "plane"
     with pytest.raises(TypeError, match="chord"):
         twofold.funnel(caricature, START, 1.0, chord=1e-3)
-    for options in [dict(exit="at-once:plus"), dict(switch="filippov"), dict(eps=1.0), dict(times=0), dict(seed=1)]:
+    for options in [
+        dict(exit="at-once:plus"),
+        dict(switch="filippov"),
+        dict(eps=1.0),
+        dict(times=0),
+        dict(seed=1),
+    ]:
         with pytest.raises(twofold.SpecError):
             twofold.funnel(caricature, START, 1.0, **options)
     for spec in ["", "[]", "{}", '{"system": {}}', {"system": float("nan")}]:
@@ -259,10 +283,17 @@ def test_a_sweep_does_not_depend_on_threads(caricature):
 
 
 def test_a_sweep_over_a_grid_and_draws(caricature):
-    grid = twofold.sweep(caricature, START, 50.0, plane="y=0", over=["params.alpha=0.1,0.2", "method=dopri5,lsoda"])
+    grid = twofold.sweep(
+        caricature, START, 50.0, plane="y=0", over=["params.alpha=0.1,0.2", "method=dopri5,lsoda"]
+    )
     assert len(grid) == 4 and list(grid.table["method"]) == ["dopri5", "lsoda"] * 2
     np.testing.assert_array_equal(grid.table["params.alpha"], [0.1, 0.1, 0.2, 0.2])
-    drawn = [twofold.sweep(caricature, None, 20.0, plane="y=0", over="shift.x=-1e-9..1e-9", random=3, random_seed=s) for s in (1, 1, 2)]
+    drawn = [
+        twofold.sweep(
+            caricature, None, 20.0, plane="y=0", over="shift.x=-1e-9..1e-9", random=3, random_seed=s
+        )
+        for s in (1, 1, 2)
+    ]
     shifts = [d.table["shift.x"] for d in drawn]
     np.testing.assert_array_equal(shifts[0], shifts[1])
     assert len(set(shifts[0])) == 3 and not set(shifts[0]) & set(shifts[2])
@@ -286,7 +317,13 @@ def test_wrong_sweeps(caricature):
 
 def test_a_failed_run_discards_no_other():
     # From x > 0 the third state blows up; from x < 0 nothing does.
-    system = twofold.System(states=["x", "y", "z"], h="x", plus=["0", "1", "1 + z^2"], minus=["0", "z", "-y"])
+    system = twofold.System(
+        states=["x", "y", "z"], h="x", plus=["0", "1", "1 + z^2"], minus=["0", "z", "-y"]
+    )
     done = twofold.sweep(system, [[1, 0, 0], [-1, 1, 1]], 500.0, plane="y=0.5")
-    assert done.ends[0] == "failed" and "grows without bound near t = 1.57" in done.errors[0] and np.isnan(done.table["end"][0])
+    assert (
+        done.ends[0] == "failed"
+        and "grows without bound near t = 1.57" in done.errors[0]
+        and np.isnan(done.table["end"][0])
+    )
     assert done.ends[1] != "failed" and done.errors[1] is None

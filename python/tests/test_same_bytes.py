@@ -1,4 +1,5 @@
-"""The same question has the same answer here, in the command line and in the published references, bit for bit."""
+"""The same question has the same answer here, in the command line and in the published references,
+bit for bit."""
 
 import csv
 import io
@@ -12,10 +13,19 @@ from conftest import START
 
 RUNS = {
     "path": (["--t-end", "30", "--method", "dopri5"], {}),
-    "lsoda": (["--t-end", "30", "--method", "lsoda", "--rtol", "1e-10"], dict(method="lsoda", rtol=1e-10)),
-    "section": (["--t-end", "30", "--method", "dopri5", "--section", "y=0", "--eps", "0.01"], dict(plane="y=0", eps=0.01)),
+    "lsoda": (
+        ["--t-end", "30", "--method", "lsoda", "--rtol", "1e-10"],
+        dict(method="lsoda", rtol=1e-10),
+    ),
+    "section": (
+        ["--t-end", "30", "--method", "dopri5", "--section", "y=0", "--eps", "0.01"],
+        dict(plane="y=0", eps=0.01),
+    ),
     "kicks": (
-        ["--t-end", "30", "--method", "dopri5", "--kick-every", "0.3", "--seed", "7", "--section", "y=0"],
+        [
+            "--t-end", "30", "--method", "dopri5", "--kick-every", "0.3", "--seed", "7",
+            "--section", "y=0",
+        ],
         dict(plane="y=0", kick_every=0.3, seed=7),
     ),
     "restarts": (
@@ -23,15 +33,24 @@ RUNS = {
         dict(method="radau5", restart=7, max_step=0.5),
     ),
     "hysteretic": (
-        ["--t-end", "30", "--method", "dopri5", "--switch", "hysteretic", "--hysteresis", "single", "--eps", "0.01"],
+        [
+            "--t-end", "30", "--method", "dopri5", "--switch", "hysteretic", "--hysteresis",
+            "single", "--eps", "0.01",
+        ],
         dict(switch="hysteretic", hysteresis="single", eps=0.01),
     ),
     "delayed": (
-        ["--t-end", "30", "--switch", "delayed", "--delay", "0.01", "--history", "flow", "--section", "y=0"],
+        [
+            "--t-end", "30", "--switch", "delayed", "--delay", "0.01", "--history", "flow",
+            "--section", "y=0",
+        ],
         dict(switch="delayed", delay=0.01, history="flow", plane="y=0"),
     ),
     "delayed-smooth": (
-        ["--t-end", "10", "--switch", "delayed", "--delay", "0.02", "--eps", "0.01", "--transition", "erf", "--method", "radau5"],
+        [
+            "--t-end", "10", "--switch", "delayed", "--delay", "0.02", "--eps", "0.01",
+            "--transition", "erf", "--method", "radau5",
+        ],
         dict(switch="delayed", delay=0.02, eps=0.01, transition="erf", method="radau5"),
     ),
     "relay": (
@@ -43,7 +62,10 @@ RUNS = {
         dict(switch="relay", band=0.01, plane="y=0"),
     ),
     "perturbed": (["--t-end", "30", "--method", "dopri5", "--sigma", "0.1"], dict(sigma=0.1)),
-    "arctan": (["--t-end", "30", "--method", "dopri5", "--transition", "arctan"], dict(transition="arctan")),
+    "arctan": (
+        ["--t-end", "30", "--method", "dopri5", "--transition", "arctan"],
+        dict(transition="arctan"),
+    ),
     "times": (["--t-end", "30", "--method", "dopri5", "--every", "0.5"], dict(every=0.5)),
     "extended": (["--t-end", "1", "--method", "taylor-extended"], dict(method="taylor-extended")),
     "precise": (
@@ -51,10 +73,16 @@ RUNS = {
         dict(method="taylor-extended", precision=192, order=40),
     ),
     "filippov": (
-        ["--t-end", "30", "--switch", "filippov", "--exit", "random:exponential:0.5", "--plus-probability", "0.4"],
+        [
+            "--t-end", "30", "--switch", "filippov", "--exit", "random:exponential:0.5",
+            "--plus-probability", "0.4",
+        ],
         dict(switch="filippov", exit="random:exponential:0.5", plus_probability=0.4),
     ),
-    "arc": (["--t-end", "30", "--switch", "filippov", "--exit", "after-arc:0.2:minus"], dict(switch="filippov", exit="after-arc:0.2:minus")),
+    "arc": (
+        ["--t-end", "30", "--switch", "filippov", "--exit", "after-arc:0.2:minus"],
+        dict(switch="filippov", exit="after-arc:0.2:minus"),
+    ),
 }  # fmt: skip
 
 
@@ -71,7 +99,11 @@ def test_flags_and_arguments_ask_the_same_and_get_the_same_bytes(command, carica
     spec = twofold.spec(caricature, START, float(flags[flags.index("--t-end") + 1]), **arguments)
     assert spec == json.loads(command(*flags, "--print-spec"))
     written = command(*flags, "--quiet")
-    assert twofold.written(spec) == written == command("run", "--spec", "-", "--quiet", stdin=json.dumps(spec).encode())
+    assert (
+        twofold.written(spec)
+        == written
+        == command("run", "--spec", "-", "--quiet", stdin=json.dumps(spec).encode())
+    )
     assert twofold.written(spec, "json") == command(*flags, "--format", "json", "--quiet")
     # And the arrays hold what the file says, to the last bit.
     answer = twofold.run_spec(spec)
@@ -85,24 +117,58 @@ def test_flags_and_arguments_ask_the_same_and_get_the_same_bytes(command, carica
 
 
 def test_a_funnel_has_the_same_bytes(command, caricature):
-    flags = ["--switch", "filippov", "--exit", "all", "--funnel-times", "2", "--funnel-horizon", "5", "--t-end", "100", "--funnel-longest", "1"]
+    flags = [
+        "--switch",
+        "filippov",
+        "--exit",
+        "all",
+        "--funnel-times",
+        "2",
+        "--funnel-horizon",
+        "5",
+        "--t-end",
+        "100",
+        "--funnel-longest",
+        "1",
+    ]
     funnel = twofold.funnel(caricature, START, 100.0, times=2, horizon=5.0, longest=1.0)
-    assert funnel.spec == json.loads(command("run", "--reading", "reconstructed", *flags, "--print-spec"))
-    assert twofold.written(funnel.spec) == command("run", "--reading", "reconstructed", *flags, "--quiet")
+    assert funnel.spec == json.loads(
+        command("run", "--reading", "reconstructed", *flags, "--print-spec")
+    )
+    assert twofold.written(funnel.spec) == command(
+        "run", "--reading", "reconstructed", *flags, "--quiet"
+    )
 
 
 def test_a_system_from_a_file_has_the_same_bytes(command, tmp_path):
-    text = 'states = ["x", "v"]\nstart = [0, 0]\nh = "v - belt"\nplus = ["v", "-x - tanh(v)"]\nminus = ["v", "-x + f"]\n[parameters]\nbelt = 0.3\nf = 1\n'
+    text = ('states = ["x", "v"]\nstart = [0, 0]\nh = "v - belt"\nplus = ["v", "-x - '
+            'tanh(v)"]\nminus = ["v", "-x + f"]\n[parameters]\nbelt = 0.3\nf = 1\n')
     file = tmp_path / "block.toml"
     file.write_text(text, encoding="utf-8")
-    flags = ["run", "--system", str(file), "--set", "f=0.7", "--t-end", "20", "--method", "dopri5", "--quiet"]
-    assert twofold.written(twofold.spec(twofold.System(file).with_(f=0.7), t_end=20.0)) == command(*flags)
+    flags = [
+        "run",
+        "--system",
+        str(file),
+        "--set",
+        "f=0.7",
+        "--t-end",
+        "20",
+        "--method",
+        "dopri5",
+        "--quiet",
+    ]
+    assert twofold.written(twofold.spec(twofold.System(file).with_(f=0.7), t_end=20.0)) == command(
+        *flags
+    )
 
 
 def test_a_sweep_has_the_same_bytes(command, caricature):
     quick = caricature.with_(beta=1e-4)
-    flags = "sweep --alpha 0.1 --beta 1e-4 --restart 100 --t-end 2000 --method dopri5 --section y=0 --quiet".split()
-    ours = twofold.sweep(quick, START, 2000.0, plane="y=0", restart=100.0, over=["eps=1e-3,2e-3", "shift.x=1e-9*2"])
+    flags = ("sweep --alpha 0.1 --beta 1e-4 --restart 100 --t-end 2000 --method dopri5 --section "
+             "y=0 --quiet").split()
+    ours = twofold.sweep(
+        quick, START, 2000.0, plane="y=0", restart=100.0, over=["eps=1e-3,2e-3", "shift.x=1e-9*2"]
+    )
     assert ours.csv == command(*flags, "--over", "eps=1e-3,2e-3", "--over", "shift.x=1e-9*2")
     lottery = twofold.sweep(quick, START, 2000.0, plane="y=0", restart=100.0, over="shift.x=1e-9*3")
     assert lottery.csv == command(*flags, "--runs", "3", "--shift", "1e-9")

@@ -36,7 +36,12 @@ def test_every_way_gives_the_same_system(tmp_path):
     by_text = twofold.System(TEXT)
     file = tmp_path / "block.toml"
     file.write_text(TEXT, encoding="utf-8")
-    for system in [twofold.System(str(file)), twofold.System(file), twofold.System.from_file(file), twofold.System.from_toml(TEXT)]:
+    for system in [
+        twofold.System(str(file)),
+        twofold.System(file),
+        twofold.System.from_file(file),
+        twofold.System.from_toml(TEXT),
+    ]:
         assert system == by_text and hash(system) == hash(by_text)
     same = twofold.System(
         name="block",
@@ -58,7 +63,9 @@ def test_every_way_gives_the_same_system(tmp_path):
 def test_values_are_values():
     system = block()
     other = system.with_(friction=0.5)
-    assert system.parameters == {"belt": 0.3, "friction": 1.0} and other.parameters["friction"] == 0.5
+    assert (
+        system.parameters == {"belt": 0.3, "friction": 1.0} and other.parameters["friction"] == 0.5
+    )
     assert other != system and other.with_(friction=1) == system and system != "block"
     assert pickle.loads(pickle.dumps(other)) == other
     precise = system.with_(belt="0.30000000000000000000000000001")
@@ -107,8 +114,16 @@ def test_errors_point():
 
 
 def test_bounds_of_parameters():
-    system = twofold.System(states=["x"], h="x", plus=["-k"], minus=["k"], parameters={"k": {"value": 1, "above": 0, "meaning": "pull"}})
-    assert pickle.loads(pickle.dumps(system)) == system and system.with_(k=2).parameters == {"k": 2.0}
+    system = twofold.System(
+        states=["x"],
+        h="x",
+        plus=["-k"],
+        minus=["k"],
+        parameters={"k": {"value": 1, "above": 0, "meaning": "pull"}},
+    )
+    assert pickle.loads(pickle.dumps(system)) == system and system.with_(k=2).parameters == {
+        "k": 2.0
+    }
     with pytest.raises(twofold.ParameterError, match="pull") as caught:
         system.with_(k=-1)
     assert caught.value.parameter == "k"
@@ -159,6 +174,8 @@ def test_two_surfaces():
     assert list(run.events["signs"]) == ["0+", "-0", "0-", "+0"]
     assert run.signs[0] == "++"
     with pytest.raises(TypeError, match="minus"):
-        twofold.System(states=["x"], h="x", plus=["1"], minus=["1"], second={"h": "x", "plus": ["1"]})
+        twofold.System(
+            states=["x"], h="x", plus=["1"], minus=["1"], second={"h": "x", "plus": ["1"]}
+        )
     with pytest.raises(twofold.SpecError, match="four fields"):
         square.evaluate([1.0, 1.0])

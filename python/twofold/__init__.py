@@ -1,9 +1,10 @@
 """Piecewise-smooth dynamical systems, integrated with the same bytes on any machine.
 
-A piecewise-smooth system is x' = f+(x) where h(x) > 0 and x' = f-(x) where h(x) < 0. What happens at h = 0 is a matter of modelling: a smooth
-transition, a hysteretic one, or the discontinuous system itself in Filippov's sense, whose future at a two-fold is a set.
+A piecewise-smooth system is x' = f+(x) where h(x) > 0 and x' = f-(x) where h(x) < 0. What happens
+at h = 0 is a matter of modelling: a smooth transition, a hysteretic one, or the discontinuous
+system itself in Filippov's sense, whose future at a two-fold is a set.
 
-=============================== ============================================================================
+=============================== ====================================================================
 :class:`System`                 a system: built in, from a file, or from expressions
 :func:`solve`                   its path from a start: ``t``, ``y`` as SciPy has them
 :func:`section`                 its crossings of a plane (a Poincaré section)
@@ -20,10 +21,11 @@ transition, a hysteretic one, or the discontinuous system itself in Filippov's s
 :func:`panels`                  the panels of the paper's figures, as runs with their hashes
 :func:`verdicts`                whether the paper's claims hold
 :class:`Paper`                  any paper as a folder: figures, claims, answers
-=============================== ============================================================================
+=============================== ====================================================================
 
-Units are the system's own: the built-in systems are dimensionless. Arrays are float64; ``y`` has the shape (states, points). Errors derive from
-:class:`TwofoldError` (see :mod:`twofold.errors`). Computations release the GIL, can be interrupted by Ctrl-C, and say how far they have come with
+Units are the system's own: the built-in systems are dimensionless. Arrays are float64; ``y`` has
+the shape (states, points). Errors derive from :class:`TwofoldError` (see :mod:`twofold.errors`).
+Computations release the GIL, can be interrupted by Ctrl-C, and say how far they have come with
 ``progress=True``.
 
 >>> import twofold
@@ -55,7 +57,14 @@ from ._runs import (
     written,
 )
 from ._system import System, builtin_systems
-from .errors import ComputationError, DefinitionError, InternalError, ParameterError, SpecError, TwofoldError
+from .errors import (
+    ComputationError,
+    DefinitionError,
+    InternalError,
+    ParameterError,
+    SpecError,
+    TwofoldError,
+)
 
 numerics: str = _NUMERICS
 """Digest of the sources that numbers depend on: equal digests give equal bits."""

@@ -1,4 +1,5 @@
-"""A paper as a folder of systems, figures and claims: what ``twofold paper`` makes and checks (docs/papers.md)."""
+"""A paper as a folder of systems, figures and claims: what ``twofold paper`` makes and checks
+(docs/papers.md)."""
 
 from __future__ import annotations
 
@@ -56,7 +57,9 @@ class Answer:
         """Digest of the numbers, the same on any machine."""
         self.facts: Dict[str, Any] = json.loads(raw["facts"])
         """What was found beside tables: a period, multipliers, exponents."""
-        self.tables: Dict[str, Table] = {name: Table(columns) for name, columns in raw["tables"].items()}
+        self.tables: Dict[str, Table] = {
+            name: Table(columns) for name, columns in raw["tables"].items()
+        }
         """Tables by name, their columns NumPy arrays."""
 
     def __repr__(self) -> str:
@@ -66,7 +69,8 @@ class Answer:
 class Paper:
     """A paper's folder.
 
-    Reading it checks every file. Answers are kept in ``out/.store`` of the folder, where ``twofold paper`` finds them, unless ``keep`` is false.
+    Reading it checks every file. Answers are kept in ``out/.store`` of the folder, where ``twofold
+    paper`` finds them, unless ``keep`` is false.
 
     :raises DefinitionError: if a file is wrong, with its place and a remedy.
     """
@@ -98,7 +102,8 @@ class Paper:
             return Answer(_native.paper_answer(self._folder, name, self._keep, show))
 
     def claims(self, threads: int = 0, progress: Progress = False) -> List[Claim]:
-        """Every claim of claims.toml with its outcome, in the file's order; ``threads`` = 0 is one per core and changes no byte.
+        """Every claim of claims.toml with its outcome, in the file's order; ``threads`` = 0 is one
+        per core and changes no byte.
 
         What panels say of themselves (``says``) is scored by ``twofold paper`` alone.
         """
@@ -117,4 +122,5 @@ class Paper:
         return found
 
     def __repr__(self) -> str:
-        return f"<twofold.Paper: {', '.join(self.authors)} ({self.year}), {len(self.figures)} figures, {len(self._claims)} claims>"
+        return (f"<twofold.Paper: {', '.join(self.authors)} ({self.year}), {len(self.figures)} "
+                f"figures, {len(self._claims)} claims>")

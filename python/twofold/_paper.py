@@ -56,23 +56,41 @@ class Panel:
 
 
 def panels(figure: Optional[str] = None, reading: Optional[str] = None) -> List[Panel]:
-    """The panels that are made of runs, in the paper's order; of one figure or one reading, if given."""
+    """The panels that are made of runs, in the paper's order; of one figure or one reading, if
+    given."""
     found = []
     for row in json.loads(_native.panels()):
         if figure not in (None, row["figure"]) or reading not in (None, row["reading"]):
             continue
-        verdict = row["verdict"] and Verdict(row["figure"], row["panel"], row["reading"], **row["verdict"])
+        verdict = row["verdict"] and Verdict(
+            row["figure"], row["panel"], row["reading"], **row["verdict"]
+        )
         title = row["panel_title"] or row["title"]
-        found.append(Panel(row["figure"], row["panel"], row["reading"], title, row["spec"], row["hash"], verdict))
+        found.append(
+            Panel(
+                row["figure"],
+                row["panel"],
+                row["reading"],
+                title,
+                row["spec"],
+                row["hash"],
+                verdict,
+            )
+        )
     return found
 
 
 def verdicts() -> List[Verdict]:
-    """The verdicts on the paper's figures that were published with this version, panel by panel, in both readings.
+    """The verdicts on the paper's figures that were published with this version, panel by panel, in
+    both readings.
 
     Our own figures (the lottery) have verdicts too: ``[p.verdict for p in panels("lottery")]``.
     """
-    return [panel.verdict for panel in panels() if panel.verdict is not None and panel.figure.startswith("fig")]
+    return [
+        panel.verdict
+        for panel in panels()
+        if panel.verdict is not None and panel.figure.startswith("fig")
+    ]
 
 
 def verdict_table() -> str:

@@ -1,4 +1,5 @@
-"""A line on standard error that says how far a computation has come. In a notebook it is redrawn in place too."""
+"""A line on standard error that says how far a computation has come. In a notebook it is redrawn in
+place too."""
 
 from __future__ import annotations
 
@@ -7,7 +8,8 @@ import time
 from typing import Callable, Optional, TextIO, Union
 
 Show = Callable[[float, str], object]
-"""Called about ten times a second with the share that is done, from 0 to 1, and what is being computed."""
+"""Called about ten times a second with the share that is done, from 0 to 1, and what is being
+computed."""
 
 _WIDTH = 24
 

@@ -1,4 +1,5 @@
-"""What commands of ``twofold`` compute, asked from Python with the commands' own flags and defaults."""
+"""What commands of ``twofold`` compute, asked from Python with the commands' own flags and
+defaults."""
 
 from __future__ import annotations
 
@@ -36,8 +37,8 @@ def _is_list(value: Any) -> bool:
 
 
 def _flags(given: Mapping[str, Any]) -> List[str]:
-    """Keyword arguments as a command's flags: ``t_end=10`` is ``--t-end=10``, a list is joined by commas, and what is named (``params``, ``within``, ``over``)
-    is given once a name."""
+    """Keyword arguments as a command's flags: ``t_end=10`` is ``--t-end=10``, a list is joined by
+    commas, and what is named (``params``, ``within``, ``over``) is given once a name."""
     flags: List[str] = []
     for key, value in given.items():
         name = "set" if key == "params" else key.replace("_", "-")
@@ -58,17 +59,23 @@ def _flags(given: Mapping[str, Any]) -> List[str]:
     return flags
 
 
-def _ask(command: str, system: SystemLike, given: Mapping[str, Any], progress: Progress, threads: int = 0) -> Answer:
+def _ask(
+    command: str, system: SystemLike, given: Mapping[str, Any], progress: Progress, threads: int = 0
+) -> Answer:
     with tempfile.TemporaryDirectory() as folder:
         flags = _flags(given)
-        if isinstance(system, System) or (isinstance(system, str) and ("\n" in system or "=" in system)):
+        if isinstance(system, System) or (
+            isinstance(system, str) and ("\n" in system or "=" in system)
+        ):
             text = system.to_toml() if isinstance(system, System) else system
             json = text.lstrip().startswith("{")
             file = Path(folder) / ("system.json" if json else "system.toml")
             file.write_text(text, encoding="utf-8")
             name = str(file)
             if isinstance(system, System):
-                flags = [f"--set={parameter}={value!r}" for parameter, value in system.parameters.items()] + flags
+                flags = [
+                    f"--set={parameter}={value!r}" for parameter, value in system.parameters.items()
+                ] + flags
         else:
             name = os.fspath(system)
         with Shown(progress) as show:
@@ -76,17 +83,19 @@ def _ask(command: str, system: SystemLike, given: Mapping[str, Any], progress: P
 
 
 def follow(system: SystemLike, *, progress: Progress = False, **flags: Any) -> Answer:
-    """Follows a general system from switch to switch, as ``twofold run`` does: the table ``path``, or ``section`` with ``section="x=0"``.
+    """Follows a general system from switch to switch, as ``twofold run`` does: the table ``path``,
+    or ``section`` with ``section="x=0"``.
 
     Parameters
     ----------
     system : System, str or path
-        A built-in system's name, a file, the text of one, or a :class:`System`. General systems (``f``, events, modes, tables) and those with h, plus and
-        minus alike.
+        A built-in system's name, a file, the text of one, or a :class:`System`. General systems
+        (``f``, events, modes, tables) and those with h, plus and minus alike.
     params : dict of str to number, optional
         Values of parameters.
     **flags
-        The flags of ``twofold run`` with underscores for dashes, and its defaults: ``t_end=10``, ``start=[1, 0]``, ``rtol=1e-12``, ``every=0.1`` ...
+        The flags of ``twofold run`` with underscores for dashes, and its defaults: ``t_end=10``,
+        ``start=[1, 0]``, ``rtol=1e-12``, ``every=0.1`` ...
 
     Raises
     ------
@@ -106,10 +115,12 @@ def follow(system: SystemLike, *, progress: Progress = False, **flags: Any) -> A
 
 
 def orbit(system: SystemLike, *, progress: Progress = False, **flags: Any) -> Answer:
-    """A closed orbit and its Floquet multipliers, as ``twofold orbit`` finds it: facts ``period``, ``point``, ``multipliers`` (real and imaginary parts).
+    """A closed orbit and its Floquet multipliers, as ``twofold orbit`` finds it: facts ``period``,
+    ``point``, ``multipliers`` (real and imaginary parts).
 
-    ``**flags`` are those of the command, and its defaults: ``section="x=0"``, ``period=1``, ``settle=100``, ``along="p=0..1"`` ... See :func:`follow` for
-    ``system``, ``params`` and the errors.
+    ``**flags`` are those of the command, and its defaults: ``section="x=0"``, ``period=1``,
+    ``settle=100``, ``along="p=0..1"`` ... See :func:`follow` for ``system``, ``params`` and the
+    errors.
 
     >>> import twofold
     >>> walker = twofold.orbit("rimless-wheel", section="a=0")
@@ -120,9 +131,11 @@ def orbit(system: SystemLike, *, progress: Progress = False, **flags: Any) -> An
 
 
 def lyapunov(system: SystemLike, *, progress: Progress = False, **flags: Any) -> Answer:
-    """Lyapunov exponents per unit time, as ``twofold lyapunov`` computes them. Of general systems and of ``switch="filippov"`` the fact ``exponents``: a list of
-    ``{"value": ..., "half_width": ...}``, largest first, ``value`` None where sliding takes the direction away; of other switches the facts ``exponent`` and
-    ``half_width`` of the largest. Half-widths are those of 95 % intervals.
+    """Lyapunov exponents per unit time, as ``twofold lyapunov`` computes them. Of general systems
+    and of ``switch="filippov"`` the fact ``exponents``: a list of ``{"value": ..., "half_width":
+    ...}``, largest first, ``value`` None where sliding takes the direction away; of other switches
+    the facts ``exponent`` and ``half_width`` of the largest. Half-widths are those of 95 %
+    intervals.
 
     >>> import twofold
     >>> found = twofold.lyapunov("sliding-mode-control", t_end=60).facts["exponents"]
@@ -133,7 +146,8 @@ def lyapunov(system: SystemLike, *, progress: Progress = False, **flags: Any) ->
 
 
 def rests(system: SystemLike, **flags: Any) -> Answer:
-    """Equilibria and pseudo-equilibria in a box, as ``twofold rests`` finds them: the fact ``rests``, with states, eigenvalues and stability.
+    """Equilibria and pseudo-equilibria in a box, as ``twofold rests`` finds them: the fact
+    ``rests``, with states, eigenvalues and stability.
 
     ``within={"x": (-3, 3)}`` bounds states; the others go from -10 to 10.
 
@@ -145,12 +159,20 @@ def rests(system: SystemLike, **flags: Any) -> Answer:
 
 
 def scan(
-    system: SystemLike, over: Mapping[str, Values], *, threads: int = 0, progress: Progress = False, **flags: Any
+    system: SystemLike,
+    over: Mapping[str, Values],
+    *,
+    threads: int = 0,
+    progress: Progress = False,
+    **flags: Any,
 ) -> Answer:
-    """What runs do as one or two settings vary, as ``twofold scan`` has it: the table ``passages`` (over one setting), or ``endings`` (over two).
+    """What runs do as one or two settings vary, as ``twofold scan`` has it: the table ``passages``
+    (over one setting), or ``endings`` (over two).
 
-    ``over={"params.input": "20..32:60"}``, or a list of numbers; ``section="x=0"`` or ``period=1`` says where runs are looked at, ``follow="both"`` follows an
-    attractor up and down. Facts: ``runs``, ``failed`` and ``first_error``: a run that fails leaves a gap. ``threads`` = 0 is one per core; rows do not depend on it.
+    ``over={"params.input": "20..32:60"}``, or a list of numbers; ``section="x=0"`` or ``period=1``
+    says where runs are looked at, ``follow="both"`` follows an attractor up and down. Facts:
+    ``runs``, ``failed`` and ``first_error``: a run that fails leaves a gap. ``threads`` = 0 is one
+    per core; rows do not depend on it.
 
     >>> import twofold
     >>> found = twofold.scan("impact-oscillator", {"params.w": [2.0, 2.1]}, section="v=0", t_end=40)
@@ -161,12 +183,15 @@ def scan(
 
 
 def sensitivities(system: SystemLike, *, progress: Progress = False, **flags: Any) -> Answer:
-    """Derivatives of the state at ``t_end`` by the start and by parameters, through switches, slides and resets, as ``twofold sensitivities`` computes them.
+    """Derivatives of the state at ``t_end`` by the start and by parameters, through switches,
+    slides and resets, as ``twofold sensitivities`` computes them.
 
-    The table ``sensitivities`` has a row a state: ``state``, ``value``, ``start.x`` ..., ``params.p`` ...; ``by=["p"]`` chooses parameters.
+    The table ``sensitivities`` has a row a state: ``state``, ``value``, ``start.x`` ...,
+    ``params.p`` ...; ``by=["p"]`` chooses parameters.
 
     >>> import twofold
-    >>> table = twofold.sensitivities("states = ['x']\\nstart = [1]\\nf = ['-k*x']\\n[parameters]\\nk = 2", t_end=1.0).tables["sensitivities"]
+    >>> text = "states = ['x']\\nstart = [1]\\nf = ['-k*x']\\n[parameters]\\nk = 2"
+    >>> table = twofold.sensitivities(text, t_end=1.0).tables["sensitivities"]
     >>> bool(abs(table["params.k"][0] + table["value"][0]) < 1e-9)
     True
     """

@@ -29,7 +29,7 @@ __all__ = [
 ]  # fmt: skip
 
 
-# The question ---------------------------------------------------------------------------------------------------------------------
+# The question -------------------------------------------------------------------------------------
 
 
 def _refuse(given: Mapping[str, Any], why: str) -> None:
@@ -50,15 +50,22 @@ def _finite(name: str, value: Any) -> float:
 
 
 def _count(name: str, value: Any) -> int:
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not 0 <= int(value) < 2**64:
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, (int, np.integer))
+        or not 0 <= int(value) < 2**64
+    ):
         raise SpecError(f"{name} is {value!r}: give a whole number from 0 to 2^64 - 1", name)
     return int(value)
 
 
-def _exit(rule: Any, plus_probability: Optional[float], seed: Optional[int], stream: Optional[int]) -> Any:
+def _exit(
+    rule: Any, plus_probability: Optional[float], seed: Optional[int], stream: Optional[int]
+) -> Any:
     """Reads "after-time:0.3:minus" as the command line does."""
     wrong = SpecError(
-        f"exit is {rule!r}: give at-once:SIDE, after-time:T:SIDE or after-arc:L:SIDE with SIDE plus or minus; "
+        f"exit is {rule!r}: give at-once:SIDE, after-time:T:SIDE or after-arc:L:SIDE with SIDE "
+        "plus or minus; "
         "random:exponential:MEAN or random:uniform:LONGEST",
         "exit",
     )
@@ -69,13 +76,18 @@ def _exit(rule: Any, plus_probability: Optional[float], seed: Optional[int], str
     try:
         if words[0] == "random":
             kind, length = words[1], float(words[2])
-            law = {"exponential": {"exponential": {"mean": length}}, "uniform": {"uniform": {"longest": length}}}[kind]
+            law = {
+                "exponential": {"exponential": {"mean": length}},
+                "uniform": {"uniform": {"longest": length}},
+            }[kind]
             if len(words) != 3 or not math.isfinite(length):
                 raise wrong
             return {
                 "random": {
                     "law": law,
-                    "plus_probability": 0.5 if plus_probability is None else _finite("plus_probability", plus_probability),
+                    "plus_probability": 0.5
+                    if plus_probability is None
+                    else _finite("plus_probability", plus_probability),
                     "seed": 2013 if seed is None else _count("seed", seed),
                     "stream": 0 if stream is None else _count("stream", stream),
                 }
@@ -132,16 +144,24 @@ def _spec(
     if start is None:
         suggested = system.start
         if suggested is None:
-            raise SpecError(f"the system suggests no start: give one, {len(system.states)} numbers", "start")
+            raise SpecError(
+                f"the system suggests no start: give one, {len(system.states)} numbers", "start"
+            )
         state = suggested
     else:
         try:
             state = np.asarray(start, dtype=np.float64)
         except (TypeError, ValueError):
-            raise SpecError(f"start is {start!r}: give {len(system.states)} numbers", "start") from None
+            raise SpecError(
+                f"start is {start!r}: give {len(system.states)} numbers", "start"
+            ) from None
         if state.shape != (len(system.states),):
             names = ", ".join(system.states)
-            raise SpecError(f"start has the shape {state.shape}: give {len(system.states)} numbers, one for each of {names}", "start")
+            raise SpecError(
+                f"start has the shape {state.shape}: give {len(system.states)} numbers, one for "
+                f"each of {names}",
+                "start",
+            )
     width = 1e-3 if eps is None else _finite("eps", eps)
     kicks = {"kick_size": kick_size, "kick_law": kick_law}
     of_hysteresis = {"eps_prime": eps_prime, "hysteresis": hysteresis}
@@ -165,7 +185,9 @@ def _spec(
         _refuse(of_hysteresis, 'it belongs to switch="hysteretic"')
         _refuse(of_filippov, 'it belongs to switch="filippov"')
         if delay is None:
-            raise SpecError('switch="delayed" needs its delay: give one, such as delay=1e-3', "delay")
+            raise SpecError(
+                'switch="delayed" needs its delay: give one, such as delay=1e-3', "delay"
+            )
         model = {"delayed": {"delay": _finite("delay", delay), "history": history or "constant"}}
         if eps is None:
             _refuse(of_smoothing, "the sharp delayed switch has no transition; give eps, too")
@@ -177,36 +199,60 @@ def _spec(
         _refuse(of_hysteresis, 'it belongs to switch="hysteretic"')
         _refuse(of_filippov, 'it belongs to switch="filippov"')
         if band is None:
-            raise SpecError('switch="relay" needs its band: give half its width, such as band=1e-3', "band")
+            raise SpecError(
+                'switch="relay" needs its band: give half its width, such as band=1e-3', "band"
+            )
         model = {"relay": {"band": _finite("band", band), "inside": inside or "sign"}}
     elif switch == "hysteretic":
         _refuse(of_smoothing, 'it belongs to switch="smoothed"')
         _refuse(of_filippov, 'it belongs to switch="filippov"')
         prime = 10.0 * width if eps_prime is None else _finite("eps_prime", eps_prime)
-        model = {"hysteretic": {"eps": width, "eps_prime": prime, "relaxation": hysteresis or "literal", "phi0": 1.0}}
+        model = {
+            "hysteretic": {
+                "eps": width,
+                "eps_prime": prime,
+                "relaxation": hysteresis or "literal",
+                "phi0": 1.0,
+            }
+        }
     elif switch == "filippov":
         _refuse({"eps": eps}, "the discontinuous system has no eps")
         _refuse(of_smoothing, 'it belongs to switch="smoothed"')
         _refuse(of_hysteresis, 'it belongs to switch="hysteretic"')
-        _refuse({"restart": restart, "kick_every": kick_every, **kicks}, "only the other switches' runs have restarts and kicks")
+        _refuse(
+            {"restart": restart, "kick_every": kick_every, **kicks},
+            "only the other switches' runs have restarts and kicks",
+        )
         if funnel is not None:
-            _refuse({"plus_probability": plus_probability, "seed": seed, "stream": stream}, "nothing in a funnel is random")
+            _refuse(
+                {"plus_probability": plus_probability, "seed": seed, "stream": stream},
+                "nothing in a funnel is random",
+            )
             model = {"filippov": {"exit": "all", "funnel": funnel}}
         elif exit is None:
             # The run ends with an error where a choice is needed.
-            _refuse({"plus_probability": plus_probability, "seed": seed, "stream": stream}, "it belongs to a random exit")
+            _refuse(
+                {"plus_probability": plus_probability, "seed": seed, "stream": stream},
+                "it belongs to a random exit",
+            )
             model = {"filippov": {"exit": "undecided"}}
         elif exit == "all":
             raise SpecError('exit="all" follows every future: that is twofold.funnel', "exit")
         else:
             model = {"filippov": {"exit": _exit(exit, plus_probability, seed, stream)}}
     else:
-        raise SpecError(f'switch is {switch!r}: give "smoothed", "hysteretic", "delayed", "relay" or "filippov"', "switch")
+        raise SpecError(
+            f'switch is {switch!r}: give "smoothed", "hysteretic", "delayed", "relay" or '
+            '"filippov"',
+            "switch",
+        )
     kick = None
     if switch != "filippov":
         if kick_every is None:
             _refuse(kicks, "there are no kicks; give kick_every")
-            _refuse({"seed": seed, "stream": stream}, "nothing in this run is random; give kick_every")
+            _refuse(
+                {"seed": seed, "stream": stream}, "nothing in this run is random; give kick_every"
+            )
         else:
             kick = {
                 "every": _finite("kick_every", kick_every),
@@ -220,7 +266,10 @@ def _spec(
     if method == "taylor-extended":
         finest = _native.DEFAULT_TOLERANCES_EXTENDED
         # What has no such entry is refused with the spec, which knows the reason.
-        tolerance = finest.get(min(finest) if precision is None else _count("precision", precision), min(finest.values()))
+        tolerance = finest.get(
+            min(finest) if precision is None else _count("precision", precision),
+            min(finest.values()),
+        )
     else:
         _refuse(of_extended, 'it belongs to method="taylor-extended"')
     return system, {
@@ -234,11 +283,22 @@ def _spec(
                 "rtol": tolerance if rtol is None else _finite("rtol", rtol),
                 "atol": tolerance if atol is None else _finite("atol", atol),
             },
-            "step_cap": {"fraction-of-segment": 0.1} if max_step is None else {"absolute": _finite("max_step", max_step)},
-            "max_steps": _native.DEFAULT_MAX_STEPS if max_steps is None else _count("max_steps", max_steps),
-            **{name: _count(name, value) for name, value in of_extended.items() if value is not None},
+            "step_cap": {"fraction-of-segment": 0.1}
+            if max_step is None
+            else {"absolute": _finite("max_step", max_step)},
+            "max_steps": _native.DEFAULT_MAX_STEPS
+            if max_steps is None
+            else _count("max_steps", max_steps),
+            **{
+                name: _count(name, value)
+                for name, value in of_extended.items()
+                if value is not None
+            },
         },
-        "schedule": {"restart_every": None if restart is None else _finite("restart", restart), "kick": kick},
+        "schedule": {
+            "restart_every": None if restart is None else _finite("restart", restart),
+            "kick": kick,
+        },
         "observe": observe,
     }
 
@@ -253,7 +313,8 @@ def _path(chord: Optional[float], every: Optional[float]) -> Dict[str, Any]:
 def _plane(system: SystemLike, plane: Plane) -> Dict[str, Any]:
     names = as_system(system).states
     wrong = SpecError(
-        f'plane is {plane!r}: give a state and its value, such as "{names[min(1, len(names) - 1)]}=0"; the states are {", ".join(names)}',
+        f'plane is {plane!r}: give a state and its value, such as '
+        f'"{names[min(1, len(names) - 1)]}=0"; the states are {", ".join(names)}',
         "plane",
     )
     if isinstance(plane, str):
@@ -278,7 +339,7 @@ def _plane(system: SystemLike, plane: Plane) -> Dict[str, Any]:
     return {"section": {"coordinate": coordinate, "value": _finite("plane", value)}}
 
 
-# Answers --------------------------------------------------------------------------------------------------------------------------
+# Answers ------------------------------------------------------------------------------------------
 
 
 def _words(column: Tuple[NDArray[np.uint32], List[str]]) -> NDArray[np.str_]:
@@ -287,7 +348,8 @@ def _words(column: Tuple[NDArray[np.uint32], List[str]]) -> NDArray[np.str_]:
 
 
 class Table(MappingBase):  # type: ignore[type-arg]
-    """Named columns of one length: ``table["t"]``, or ``table.t``. Numbers are float64 (NaN is a blank), whole numbers int64, words str."""
+    """Named columns of one length: ``table["t"]``, or ``table.t``. Numbers are float64 (NaN is a
+    blank), whole numbers int64, words str."""
 
     def __init__(self, columns: Mapping[str, Any]) -> None:
         self._columns: Dict[str, Any] = dict(columns)
@@ -300,7 +362,9 @@ class Table(MappingBase):  # type: ignore[type-arg]
 
     def __getattr__(self, name: str) -> NDArray[Any]:
         if name.startswith("_") or name not in self._columns:
-            raise AttributeError(f"there is no column {name!r} among {', '.join(self.__dict__.get('_columns', {}))}")
+            raise AttributeError(
+                f"there is no column {name!r} among {', '.join(self.__dict__.get('_columns', {}))}"
+            )
         return self[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -317,7 +381,10 @@ class Table(MappingBase):  # type: ignore[type-arg]
         return len(first[0] if isinstance(first, tuple) else first)
 
     def _rows(self, rows: slice) -> Table:
-        part = {k: (c[0][rows], c[1]) if isinstance(c, tuple) else c[rows] for k, c in self._columns.items()}
+        part = {
+            k: (c[0][rows], c[1]) if isinstance(c, tuple) else c[rows]
+            for k, c in self._columns.items()
+        }
         return Table(part)
 
     def __repr__(self) -> str:
@@ -344,7 +411,8 @@ class _Points:
     def y(self) -> Floats:
         """States, shape (states, points), in the order of ``system.states``.
 
-        Made from the recorded columns when it is first asked for; a single state (``solution["x"]``) is the recorded column itself.
+        Made from the recorded columns when it is first asked for; a single state
+        (``solution["x"]``) is the recorded column itself.
         """
         if self._y is None:
             names = self.system.states
@@ -394,7 +462,8 @@ class _Answer(_Points):
 
     @property
     def spec(self) -> Dict[str, Any]:
-        """Everything that the run depends on, as ``twofold run --spec`` reads it (``json.dump`` it)."""
+        """Everything that the run depends on, as ``twofold run --spec`` reads it (``json.dump``
+        it)."""
         return self._facts.spec
 
     @property
@@ -449,7 +518,8 @@ class _Answer(_Points):
 
     @property
     def hash(self) -> str:
-        """SHA-256 of all recorded numbers' bits, facts and stop reason: the ``data`` hash of manifests, the same on any machine."""
+        """SHA-256 of all recorded numbers' bits, facts and stop reason: the ``data`` hash of
+        manifests, the same on any machine."""
         return self._facts.hash
 
     @property
@@ -463,43 +533,52 @@ class _Answer(_Points):
 
 
 class Solution(_Answer):
-    """A path. Like SciPy's: ``t`` (points,), ``y`` (states, points), ``message``, ``success``, ``nfev``, ``njev``, ``nlu``.
+    """A path. Like SciPy's: ``t`` (points,), ``y`` (states, points), ``message``, ``success``,
+    ``nfev``, ``njev``, ``nlu``.
 
-    The points are those of a polyline that stays within ``chord`` of the dense output; ``solution["x"]`` is a state by name. In the
-    discontinuous system there are also ``mode``, ``piece`` and ``events``.
+    The points are those of a polyline that stays within ``chord`` of the dense output;
+    ``solution["x"]`` is a state by name. In the discontinuous system there are also ``mode``,
+    ``piece`` and ``events``.
     """
 
     events: Optional[Table]
-    """What happened at the switching surface (``switch="filippov"``), else None: columns t, the states, event, from, to, side, leg, error, time, arc,
-    rule; one row an event."""
+    """What happened at the switching surface (``switch="filippov"``), else None: columns t, the
+    states, event, from, to, side, leg, error, time, arc, rule; one row an event."""
 
-    def __init__(self, system: System, table: Table, facts: _Facts, events: Optional[Table]) -> None:
+    def __init__(
+        self, system: System, table: Table, facts: _Facts, events: Optional[Table]
+    ) -> None:
         super().__init__(system, table, facts)
         self.events = events
 
     @property
     def mode(self) -> Optional[NDArray[np.str_]]:
-        """Where each point is, shape (points,): "plus", "minus", "sliding-attracting" or "sliding-repelling"; None if the switch is not Filippov's."""
+        """Where each point is, shape (points,): "plus", "minus", "sliding-attracting" or
+        "sliding-repelling"; None if the switch is not Filippov's."""
         return self._table["mode"] if "mode" in self._table else None
 
     @property
     def signs(self) -> Optional[NDArray[np.str_]]:
-        """The signs of both switching functions at each point, such as ``"+-"`` or ``"0+"`` (0: on the surface), shape (points,); None unless
-        the switch is Filippov's and the system has two surfaces."""
+        """The signs of both switching functions at each point, such as ``"+-"`` or ``"0+"`` (0: on
+        the surface), shape (points,); None unless the switch is Filippov's and the system has two
+        surfaces."""
         return self._table["signs"] if "signs" in self._table else None
 
     @property
     def piece(self) -> Optional[NDArray[np.int64]]:
-        """Number of the piece of one mode to which each point belongs, shape (points,); None if the switch is not Filippov's."""
+        """Number of the piece of one mode to which each point belongs, shape (points,); None if the
+        switch is not Filippov's."""
         return self._table["piece"] if "piece" in self._table else None
 
 
 class Section(_Answer):
-    """Passages through a plane: ``t`` (points,), ``y`` (states, points), ``direction`` (points,)."""
+    """Passages through a plane: ``t`` (points,), ``y`` (states, points), ``direction``
+    (points,)."""
 
     @property
     def direction(self) -> NDArray[np.int8]:
-        """+1 where the coordinate grows through the plane's value, -1 where it falls; shape (points,)."""
+        """+1 where the coordinate grows through the plane's value, -1 where it falls; shape
+        (points,)."""
         return np.where(self._table["direction"] == "up", np.int8(1), np.int8(-1))
 
     @property
@@ -509,7 +588,8 @@ class Section(_Answer):
 
 
 class Future(_Points):
-    """One future of a set-valued point: ``t`` (points,), ``y`` (states, points), ``mode``, ``events``."""
+    """One future of a set-valued point: ``t`` (points,), ``y`` (states, points), ``mode``,
+    ``events``."""
 
     exit_time: float
     """Time of repelling sliding before it leaves the surface."""
@@ -518,7 +598,9 @@ class Future(_Points):
     events: Table
     """What happened at the switching surface."""
 
-    def __init__(self, system: System, table: Table, events: Table, exit_time: float, side: str) -> None:
+    def __init__(
+        self, system: System, table: Table, events: Table, exit_time: float, side: str
+    ) -> None:
         super().__init__(system, table)
         self.events, self.exit_time, self.side = events, exit_time, side
 
@@ -539,7 +621,9 @@ class Funnel(_Answer):
     events: Table
     """What happened on the approach."""
 
-    def __init__(self, system: System, table: Table, facts: _Facts, events: Table, futures: List[Future]) -> None:
+    def __init__(
+        self, system: System, table: Table, facts: _Facts, events: Table, futures: List[Future]
+    ) -> None:
         super().__init__(system, table, facts)
         self.events, self.futures = events, futures
 
@@ -557,16 +641,22 @@ class Funnel(_Answer):
 def _split(table: Table) -> List[Table]:
     """The rows of each member of a funnel: 0 is the approach."""
     numbers = table["future"]
-    ends = np.searchsorted(numbers, np.arange(int(numbers[-1]) + 2) if len(numbers) else np.arange(2))
+    ends = np.searchsorted(
+        numbers, np.arange(int(numbers[-1]) + 2) if len(numbers) else np.arange(2)
+    )
     return [table._rows(slice(int(a), int(b))) for a, b in zip(ends[:-1], ends[1:])]
 
 
-def _answer(system: System, spec: Dict[str, Any], progress: Progress) -> Union[Solution, Section, Funnel]:
+def _answer(
+    system: System, spec: Dict[str, Any], progress: Progress
+) -> Union[Solution, Section, Funnel]:
     with Shown(progress) as show:
         raw = _native.run(json.dumps(spec, allow_nan=False), show)
     tables = {name: Table(columns) for name, columns in raw["tables"].items()}
     statistics = json.loads(raw["statistics"]) or {}
-    facts = _Facts(spec, raw["stop"], statistics, raw["hash"], raw["question"], json.loads(raw["facts"]))
+    facts = _Facts(
+        spec, raw["stop"], statistics, raw["hash"], raw["question"], json.loads(raw["facts"])
+    )
     if "section" in tables:
         return Section(system, tables["section"], facts)
     if "path" in tables:
@@ -583,7 +673,7 @@ def _answer(system: System, spec: Dict[str, Any], progress: Progress) -> Union[S
     return Funnel(system, members[0], facts, happened[0], futures)
 
 
-# What is asked --------------------------------------------------------------------------------------------------------------------
+# What is asked ------------------------------------------------------------------------------------
 
 
 def solve(
@@ -631,20 +721,23 @@ def solve(
     t_end : float
         Final time, in the system's unit of time.
     switch : {"smoothed", "hysteretic", "delayed", "relay", "filippov"}
-        What stands in for the discontinuity at h = 0: a smooth transition of width ``eps``; a loop of half-width ``eps`` with a state of its
-        own; a switch that acts late, on h(x(t - delay)); a relay with memory, f+ until h falls to -band, then f- until it rises to
-        band; or nothing: the discontinuous system, in Filippov's sense, event by event.
+        What stands in for the discontinuity at h = 0: a smooth transition of width ``eps``; a loop
+        of half-width ``eps`` with a state of its own; a switch that acts late, on h(x(t - delay));
+        a relay with memory, f+ until h falls to -band, then f- until it rises to band; or nothing:
+        the discontinuous system, in Filippov's sense, event by event.
     delay : float
         Delay of a delayed switch, in units of time.
     history : {"constant", "flow"}
-        Where the orbit was before the start of a run with a delayed switch: at the start, or on the orbit without delay that leads
-        there [default "constant"].
+        Where the orbit was before the start of a run with a delayed switch: at the start, or on the
+        orbit without delay that leads there [default "constant"].
     band : float
         Half the width of a relay's band, in units of h.
     inside : {"sign", "plus", "minus"}
-        What a relay begins with where the start lies inside its band: f+ if h > 0 and f- otherwise, f+, or f- [default "sign"].
+        What a relay begins with where the start lies inside its band: f+ if h > 0 and f- otherwise,
+        f+, or f- [default "sign"].
     eps : float
-        Width of the layer, in units of h [default 1e-3; of a delayed switch none, which is the sharp rule].
+        Width of the layer, in units of h [default 1e-3; of a delayed switch none, which is the
+        sharp rule].
     transition : {"tanh", "arctan", "algebraic", "erf"}
         Transition function of a smoothed switch, or of a delayed one with ``eps`` [default "tanh"].
     sigma : float
@@ -654,15 +747,17 @@ def solve(
     hysteresis : {"literal", "single"}
         How the hysteretic equation is read [default "literal"].
     exit : str
-        How repelling sliding ends (Filippov): "at-once:SIDE", "after-time:T:SIDE", "after-arc:L:SIDE" with SIDE "plus" or "minus";
-        "random:exponential:MEAN" or "random:uniform:LONGEST". There is no default: the equations do not make this choice.
+        How repelling sliding ends (Filippov): "at-once:SIDE", "after-time:T:SIDE",
+        "after-arc:L:SIDE" with SIDE "plus" or "minus"; "random:exponential:MEAN" or
+        "random:uniform:LONGEST". There is no default: the equations do not make this choice.
     plus_probability : float
         Probability of leaving to h > 0 under a random exit [default 0.5].
     method : {"dopri5", "lsoda", "radau5", "taylor", "taylor-extended", "layered"}
-        Integration method. Filippov motion is integrated by dopri5, a sharp delayed switch and a relay by dopri5,
-        taylor or taylor-extended, a smooth delayed switch by dopri5 or radau5.
+        Integration method. Filippov motion is integrated by dopri5, a sharp delayed switch and a
+        relay by dopri5, taylor or taylor-extended, a smooth delayed switch by dopri5 or radau5.
     rtol, atol : float
-        Tolerances of a step's local error [default 10^-7.97727, NDSolve's; 1e-32 for taylor-extended, or what ``precision`` allows].
+        Tolerances of a step's local error [default 10^-7.97727, NDSolve's; 1e-32 for
+        taylor-extended, or what ``precision`` allows].
     max_step : float
         Longest step, in units of time [default a tenth of the time between restarts or kicks].
     max_steps : int
@@ -674,15 +769,18 @@ def solve(
     restart : float
         Start the method afresh after each such interval of time.
     kick_every, kick_size, kick_law : float, float, {"sphere", "cube", "normal"}
-        Perturb the state after each such interval, by so much [default eps], by this law [default "sphere"].
+        Perturb the state after each such interval, by so much [default eps], by this law [default
+        "sphere"].
     seed, stream : int
         Of the random numbers of kicks and random exits (ChaCha8) [default 2013, 0].
     chord : float
-        Largest distance between the recorded polyline and the dense output, in the states' units [default 1e-3].
+        Largest distance between the recorded polyline and the dense output, in the states' units
+        [default 1e-3].
     every : float
         Record at multiples of this time instead.
     progress : bool or callable
-        True shows a line on standard error; a callable is given the share that is done and what is being computed.
+        True shows a line on standard error; a callable is given the share that is done and what is
+        being computed.
 
     Returns
     -------
@@ -698,7 +796,8 @@ def solve(
 
     Notes
     -----
-    Equal arguments give equal bits, on any machine and in the command line. The GIL is released; Ctrl-C stops the run.
+    Equal arguments give equal bits, on any machine and in the command line. The GIL is released;
+    Ctrl-C stops the run.
 
     Examples
     --------
@@ -707,7 +806,11 @@ def solve(
     >>> run.y.shape == (3, len(run.t)), run.success
     (True, True)
     """
-    options = {k: v for k, v in locals().items() if k not in ("system", "start", "t_end", "chord", "every", "progress")}
+    options = {
+        k: v
+        for k, v in locals().items()
+        if k not in ("system", "start", "t_end", "chord", "every", "progress")
+    }
     system, question = _spec(system, start, t_end, _path(chord, every), **options)
     answer = _answer(system, question, progress)
     assert isinstance(answer, Solution)
@@ -757,7 +860,8 @@ def funnel(
     progress: Progress = False,
     **options: Any,
 ) -> Funnel:
-    """Follows the discontinuous system to the first point whose future is a set, and from there computes members of the set.
+    """Follows the discontinuous system to the first point whose future is a set, and from there
+    computes members of the set.
 
     Parameters
     ----------
@@ -770,7 +874,8 @@ def funnel(
     until_two_fold : bool
         End a future when it next comes to a two-fold.
     system, start, t_end, progress, **options
-        As for :func:`solve`, without ``chord`` and ``every``: each step is recorded at fixed points; ``t_end`` ends the approach.
+        As for :func:`solve`, without ``chord`` and ``every``: each step is recorded at fixed
+        points; ``t_end`` ends the approach.
 
     Returns
     -------
@@ -790,8 +895,12 @@ def funnel(
         "until_two_fold": bool(until_two_fold),
     }
     for name in ("switch", "exit"):
-        _refuse({name: options.get(name)}, "a funnel is of the discontinuous system, with every exit")
-    system, question = _spec(system, start, t_end, _path(None, None), grid, **{**options, "switch": "filippov"})
+        _refuse(
+            {name: options.get(name)}, "a funnel is of the discontinuous system, with every exit"
+        )
+    system, question = _spec(
+        system, start, t_end, _path(None, None), grid, **{**options, "switch": "filippov"}
+    )
     answer = _answer(system, question, progress)
     assert isinstance(answer, Funnel)
     return answer
@@ -807,7 +916,8 @@ def spec(
     every: Optional[float] = None,
     **options: Any,
 ) -> Dict[str, Any]:
-    """A run as data, computing nothing: what ``twofold run --print-spec`` prints. ``plane`` records crossings, else the path is recorded.
+    """A run as data, computing nothing: what ``twofold run --print-spec`` prints. ``plane`` records
+    crossings, else the path is recorded.
 
     The other arguments are those of :func:`solve`. See :func:`run_spec`.
     """
@@ -815,23 +925,36 @@ def spec(
     if plane is None:
         observe: Any = _path(chord, every)
     else:
-        _refuse({"chord": chord, "every": every}, "crossings of a plane are recorded where they are")
+        _refuse(
+            {"chord": chord, "every": every}, "crossings of a plane are recorded where they are"
+        )
         observe = _plane(system, plane)
     return _spec(system, start, t_end, observe, **options)[1]
 
 
 def _given(spec: Union[str, bytes, Mapping[str, Any]]) -> Tuple[System, Dict[str, Any]]:
     try:
-        data = json.loads(spec) if isinstance(spec, (str, bytes)) else json.loads(json.dumps(spec, allow_nan=False))
+        data = (
+            json.loads(spec)
+            if isinstance(spec, (str, bytes))
+            else json.loads(json.dumps(spec, allow_nan=False))
+        )
     except ValueError as error:
         raise SpecError(f"the spec is not JSON: {error}", "spec") from None
     if not isinstance(data, dict) or not isinstance(data.get("system"), dict):
-        raise SpecError("a spec is a JSON object with system, switch, start, t_end, method, schedule and observe", "spec")
+        raise SpecError(
+            "a spec is a JSON object with system, switch, start, t_end, method, schedule and "
+            "observe",
+            "spec",
+        )
     return System.from_json(json.dumps(data["system"]), "spec"), data
 
 
-def run_spec(spec: Union[str, bytes, Mapping[str, Any]], *, progress: Progress = False) -> Union[Solution, Section, Funnel]:
-    """Computes a run given as data: JSON text (``twofold run --print-spec``), or the same as a dict.
+def run_spec(
+    spec: Union[str, bytes, Mapping[str, Any]], *, progress: Progress = False
+) -> Union[Solution, Section, Funnel]:
+    """Computes a run given as data: JSON text (``twofold run --print-spec``), or the same as a
+    dict.
 
     Returns
     -------
@@ -841,14 +964,17 @@ def run_spec(spec: Union[str, bytes, Mapping[str, Any]], *, progress: Progress =
     return _answer(*_given(spec), progress)
 
 
-def written(spec: Union[str, bytes, Mapping[str, Any]], format: str = "csv", *, progress: Progress = False) -> bytes:
-    """The very bytes that ``twofold run --spec SPEC --format FORMAT`` writes; ``format`` is "csv" or "json"."""
+def written(
+    spec: Union[str, bytes, Mapping[str, Any]], format: str = "csv", *, progress: Progress = False
+) -> bytes:
+    """The very bytes that ``twofold run --spec SPEC --format FORMAT`` writes; ``format`` is "csv"
+    or "json"."""
     _, data = _given(spec)
     with Shown(progress) as show:
         return bytes(_native.written(json.dumps(data, allow_nan=False), format, show))
 
 
-# Outcomes of runs ------------------------------------------------------------------------------------------------------------------
+# Outcomes of runs ---------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -856,7 +982,8 @@ class Classification:
     """What a run settles on."""
 
     name: str
-    """"periodic", "spiralling", "quasi-periodic", "chaotic", "undecided", "noisy", "escaped" or "too-few"."""
+    """"periodic", "spiralling", "quasi-periodic", "chaotic", "undecided", "noisy", "escaped" or
+    "too-few"."""
     summary: str
     """The same in one line."""
     evidence: Dict[str, Any] = field(repr=False)
@@ -890,7 +1017,8 @@ class Classification:
 
     @property
     def rate(self) -> Optional[float]:
-        """Rate per unit time at which the distance from the closed orbit shrinks, where it could be fitted."""
+        """Rate per unit time at which the distance from the closed orbit shrinks, where it could be
+        fitted."""
         approach = self._cycle.get("approach")
         return None if approach is None else approach["per_time"]
 
@@ -914,32 +1042,38 @@ def classify(
     progress: Progress = False,
     **options: Any,
 ) -> Classification:
-    """Says what a run settles on, judged from its crossings of a plane; systems of two states and more.
+    """Says what a run settles on, judged from its crossings of a plane; systems of two states and
+    more.
 
     The arguments are those of :func:`section`. A chaotic run's largest exponent is computed too.
     """
     question = spec(system, start, t_end, plane=plane, **options)
     with Shown(progress) as show:
-        return _classification(json.loads(_native.classify(json.dumps(question, allow_nan=False), show)))
+        return _classification(
+            json.loads(_native.classify(json.dumps(question, allow_nan=False), show))
+        )
 
 
 class Sweep:
     """Where many runs end: a row a run, in order."""
 
     table: Table
-    """The rows: first what was varied, then ``outcome``, ``period``, ``captured_at``, ``settled_at``, ``radius``, ``rate``, ``rate_error``, ``turn``,
-    ``exponent``, ``exponent_error``, ``crossings``, ``end``, ``steps``, ``reason``. NaN where there is nothing to say. Times are in the system's unit of time,
-    rates and exponents per unit of time."""
+    """The rows: first what was varied, then ``outcome``, ``period``, ``captured_at``,
+    ``settled_at``, ``radius``, ``rate``, ``rate_error``, ``turn``, ``exponent``,
+    ``exponent_error``, ``crossings``, ``end``, ``steps``, ``reason``. NaN where there is nothing to
+    say. Times are in the system's unit of time, rates and exponents per unit of time."""
     csv: Optional[bytes]
-    """The same as the very bytes that ``twofold sweep --out FILE.csv`` writes; None for runs from a list of starts."""
+    """The same as the very bytes that ``twofold sweep --out FILE.csv`` writes; None for runs from a
+    list of starts."""
 
     def __init__(self, table: Table, csv: Optional[bytes]) -> None:
         self.table, self.csv = table, csv
 
     @property
     def ends(self) -> List[str]:
-        """Where each run ends: "rest", "period-1", "leaving-period-1", "quasi-periodic", "irregular", "undecided", "noisy", "noisy-around-period-1", "far",
-        "escaped", "too-few" or "failed"."""
+        """Where each run ends: "rest", "period-1", "leaving-period-1", "quasi-periodic",
+        "irregular", "undecided", "noisy", "noisy-around-period-1", "far", "escaped", "too-few" or
+        "failed"."""
         return [str(word) for word in self.table["outcome"]]
 
     @property
@@ -961,9 +1095,11 @@ class Sweep:
 
 
 def shifted(start: ArrayLike, runs: int, shift: float, state: int = 0) -> Floats:
-    """Starts that differ by almost nothing: ``start`` with one state shifted by ``shift``, twice ``shift``, ...; shape (runs, states).
+    """Starts that differ by almost nothing: ``start`` with one state shifted by ``shift``, twice
+    ``shift``, ...; shape (runs, states).
 
-    These are the starts of ``twofold sweep --runs RUNS --shift SHIFT``, and of ``over="shift.x=SHIFT*RUNS"``.
+    These are the starts of ``twofold sweep --runs RUNS --shift SHIFT``, and of
+    ``over="shift.x=SHIFT*RUNS"``.
     """
     starts = np.tile(np.asarray(start, dtype=np.float64), (_count("runs", runs), 1))
     starts[:, state] += np.arange(1, runs + 1) * float(shift)
@@ -971,8 +1107,9 @@ def shifted(start: ArrayLike, runs: int, shift: float, state: int = 0) -> Floats
 
 
 _OUTCOME = {
-    "outcome": "", "period": 0, "captured_at": None, "settled_at": None, "radius": None, "rate": None, "rate_error": None, "turn": None,
-    "exponent": None, "exponent_error": None, "crossings": 0, "end": None, "steps": 0, "reason": "",
+    "outcome": "", "period": 0, "captured_at": None, "settled_at": None, "radius": None,
+    "rate": None, "rate_error": None, "turn": None, "exponent": None, "exponent_error": None,
+    "crossings": 0, "end": None, "steps": 0, "reason": "",
 }  # fmt: skip
 
 
@@ -984,8 +1121,16 @@ def _outcomes(names: Sequence[str], starts: Floats, rows: Sequence[Dict[str, Any
         if outcome is None:
             found.append({**_OUTCOME, "outcome": "failed", "reason": row["error"]})
         else:
-            found.append({**_OUTCOME, **{k: v for k, v in outcome.items() if k != "word"}, "outcome": outcome["word"]})
-    columns: Dict[str, Any] = {f"start.{name}": np.ascontiguousarray(starts[:, i]) for i, name in enumerate(names)}
+            found.append(
+                {
+                    **_OUTCOME,
+                    **{k: v for k, v in outcome.items() if k != "word"},
+                    "outcome": outcome["word"],
+                }
+            )
+    columns: Dict[str, Any] = {
+        f"start.{name}": np.ascontiguousarray(starts[:, i]) for i, name in enumerate(names)
+    }
     for name, usual in _OUTCOME.items():
         values = [row[name] for row in found]
         if usual is None:
@@ -1008,15 +1153,19 @@ def sweep(
     progress: Progress = False,
     **options: Any,
 ) -> Sweep:
-    """Varies any number of a run, or takes many starts, and says where each run ends. Runs are computed side by side.
+    """Varies any number of a run, or takes many starts, and says where each run ends. Runs are
+    computed side by side.
 
     Parameters
     ----------
     start : array_like
-        Shape (runs, states): a run from each of these starts (see :func:`shifted`). Shape (states,), or nothing: one start, and ``over`` says what varies.
+        Shape (runs, states): a run from each of these starts (see :func:`shifted`). Shape
+        (states,), or nothing: one start, and ``over`` says what varies.
     over : list of str
-        What varies, as ``twofold sweep --over`` has it: ``"params.alpha=0.1,0.2"``, ``"interval=20,40,100"`` (between restarts),
-        ``"shift.x=1e-9*40"``, ``"eps=1e-4..1e-2:log:20"``; ``"start.x=-1..1"`` is drawn at random. All combinations are computed, the last axis fastest.
+        What varies, as ``twofold sweep --over`` has it: ``"params.alpha=0.1,0.2"``,
+        ``"interval=20,40,100"`` (between restarts), ``"shift.x=1e-9*40"``,
+        ``"eps=1e-4..1e-2:log:20"``; ``"start.x=-1..1"`` is drawn at random. All combinations are
+        computed, the last axis fastest.
     random, random_seed : int
         How often random axes are drawn, and the seed of the draws [default 2013].
     threads : int
@@ -1032,7 +1181,8 @@ def sweep(
     Examples
     --------
     >>> import twofold
-    >>> twofold.sweep("caricature", None, 20.0, plane="y=0", over=["interval=5,10", "shift.x=1e-9*2"]).counts
+    >>> over = ["interval=5,10", "shift.x=1e-9*2"]
+    >>> twofold.sweep("caricature", None, 20.0, plane="y=0", over=over).counts
     {'too-few': 4}
     """
     system = as_system(system)
@@ -1042,15 +1192,31 @@ def sweep(
         if over is None:
             raise SpecError("give over: what varies; or starts of the shape (runs, states)", "over")
         if random is None:
-            _refuse({"random_seed": random_seed}, "nothing is drawn at random; give random, the number of draws")
-        draws = None if random is None else (_count("random", random), 2013 if random_seed is None else _count("random_seed", random_seed))
+            _refuse(
+                {"random_seed": random_seed},
+                "nothing is drawn at random; give random, the number of draws",
+            )
+        draws = (
+            None
+            if random is None
+            else (
+                _count("random", random),
+                2013 if random_seed is None else _count("random_seed", random_seed),
+            )
+        )
         question = json.dumps(spec(system, given, t_end, plane=plane, **options), allow_nan=False)
         with Shown(progress) as show:
-            columns, csv = _native.sweep(question, [over] if isinstance(over, str) else list(over), draws, workers, show)
+            columns, csv = _native.sweep(
+                question, [over] if isinstance(over, str) else list(over), draws, workers, show
+            )
         return Sweep(Table(columns), bytes(csv))
-    _refuse({"over": over, "random": random, "random_seed": random_seed}, "the starts say what varies")
+    _refuse(
+        {"over": over, "random": random, "random_seed": random_seed}, "the starts say what varies"
+    )
     if given.ndim != 2 or len(given) == 0:
-        raise SpecError(f"the starts have the shape {given.shape}: give (runs, states), a run at least", "start")
+        raise SpecError(
+            f"the starts have the shape {given.shape}: give (runs, states), a run at least", "start"
+        )
     question = json.dumps(spec(system, given[0], t_end, plane=plane, **options), allow_nan=False)
     with Shown(progress) as show:
         rows = _native.fates(question, given.tolist(), workers, show)

@@ -15,7 +15,8 @@ from . import _native
 from .errors import DefinitionError
 
 Number = Union[int, float, str]
-"""A number, or its digits as a string: digits beyond double precision are used by ``method="taylor-extended"``."""
+"""A number, or its digits as a string: digits beyond double precision are used by
+``method="taylor-extended"``."""
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -70,7 +71,11 @@ def _toml(
     text = "".join(f"{key} = {_text(word)}\n" for key, word in words.items() if word)
     if references:
         text += _texts("references", references)
-    text += "states = [" + ", ".join(_text(s) if isinstance(s, str) else table(s, "states") for s in states) + "]\n"
+    text += (
+        "states = ["
+        + ", ".join(_text(s) if isinstance(s, str) else table(s, "states") for s in states)
+        + "]\n"
+    )
     if start is not None:
         text += "start = [" + ", ".join(_number(x, "start") for x in start) + "]\n"
     if axes:
@@ -79,12 +84,22 @@ def _toml(
     if second is not None:
         unknown = set(second) ^ {"h", "plus", "minus"}
         if unknown:
-            raise TypeError(f'second is {{"h": "...", "plus": [...], "minus": [...]}}: look at {sorted(unknown)}')
-        text += f"[second]\nh = {_text(second['h'])}\n" + _texts("plus", second["plus"]) + _texts("minus", second["minus"])
+            raise TypeError(
+                f'second is {{"h": "...", "plus": [...], "minus": [...]}}: look at '
+                f'{sorted(unknown)}'
+            )
+        text += (
+            f"[second]\nh = {_text(second['h'])}\n"
+            + _texts("plus", second["plus"])
+            + _texts("minus", second["minus"])
+        )
     if parameters:
         text += "[parameters]\n"
         for name, value in parameters.items():
-            text += f"{_key(name)} = {table(value, name) if isinstance(value, Mapping) else _number(value, name)}\n"
+            text += (
+                f"{_key(name)} = "
+                f"{table(value, name) if isinstance(value, Mapping) else _number(value, name)}\n"
+            )
     if let:
         text += "[let]\n" + "".join(f"{_key(name)} = {_text(term)}\n" for name, term in let.items())
     return text
@@ -100,8 +115,8 @@ class System:
     - ``System(text)``: the text of such a file;
     - ``System(states=[...], h="...", plus=[...], minus=[...], parameters={...})``: expressions.
 
-    Expressions have ``+ - * / ^``, parentheses, and the functions that the file format knows (``docs/python.md``). Where one is wrong,
-    :class:`twofold.DefinitionError` points to it.
+    Expressions have ``+ - * / ^``, parentheses, and the functions that the file format knows
+    (``docs/python.md``). Where one is wrong, :class:`twofold.DefinitionError` points to it.
 
     Parameters
     ----------
@@ -114,10 +129,11 @@ class System:
     plus, minus : list of str
         The vector fields where h > 0 and where h < 0: one expression a state, the derivatives.
     second : dict, optional
-        A second switching surface, ``{"h": "...", "plus": [...], "minus": [...]}``: ``plus`` and ``minus`` above then hold where its h is positive,
-        its own where that is negative.
+        A second switching surface, ``{"h": "...", "plus": [...], "minus": [...]}``: ``plus`` and
+        ``minus`` above then hold where its h is positive, its own where that is negative.
     parameters : dict of str to number, optional
-        ``{"alpha": 0.1}``, ``{"alpha": "0.1000000000000000000001"}`` or ``{"alpha": {"value": 0.1, "meaning": "...", "unit": "..."}}``.
+        ``{"alpha": 0.1}``, ``{"alpha": "0.1000000000000000000001"}`` or ``{"alpha": {"value": 0.1,
+        "meaning": "...", "unit": "..."}}``.
     let : dict of str to str, optional
         Intermediate terms, in any order.
     start : list of numbers, optional
@@ -136,13 +152,15 @@ class System:
 
     Notes
     -----
-    Systems are values: they do not change, and are equal if their definitions (texts included) and parameters are.
+    Systems are values: they do not change, and are equal if their definitions (texts included) and
+    parameters are.
 
     Examples
     --------
     >>> import twofold
     >>> block = twofold.System(
-    ...     states=["x", "v"], h="v - belt", plus=["v", "-x - friction"], minus=["v", "-x + friction"],
+    ...     states=["x", "v"], h="v - belt",
+    ...     plus=["v", "-x - friction"], minus=["v", "-x + friction"],
     ...     parameters={"belt": 0.3, "friction": 1},
     ... )
     >>> block.with_(friction=0.5).parameters
@@ -172,14 +190,45 @@ class System:
     ) -> None:
         if source is None:
             if states is None or h is None or plus is None or minus is None:
-                raise TypeError("give a name, a file or a text, or else states=, h=, plus= and minus=")
+                raise TypeError(
+                    "give a name, a file or a text, or else states=, h=, plus= and minus="
+                )
             words = {"name": name, "title": title, "about": about}
-            text = _toml(states, h, plus, minus, second, parameters or {}, let or {}, start, axes, references, words)
+            text = _toml(
+                states,
+                h,
+                plus,
+                minus,
+                second,
+                parameters or {},
+                let or {},
+                start,
+                axes,
+                references,
+                words,
+            )
             self._definition = _native.Definition.from_toml(text, "<expressions>")
             return
-        others = (states, h, plus, minus, second, parameters, let, start, axes, name, title, about, references)
+        others = (
+            states,
+            h,
+            plus,
+            minus,
+            second,
+            parameters,
+            let,
+            start,
+            axes,
+            name,
+            title,
+            about,
+            references,
+        )
         if any(other is not None and len(other) > 0 for other in others):
-            raise TypeError("a name, a file or a text says everything: leave the other arguments out, or use with_(...)")
+            raise TypeError(
+                "a name, a file or a text says everything: leave the other arguments out, or use "
+                "with_(...)"
+            )
         self._definition = _native_from(source)
 
     @classmethod
@@ -203,7 +252,11 @@ class System:
         """Reads a file; JSON if its name ends in ``.json``, else TOML."""
         path = Path(path)
         text = path.read_text(encoding="utf-8")
-        return cls.from_json(text, str(path)) if path.suffix.lower() == ".json" else cls.from_toml(text, str(path))
+        return (
+            cls.from_json(text, str(path))
+            if path.suffix.lower() == ".json"
+            else cls.from_toml(text, str(path))
+        )
 
     def with_(self, **parameters: Number) -> System:
         """The same system with other values of some parameters: ``system.with_(alpha=0.2)``.
@@ -248,7 +301,9 @@ class System:
     @property
     def meanings(self) -> Dict[str, str]:
         """What states and parameters are, where the definition says so, with their units."""
-        rows = [(n, m, u) for n, m, u in self._definition.states] + [(n, m, u) for n, _, _, m, u in self._definition.parameters]
+        rows = [(n, m, u) for n, m, u in self._definition.states] + [
+            (n, m, u) for n, _, _, m, u in self._definition.parameters
+        ]
         return {n: f"{m} [{u}]" if u else m for n, m, u in rows if m or u}
 
     @property
@@ -273,11 +328,13 @@ class System:
         return self._definition.minus
 
     def evaluate(self, x: ArrayLike) -> Tuple[float, NDArray[np.float64], NDArray[np.float64]]:
-        """h, f+ and f- at the point ``x``, shape (states,): a number and two arrays of that shape."""
+        """h, f+ and f- at the point ``x``, shape (states,): a number and two arrays of that
+        shape."""
         return self._definition.evaluate(np.ascontiguousarray(x, dtype=np.float64))
 
     def to_toml(self) -> str:
-        """The definition as a file, with the values that it gives to parameters; values set by :meth:`with_` are not in it."""
+        """The definition as a file, with the values that it gives to parameters; values set by
+        :meth:`with_` are not in it."""
         return self._definition.to_toml()
 
     def to_json(self) -> str:
@@ -285,17 +342,28 @@ class System:
         return self._definition.to_json()
 
     def __eq__(self, other: object) -> bool:
-        return self._definition == other._definition if isinstance(other, System) else NotImplemented
+        return (
+            self._definition == other._definition if isinstance(other, System) else NotImplemented
+        )
 
     def __hash__(self) -> int:
         return hash(self.to_json())
 
     def __reduce__(self) -> Tuple[Any, ...]:
-        return (_restored, (self._definition.to_toml(), [(name, digits) for name, _, digits, _, _ in self._definition.parameters]))
+        return (
+            _restored,
+            (
+                self._definition.to_toml(),
+                [(name, digits) for name, _, digits, _, _ in self._definition.parameters],
+            ),
+        )
 
     def __repr__(self) -> str:
-        values = ", ".join(f"{name}={digits}" for name, _, digits, _, _ in self._definition.parameters)
-        return f"<twofold.System {self.name or 'without name'}: {', '.join(self.states)}{'; ' + values if values else ''}>"
+        values = ", ".join(
+            f"{name}={digits}" for name, _, digits, _, _ in self._definition.parameters
+        )
+        return (f"<twofold.System {self.name or 'without name'}: "
+                f"{', '.join(self.states)}{'; ' + values if values else ''}>")
 
 
 def _restored(definition: str, values: List[Tuple[str, str]]) -> System:

@@ -1,14 +1,14 @@
 """The errors of :mod:`twofold`. All derive from :class:`TwofoldError`.
 
-==================== ========================= ==================================================================
-class                is also a                 means
-==================== ========================= ==================================================================
-``DefinitionError``  ``ValueError``            a system's definition is wrong: where, and what to do
-``ParameterError``   ``ValueError``            no such parameter, or no such value
-``SpecError``        ``ValueError``            a run's argument is wrong, or has no effect on this run
-``ComputationError`` ``RuntimeError``          the run was sound, but could not be computed to its end
-``InternalError``    ``RuntimeError``          a defect of the library: please report it
-==================== ========================= ==================================================================
+==================== ================== ============================================================
+class                is also a          means
+==================== ================== ============================================================
+``DefinitionError``  ``ValueError``     a system's definition is wrong: where, and what to do
+``ParameterError``   ``ValueError``     no such parameter, or no such value
+``SpecError``        ``ValueError``     a run's argument is wrong, or has no effect on this run
+``ComputationError`` ``RuntimeError``   the run was sound, but could not be computed to its end
+``InternalError``    ``RuntimeError``   a defect of the library: please report it
+==================== ================== ============================================================
 
 Ctrl-C raises :class:`KeyboardInterrupt`, as everywhere.
 """
@@ -17,7 +17,14 @@ from __future__ import annotations
 
 from typing import Optional
 
-__all__ = ["TwofoldError", "DefinitionError", "ParameterError", "SpecError", "ComputationError", "InternalError"]
+__all__ = [
+    "TwofoldError",
+    "DefinitionError",
+    "ParameterError",
+    "SpecError",
+    "ComputationError",
+    "InternalError",
+]
 
 
 class TwofoldError(Exception):
@@ -38,7 +45,8 @@ class DefinitionError(TwofoldError, ValueError):
     message: str
     """What is wrong, in one line."""
     origin: Optional[str]
-    """The file's name, or ``<expressions>`` for a system given as arguments; None if no place is known."""
+    """The file's name, or ``<expressions>`` for a system given as arguments; None if no place is
+    known."""
     line: Optional[int]
     """Line in the text, from 1."""
     column: Optional[int]
@@ -75,7 +83,8 @@ class ParameterError(TwofoldError, ValueError):
 
 
 class SpecError(TwofoldError, ValueError):
-    """An argument of a run is wrong, or would have no effect on this run: nothing is ignored silently."""
+    """An argument of a run is wrong, or would have no effect on this run: nothing is ignored
+    silently."""
 
     field: str
     """The argument's name."""
@@ -86,8 +95,9 @@ class SpecError(TwofoldError, ValueError):
 
 
 class ComputationError(TwofoldError, RuntimeError):
-    """The computation could not be carried out: the step size fell to nothing, the budget of steps was used up, the orbit escaped,
-    a point was reached where the rules say nothing, or more points came than are kept."""
+    """The computation could not be carried out: the step size fell to nothing, the budget of steps
+    was used up, the orbit escaped, a point was reached where the rules say nothing, or more points
+    came than are kept."""
 
 
 class InternalError(TwofoldError, RuntimeError):
