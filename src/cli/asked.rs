@@ -56,7 +56,7 @@ pub fn recorded(flags: &RunFlags, command: Use) -> Result<Recorded, CliError> {
     })
 }
 
-/// What one of [`COMMANDS`] asks with these flags.
+/// The question of one of [`COMMANDS`] with these flags.
 ///
 /// # Errors
 /// If there is no such command, a flag has no effect, or a value is wrong.

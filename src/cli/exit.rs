@@ -82,7 +82,7 @@ pub enum CliError {
     /// A file could not be read or written.
     #[error("{source}{}", advice(source))]
     File {
-        /// Which, and why.
+        /// The file, and why.
         #[from]
         source: FileError,
     },
@@ -92,7 +92,7 @@ pub enum CliError {
     /// Threads could not be started.
     #[error("--threads {threads}: {reason}; give a smaller number, or 0 for one per core")]
     Threads {
-        /// How many.
+        /// The number of threads.
         threads: usize,
         /// Why.
         reason: String,

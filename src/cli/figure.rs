@@ -275,7 +275,7 @@ fn say_how(
         return Ok(());
     }
     let path = arguments.out.join(names::MAKING);
-    // What cannot be read is not worth keeping.
+    // A file that cannot be read is not worth keeping.
     let before: Makings =
         read(&path).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok()).unwrap_or_default();
     let threads = in_pool(arguments.threads, rayon::current_num_threads)?;

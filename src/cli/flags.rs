@@ -32,7 +32,7 @@ pub struct RunFlags {
     /// Give a parameter of the system another value; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true, help_heading = "System")]
     pub set: Vec<String>,
-    /// What stands in for the discontinuity [default: smoothed].
+    /// Rule in place of the discontinuity [default: smoothed].
     #[arg(long, value_enum, help_heading = "System")]
     pub switch: Option<Switch>,
     /// Parameters of the caricature: alpha = 1e-3 as the paper prints it, or 1e-1 as its figures
@@ -54,13 +54,13 @@ pub struct RunFlags {
     /// Delay of the delayed switch.
     #[arg(long, allow_hyphen_values = true, help_heading = "System")]
     pub delay: Option<f64>,
-    /// Where the orbit was before the start of a run with a delayed switch [default: constant].
+    /// Orbit before the start of a run with a delayed switch [default: constant].
     #[arg(long, value_enum, help_heading = "System")]
     pub history: Option<History>,
     /// Half the width of a relay's band.
     #[arg(long, allow_hyphen_values = true, help_heading = "System")]
     pub band: Option<f64>,
-    /// What a relay begins with where the start lies inside its band [default: sign].
+    /// Initial field of a relay whose start lies inside its band [default: sign].
     #[arg(long, value_enum, help_heading = "System")]
     pub inside: Option<Inside>,
     /// Width of the layer of a smoothed switch, or half the band of a hysteretic one [default:
@@ -76,7 +76,7 @@ pub struct RunFlags {
     /// Relaxation time of the hysteretic switch [default: 10 eps].
     #[arg(long, allow_hyphen_values = true, help_heading = "System")]
     pub eps_prime: Option<f64>,
-    /// How the two divisions by eps-prime in eq. (10) are read: both, as printed, or one [default:
+    /// Reading of the two divisions by eps-prime in eq. (10): both, as printed, or one [default:
     /// literal].
     #[arg(long, value_enum, help_heading = "System")]
     pub hysteresis: Option<Relaxation>,
@@ -131,16 +131,16 @@ pub struct RunFlags {
     /// Distribution of a kick [default: sphere].
     #[arg(long, value_enum, help_heading = "Schedule")]
     pub kick_law: Option<KickLaw>,
-    /// How repelling sliding ends (with --switch filippov): at-once:SIDE, after-time:T:SIDE,
+    /// End of repelling sliding (with --switch filippov): at-once:SIDE, after-time:T:SIDE,
     /// after-arc:L:SIDE, with SIDE plus or minus; random:exponential:MEAN or random:uniform:LONGEST
     /// (see --seed, --stream, --plus-probability); all. Without it a run ends with an error where a
     /// choice is needed.
     #[arg(long, value_name = "RULE", allow_hyphen_values = true, help_heading = "Filippov motion")]
     pub exit: Option<String>,
-    /// Which mixture a general system takes on several surfaces at once where mixtures of its
-    /// fields have different velocities [default: none, an error]: bilinear (products of one weight
-    /// for each surface: equally steep smoothed switches), hull-least-norm (the shortest velocity
-    /// of Filippov's hull that stays on the surfaces), or order:EXPRESSION,... (a hierarchy of the
+    /// Mixture that a general system takes on several surfaces at once if mixtures of its fields
+    /// have different velocities [default: none, an error]: bilinear (products of one weight for
+    /// each surface: equally steep smoothed switches), hull-least-norm (the shortest velocity of
+    /// Filippov's hull that stays on the surfaces), or order:EXPRESSION,... (a hierarchy of the
     /// switching functions that meet, the fastest first).
     #[arg(long, value_name = "RULE", allow_hyphen_values = true, help_heading = "Filippov motion")]
     pub intersection: Option<String>,

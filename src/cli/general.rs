@@ -166,7 +166,7 @@ pub fn looked_at(flags: &RunFlags, period: Option<f64>) -> Result<Option<General
             ));
         }
         (Some(period), _) if period.is_finite() && period > 0.0 => {
-            // Whole periods, so that the next run can begin at the same phase.
+            // A whole number of periods, so that the next run can begin at the same phase.
             options.t_end =
                 options.t_start + ((options.t_end - options.t_start) / period).ceil() * period;
             options.record = Record::Times { every: period };

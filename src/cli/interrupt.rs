@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
 
 use super::Exit;
 
-/// How many graces are asked for at present.
+/// Number of graces that are requested at present.
 static GRACES: AtomicUsize = AtomicUsize::new(0);
 /// The exit code of the signal that came; 0 before.
 static CAME: AtomicU8 = AtomicU8::new(0);

@@ -30,7 +30,7 @@ pub struct Progress {
     style: Style,
     grace: Option<Grace>,
     begun: Instant,
-    /// What was computed, and the seconds it took.
+    /// Computations, and the seconds that each took.
     computed: Mutex<Vec<(String, f64)>>,
 }
 

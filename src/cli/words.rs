@@ -58,7 +58,7 @@ mirror! {
 }
 
 mirror! {
-    /// Where the orbit was before the start.
+    /// Orbit before the start.
     History = integrate::delay::History {
         /// At the start, all the time.
         Constant,
@@ -68,7 +68,7 @@ mirror! {
 }
 
 mirror! {
-    /// What a relay begins with inside its band.
+    /// Initial field of a relay inside its band.
     Inside = integrate::delay::Inside {
         /// f+ where h > 0, f- otherwise.
         Sign,
@@ -92,7 +92,7 @@ mirror! {
 }
 
 mirror! {
-    /// How eq. (10)'s two divisions by eps' are read.
+    /// Reading of the two divisions by eps' in eq. (10).
     Relaxation = system::Relaxation {
         /// As printed: psi divides by eps' once more.
         Literal,
@@ -124,7 +124,7 @@ pub enum Transition {
     Erf,
 }
 
-/// Which readings to make.
+/// Readings to make.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Readings {
     /// As printed.

@@ -24,16 +24,16 @@ use crate::system::diagnostic::nearest;
 pub struct ClaimFile {
     /// A name of its own.
     pub id: Spanned<String>,
-    /// Where the paper says it: "sec. 4.2, fig. 7(ii)".
+    /// Place in the paper: "sec. 4.2, fig. 7(ii)".
     place: String,
-    /// What it says, in our words, so that it can be measured.
+    /// The claim in our words, so that it can be measured.
     says: String,
     /// Its own words, a few of them.
     #[serde(default)]
     quote: String,
     /// The day on which the rule was fixed.
     decided: Datetime,
-    /// What was found beside the outcome: what was tried, what the paper leaves open.
+    /// Remarks beside the outcome: what was tried, what the paper leaves open.
     #[serde(default)]
     note: String,
     /// The kind of check.
@@ -50,7 +50,8 @@ pub struct ClaimFile {
     column: Option<Spanned<String>>,
     /// The table [default: the first].
     table: Option<Spanned<String>>,
-    /// What of the column, or of a complex fact: last, first, max, min, mean, span, count, modulus.
+    /// Quantity of the column, or of a complex fact: last, first, max, min, mean, span, count,
+    /// modulus.
     take: Option<Spanned<String>>,
     /// The paper's value.
     equals: Option<Spanned<f64>>,
@@ -58,7 +59,7 @@ pub struct ClaimFile {
     within: Option<Spanned<f64>>,
     /// Less or greater.
     relation: Option<Spanned<String>>,
-    /// What the value is compared with.
+    /// Number with which the value is compared.
     than: Option<Spanned<f64>>,
     /// A period of a section, in crossings.
     is: Option<Spanned<u64>>,
@@ -72,7 +73,7 @@ pub struct ClaimFile {
     odds: Option<Spanned<OddsFile>>,
 }
 
-/// How often a check is repeated.
+/// Repetitions of a check.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 struct OddsFile {
@@ -97,15 +98,15 @@ fn seed() -> u64 {
 pub struct Claim {
     /// A name of its own.
     pub id: String,
-    /// Where the paper says it.
+    /// Place in the paper.
     pub place: String,
-    /// What it says, in our words.
+    /// The claim, in our words.
     pub says: String,
     /// Its own words.
     pub quote: String,
     /// The day on which the rule was fixed.
     pub decided: String,
-    /// What was found beside the outcome.
+    /// Remarks beside the outcome.
     pub note: String,
     /// Digest of the rule: the check and all its numbers.
     pub rule: Hash,
@@ -483,7 +484,7 @@ impl Claim {
     }
 }
 
-/// Where a source's run begins.
+/// Start of a source's run.
 fn start(source: &Source) -> Result<Vec<f64>, FolderError> {
     let json = source.question.json();
     let numbers = json["start"]

@@ -1,4 +1,4 @@
-//! What came of making a paper: pictures' records and scored claims.
+//! Results of making a paper: pictures' records and scored claims.
 
 use super::check::{Claim, Verdict};
 use crate::job::JobError;

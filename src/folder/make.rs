@@ -73,7 +73,7 @@ impl Finding {
 }
 
 impl Folder {
-    /// Where outputs go.
+    /// Folder of outputs.
     pub fn out(&self) -> PathBuf {
         self.root.join("out")
     }

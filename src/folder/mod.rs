@@ -63,7 +63,7 @@ pub enum FolderError {
 /// A paper's folder, read and checked.
 #[derive(Debug)]
 pub struct Folder {
-    /// Where it lies.
+    /// Its path.
     pub root: PathBuf,
     files: Files,
     /// The paper.
@@ -72,12 +72,12 @@ pub struct Folder {
     common: Origin,
     /// Its figures, in the order of their names.
     pub figures: Vec<Figure>,
-    /// What in the paper each figure shows, in the same order.
+    /// The part of the paper that each figure shows, in the same order.
     pub shows: Vec<String>,
     /// Everything that claims may read, by name: "fig3/a" for a panel, in a reading
     /// "fig3/a@printed"; a measure by its own.
     pub sources: BTreeMap<String, Source>,
-    /// What it says.
+    /// Its claims.
     pub claims: Vec<Claim>,
 }
 
@@ -104,7 +104,7 @@ pub struct About {
     pub authors: Vec<String>,
     /// Year.
     pub year: u16,
-    /// Where it appeared.
+    /// Journal or proceedings.
     #[serde(default)]
     pub journal: String,
     /// Its digital object identifier.
@@ -113,14 +113,14 @@ pub struct About {
     /// Its number on arXiv.
     #[serde(default)]
     pub arxiv: String,
-    /// What it is about, in our words, and which text the equations were taken from.
+    /// Its subject, in our words, and the text from which the equations were taken.
     pub summary: String,
     /// The day on which the folder was published, for archives.
     pub published: Option<toml::value::Datetime>,
     /// The folder's licence for archives, by its SPDX name: "CC-BY-4.0".
     #[serde(default)]
     pub license: String,
-    /// What it leaves open.
+    /// Questions that it leaves open.
     #[serde(default)]
     pub open: Vec<String>,
     /// Words that hold for every run of a panel.
@@ -153,14 +153,14 @@ struct FigureFile {
     title: String,
     /// Caption, in our words.
     caption: String,
-    /// What in the paper it shows: "fig. 3".
+    /// The part of the paper that it shows: "fig. 3".
     #[serde(default)]
     shows: String,
     /// Panels in a row [default: at most three].
     columns: Option<Spanned<usize>>,
     /// The readings of which it has a picture [default: all].
     readings: Option<Vec<Spanned<String>>>,
-    /// How panels are drawn that do not say it.
+    /// Kind of drawing of panels that do not say it.
     draw: Option<Spanned<Draw>>,
     /// States on the axes of panels that do not say it.
     axes: Option<Spanned<Vec<String>>>,
@@ -179,14 +179,14 @@ struct PanelFile {
     /// A few words.
     #[serde(default)]
     title: String,
-    /// How it is drawn [default: as the figure says].
+    /// Kind of drawing [default: the figure's].
     draw: Option<Spanned<Draw>>,
     /// The run that it shows; of `draw = "columns"` nothing.
     run: Option<Spanned<Words>>,
-    /// What a reading changes in the run.
+    /// Changes of the run in a reading.
     #[serde(default)]
     r#in: BTreeMap<Spanned<String>, Spanned<Words>>,
-    /// What the paper says of a section or path drawn as `halves` or `surface`; the picture shows
+    /// The paper's claim about a section or path drawn as `halves` or `surface`; the picture shows
     /// the verdict.
     says: Option<Spanned<PanelClaim>>,
     /// Committed runs that repeat it, by study and name; the picture shows the share that supports
@@ -210,7 +210,7 @@ struct PanelFile {
     dots: bool,
     /// Titles of the two axes of columns [default: the columns' names].
     labels: Option<Spanned<[String; 2]>>,
-    /// What the legend calls the vertical columns [default: their names].
+    /// Names of the vertical columns in the legend [default: their own].
     names: Option<Spanned<Vec<String>>>,
     /// Numbers of the paper to be drawn over it.
     points: Option<Spanned<PointsFile>>,
@@ -230,7 +230,7 @@ enum Draw {
     Surface,
 }
 
-/// How a panel is drawn: as it says, or else as its figure does.
+/// Drawing of a panel: its own, or else its figure's.
 struct Drawn<'a> {
     draw: &'a Spanned<Draw>,
     axes: Option<&'a Spanned<Vec<String>>>,
@@ -241,7 +241,7 @@ struct Drawn<'a> {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 struct PointsFile {
-    /// What they are.
+    /// Name of the numbers.
     name: String,
     /// A CSV file of the folder whose first two columns are the horizontal and the vertical values.
     file: String,
@@ -275,7 +275,7 @@ type Origin = Arc<(String, String)>;
 /// The path of a file in the folder, and its text.
 pub type Embedded = &'static [(&'static str, &'static str)];
 
-/// Where a folder's files are.
+/// Place of a folder's files.
 #[derive(Clone, Debug)]
 enum Files {
     Disk(PathBuf),
@@ -344,7 +344,7 @@ impl Folder {
     /// something.
     ///
     /// # Errors
-    /// What is wrong first, with its file, place and remedy.
+    /// The first problem, with its file, place and remedy.
     pub fn read(root: &Path) -> Result<Self, FolderError> {
         Self::read_from(root, Files::Disk(root.to_owned()))
     }

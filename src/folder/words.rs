@@ -29,7 +29,7 @@ pub struct Words(BTreeMap<Spanned<String>, Spanned<Value>>);
 pub struct Said {
     /// Path of the file in the folder, and its text.
     pub origin: Origin,
-    /// Where the question stands in it.
+    /// Place of the question in it, in bytes.
     pub place: Range<usize>,
     flags: Vec<Flag>,
 }
@@ -39,7 +39,7 @@ pub struct Said {
 struct Flag {
     name: String,
     values: Vec<String>,
-    /// Where, if a file says it.
+    /// Its place, if a file says it.
     place: Option<(Origin, Range<usize>)>,
 }
 

@@ -13,7 +13,7 @@ use crate::record::{FileBytes, FileError, read_tree};
 
 pub use twofold_jeffrey_2013::{audit, census, data, delay, fig1, fig3, fig4};
 
-/// Where the paper stands in the sources.
+/// Folder of the paper in the sources.
 pub const FOLDER: &str = "papers/jeffrey-2013";
 
 macro_rules! files {
@@ -63,8 +63,8 @@ pub fn reference(id: &str) -> Option<&'static str> {
     FILES.iter().find(|f| f.0 == file).map(|f| f.1).or_else(|| twofold_jeffrey_2013::reference(id))
 }
 
-/// Where the references in `expected` (a checkout's `figures`, or a folder of the same form) keep
-/// that of a figure: NAME/expected.json there, or in the paper's folder if it is one of its own.
+/// Reference of a figure in `expected` (a checkout's `figures`, or a folder of the same form):
+/// NAME/expected.json there, or in the paper's folder if it is one of its own.
 pub fn reference_file(expected: &Path, id: &str) -> PathBuf {
     let own = expected.join("..").join(FOLDER).join(format!("expected/{id}.json"));
     if own.exists() { own } else { expected.join(id).join("expected.json") }

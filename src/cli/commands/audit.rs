@@ -44,7 +44,7 @@ pub struct Arguments {
     /// Threads; 0 is one per core.
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
-    /// What was found, row by row, as JSON on standard output.
+    /// The findings, row by row, as JSON on standard output.
     #[arg(long)]
     json: bool,
     /// No progress on standard error.

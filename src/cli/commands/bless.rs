@@ -34,7 +34,7 @@ pub struct Arguments {
     /// Threads; 0 is one per core.
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
-    /// What was done, as JSON on standard output.
+    /// A record of the work as JSON on standard output.
     #[arg(long)]
     json: bool,
     /// No progress on standard error.

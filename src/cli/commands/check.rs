@@ -22,9 +22,9 @@ use crate::record::{self, Layer, Manifest, listed};
 pub struct Arguments {
     /// Figures to check, such as fig7; all if none is named.
     figures: Vec<String>,
-    /// What to check against instead of figures/figN/expected.json: another manifest, or a folder
-    /// with published pictures (PNG, named like ours). A picture holds by the first of these that
-    /// does: same file, same pixels, few and slightly changed pixels, small RMS, high SSIM.
+    /// Reference to check against instead of figures/figN/expected.json: another manifest, or a
+    /// folder with published pictures (PNG, named like ours). A picture holds by the first of these
+    /// that does: same file, same pixels, few and slightly changed pixels, small RMS, high SSIM.
     #[arg(long, value_name = "DIR|MANIFEST")]
     against: Option<PathBuf>,
     /// Folder that holds figN/expected.json [default: the references that this program was built
@@ -34,7 +34,7 @@ pub struct Arguments {
     /// Threads; 0 is one per core.
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
-    /// What was found, as JSON on standard output when all is checked.
+    /// The findings, as JSON on standard output when all is checked.
     #[arg(long)]
     json: bool,
     /// No progress on standard error.

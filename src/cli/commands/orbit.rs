@@ -93,7 +93,7 @@ enum Format {
 const MOST_ORBITS: usize = 10_000;
 
 impl Arguments {
-    /// What is asked.
+    /// The question that the flags ask.
     ///
     /// # Errors
     /// If a flag has no effect, or a value is wrong.

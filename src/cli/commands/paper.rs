@@ -62,7 +62,7 @@ struct Flags {
     /// Threads; 0 is one per core. The bytes do not depend on it.
     #[arg(long, value_name = "N", default_value_t = 0)]
     threads: usize,
-    /// What was found, as JSON on standard output.
+    /// The findings, as JSON on standard output.
     #[arg(long)]
     json: bool,
     /// No progress on standard error.

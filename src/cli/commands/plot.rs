@@ -42,7 +42,7 @@ pub struct Arguments {
     /// the run are then refused.
     #[arg(long, value_name = "FILE", help_heading = "Picture")]
     from: Option<PathBuf>,
-    /// What is shown [default: section with --section, else by the number of axes that the system
+    /// Kind of picture [default: section with --section, else by the number of axes that the system
     /// suggests].
     #[arg(long, value_enum, help_heading = "Picture")]
     kind: Option<KindFlag>,
@@ -282,7 +282,7 @@ pub(super) fn small_print(spec: &RunSpec) -> Vec<String> {
     lines
 }
 
-/// How the flags want it.
+/// The look that the flags ask for.
 fn look(arguments: &Arguments, frame: &plot::Frame) -> Result<Look, CliError> {
     let kind = arguments.kind.map_or_else(|| plot::PictureKind::suiting(frame), Into::into);
     let names: Vec<&str> = frame.states.iter().map(|s| s.name.as_str()).collect();

@@ -46,7 +46,7 @@ pub struct Arguments {
     /// files instead of linking to them.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// What was written and found, as JSON on standard output.
+    /// The files written and the findings, as JSON on standard output.
     #[arg(long)]
     json: bool,
 }

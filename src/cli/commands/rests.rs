@@ -45,7 +45,7 @@ enum Format {
 }
 
 impl Arguments {
-    /// What is asked.
+    /// The question that the flags ask.
     ///
     /// # Errors
     /// If the system cannot be read, or a bound is wrong.

@@ -221,7 +221,7 @@ fn said_how_it_ended(run: &GeneralRun, answer: &Answer) -> Exit {
     Exit::Fine
 }
 
-/// What counts as agreement of orbits: nine digits.
+/// Largest difference between orbits that agree: nine digits.
 const AGREEMENT: f64 = 1e-9;
 
 fn say_horizon(run: &Run, progress: &Progress) -> Result<(), CliError> {
@@ -284,7 +284,7 @@ fn stopped_at(t: f64, rows: u64, part: Option<&Path>, exit: Exit) -> CliError {
     }
 }
 
-/// Where rows go as they come.
+/// Destination of rows as they come.
 enum Rows {
     File(Growing),
     Output,

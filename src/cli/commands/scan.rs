@@ -75,7 +75,7 @@ pub struct Arguments {
     delivery: Delivery,
 }
 
-/// What the rows of a scan are written as.
+/// Format of a scan's rows.
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
 enum Rows {
     Csv,
@@ -91,7 +91,7 @@ enum Direction {
     Both,
 }
 
-/// How the diagram's axis and its small print are made.
+/// Title, shown state, small print, method and hash of a diagram.
 struct Drawn {
     title: String,
     /// The state on the vertical axis of an orbit diagram.

@@ -45,7 +45,7 @@ enum Format {
 }
 
 impl Arguments {
-    /// What is asked.
+    /// The question that the flags ask.
     ///
     /// # Errors
     /// If a flag has no effect, or a value is wrong.

@@ -358,7 +358,7 @@ fn merged(arguments: &Merge) -> Result<Exit, CliError> {
     Ok(if ends == Exit::Fine { Exit::CheckFailed } else { ends })
 }
 
-/// What rows are written as.
+/// Format of the rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 enum Format {
     Csv,
@@ -404,7 +404,7 @@ fn json_of(rows: &Rows) -> Vec<u8> {
     bytes
 }
 
-/// How often each end occurred; and the first failure, if there is one.
+/// Prints the number of runs with each end, and the first failure, if there is one.
 fn summary(rows: &Rows, progress: &Progress) -> Result<Exit, CliError> {
     let counts = rows.counts();
     for (end, count) in &counts {
