@@ -14,6 +14,9 @@ const RUST: [&str; 10] = [
     "crates", "src", "figures", "tests", "proofs", "examples", "benches", "fuzz", "python", "tools",
 ];
 
+/// Folders with Python sources.
+const PYTHON: [&str; 4] = ["python", "scripts", "benches", "cluster"];
+
 /// Every Markdown file that people write, and its text without blocks that programs write.
 fn pages() -> Vec<(String, String)> {
     const FOLDERS: [&str; 9] = [
@@ -87,12 +90,23 @@ fn prose_has_at_most_100_columns() {
     assert!(long.is_empty(), "lines of more than 100 columns: {long:#?}");
 }
 
+/// Programs of the comparison with other solvers, whose lines it counts as they are written.
+const COUNTED: [&str; 2] = ["compare.py", "systems.py"];
+
 #[test]
-fn rust_has_at_most_100_columns() {
+fn rust_and_python_have_at_most_100_columns() {
     let mut files = Vec::new();
     for folder in RUST {
         files_of(&root().join(folder), &["rs"], &mut files);
     }
+    for folder in PYTHON {
+        files_of(&root().join(folder), &["py"], &mut files);
+    }
+    files.retain(|file| {
+        let hybrid = file.parent().is_some_and(|folder| folder.ends_with("benches/hybrid"));
+        !(hybrid && COUNTED.iter().any(|name| file.ends_with(name)))
+    });
+    assert!(files.iter().filter(|file| file.extension().is_some_and(|e| e == "py")).count() > 20);
     let mut long = Vec::new();
     for file in files {
         for (i, line) in fs::read_to_string(&file).unwrap().lines().enumerate() {
@@ -357,6 +371,47 @@ fn comments_do_not_begin_in_the_middle_of_a_sentence() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
+/// Lines, from 1, of comments in Rust that begin with "What" or "How": such a fragment says less
+/// than the noun that it stands for. A comment begins after code, a blank line or an empty comment.
+fn fragments(text: &str) -> Vec<usize> {
+    let comment = |line: &str| -> Option<(usize, String)> {
+        let line = line.trim_start();
+        let slashes = line.len() - line.trim_start_matches(['/', '!']).len();
+        line.starts_with("//").then(|| (slashes, line[slashes..].trim().to_owned()))
+    };
+    let mut before = None;
+    let mut found = Vec::new();
+    for (i, line) in text.lines().enumerate() {
+        let now = comment(line).filter(|(_, words)| !words.is_empty());
+        if let Some((kind, words)) = &now {
+            let goes_on = before.as_ref().is_some_and(|(other, _)| other == kind);
+            if !goes_on && ["What ", "How "].iter().any(|word| words.starts_with(word)) {
+                found.push(i + 1);
+            }
+        }
+        before = now;
+    }
+    found
+}
+
+#[test]
+fn no_comment_begins_with_a_fragment() {
+    let mut files = Vec::new();
+    for folder in RUST {
+        files_of(&root().join(folder), &["rs"], &mut files);
+    }
+    files.push(root().join("build.rs"));
+    let mut wrong = Vec::new();
+    for file in files {
+        let lines = fragments(&fs::read_to_string(&file).unwrap());
+        wrong.extend(lines.into_iter().map(|line| format!("{}:{line}", file.display())));
+    }
+    assert!(wrong.is_empty(), "name the item in the first word: {wrong:#?}");
+    assert_eq!(fragments("/// What it is.\nlet x;\n    // How it ends.\n"), [1, 3]);
+    assert_eq!(fragments("//! One.\n//!\n//! How to read it.\n"), [3]);
+    assert!(fragments("// Of that\n// What remains.\n/// Whether it is.\n").is_empty());
+}
+
 /// Words of the first versions with a meaning that only their authors knew, and pronouns that stand
 /// for a program, a caller or a user. STYLE: the field's word, and the thing itself.
 const PRIVATE: [&str; 19] = [
@@ -402,7 +457,7 @@ fn texts() -> Vec<(String, String)> {
     for folder in RUST {
         files_of(&root().join(folder), &["rs"], &mut files);
     }
-    for folder in ["python", "scripts", "benches", "cluster"] {
+    for folder in PYTHON {
         files_of(&root().join(folder), &["py", "sh"], &mut files);
     }
     let named = files.into_iter().map(|path| {
