@@ -232,13 +232,23 @@ fn root_between(q: &[f64], mut low: f64, mut high: f64) -> f64 {
             high = u
         }
         let newton = u - value / slope;
+        if settled(newton, u) {
+            return newton.clamp(low, high);
+        }
         let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-        if (next - u).abs() <= 2.0 * f64::EPSILON * u {
+        if settled(next, u) {
             return next;
         }
         u = next;
     }
     u
+}
+
+/// Whether Newton's method has come to its end. This is asked of its own step, not of one within the
+/// bounds: there the rounding of a value may say the wrong side of zero, and what is left to halve
+/// is most of the bracket.
+fn settled(newton: f64, u: f64) -> bool {
+    (newton - u).abs() <= 2.0 * f64::EPSILON * u
 }
 
 /// Number of sign changes among coefficients.
@@ -277,8 +287,11 @@ fn polynomial_root(v: &[f64; 5], side: f64) -> f64 {
             high = u
         }
         let newton = u - p / slope;
+        if settled(newton, u) {
+            return newton.clamp(low, high);
+        }
         let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-        if (next - u).abs() <= 2.0 * f64::EPSILON * u {
+        if settled(next, u) {
             return next;
         }
         u = next;
