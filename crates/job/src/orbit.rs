@@ -260,7 +260,8 @@ impl ClosedOrbit {
             return wrong(
                 "section",
                 self.plane.axis.to_string(),
-                "that is not the number of a state; they count from 0",
+                "there is no state of that number (they count from 0, and 1 is the default); \
+                 name another, as in --section x=0",
             );
         }
         if let Some(along) = &self.along {

@@ -605,7 +605,8 @@ impl RunSpec {
                     return wrong(
                         "section",
                         coordinate as f64,
-                        "that is not the number of a state; they count from 0",
+                        "there is no state of that number (they count from 0, and 1 is the \
+                         default); name another, as in --section x=0",
                     );
                 }
                 finite("section", value)

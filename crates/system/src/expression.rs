@@ -976,6 +976,9 @@ impl Parser<'_> {
                     .into()
             }
             None if name == "e" => "write exp(1) for the base of natural logarithms".into(),
+            None if self.names.is_empty() => {
+                "no names are known here; write numbers and functions of them".into()
+            }
             None => format!("known here: {}", self.names.join(", ")),
         };
         error(format!("unknown name `{name}`"), Some(help))
@@ -1199,6 +1202,8 @@ mod tests {
             assert!(error.message.contains(message), "{text}: {error:?}");
             assert!(error.help.clone().unwrap_or_default().contains(help), "{text}: {error:?}");
         }
+        let constant = Expression::parse_general("k", &[]).expect_err("there are no names");
+        assert!(constant.help.is_some_and(|help| help.contains("no names are known here")));
     }
 
     /// (text, how it is printed)

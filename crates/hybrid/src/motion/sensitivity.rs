@@ -115,10 +115,8 @@ fn with_states(model: &Model, parameters: &[&str]) -> Result<(Extended, Vec<f64>
         model.definition().parameters().iter().map(|p| p.name.as_str()).collect();
     for (i, name) in parameters.iter().enumerate() {
         if !known.contains(name) {
-            return Err(bad(format!(
-                "there is no parameter `{name}`; the system has {}",
-                known.join(", ")
-            )));
+            let known = if known.is_empty() { "none".into() } else { known.join(", ") };
+            return Err(bad(format!("there is no parameter `{name}`; the system has {known}")));
         }
         if parameters[..i].contains(name) {
             return Err(bad(format!("the parameter `{name}` is named twice")));
