@@ -116,9 +116,9 @@ pub fn figure() -> Figure {
     Figure::studied_in_both_readings(
         "basin",
         "Where starts lead",
-        "Starts on the plane y = 0, coloured by what becomes of the run: captured by the \
-            period-one orbit, by the period-three orbit, regular \
-         otherwise, still irregular, or on the way to the far state.",
+        "Starts on the plane y = 0, coloured by the outcome of the run: captured by the \
+         period-one orbit, by the period-three orbit, regular otherwise, still irregular, or on \
+         the way to the far state.",
         [
             Study {
                 questions: || vec![question(Reading::Printed)],

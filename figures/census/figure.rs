@@ -273,10 +273,9 @@ fn draw(tables: &[Table]) -> Sheet {
     sheet
         .footer(format!(
             "Runs to *t* = 200000 from starts shifted by less than 10^{{-9}}, LSODA at NDSolve's \
-                defaults, {} a panel. Below each bar of (a): share of runs \
-             that bear out what the paper says of the panel, with its 95 % interval (Wilson). (c) \
-             LSODA, Dormand-Prince (DP5) and Radau IIA at NDSolve's tolerance; \
-             Dormand-Prince at other tolerances.",
+             defaults, {} a panel. Below each bar of (a): share of runs that support the paper's \
+             claim about the panel, with its 95 % interval (Wilson). (c) LSODA, Dormand-Prince \
+             (DP5) and Radau IIA at NDSolve's tolerance; Dormand-Prince at other tolerances.",
             match [runs.iter().min(), runs.iter().max()].map(|n| n.copied().unwrap_or(0)) {
                 [fewest, most] if fewest == most => fewest.to_string(),
                 [fewest, most] => format!("{fewest} to {most}"),
@@ -309,12 +308,10 @@ pub fn figure() -> Figure {
         "census",
         "The odds of each outcome of figs 7 and 8",
         "(a) Where runs of each panel of figs 7 and 8 end, of many starts that differ by less than \
-            1e-9, and the share that bears out what the \
-         paper says of the panel. (b) Share of runs that a closed orbit has captured by time t. \
-         (c) The same as (a) for fig. 7(iii) by other \
-         methods, and by Dormand-Prince at other tolerances. (d) Runs of fig. 7(iii) that end \
-         earlier, by LSODA and by a Taylor method in double-double \
-         arithmetic.",
+         1e-9, and the share that supports the paper's claim about the panel. (b) Share \
+         of runs that a closed orbit has captured by time t. (c) The same as (a) for fig. 7(iii) \
+         by other methods, and by Dormand-Prince at other tolerances. (d) Runs of fig. 7(iii) that \
+         end earlier, by LSODA and by a Taylor method in double-double arithmetic.",
         [
             Study {
                 questions: || vec![question(Reading::Printed)],

@@ -285,15 +285,48 @@ fn passage_panels(paths: &[Table]) -> (PlanePanel, PlanePanel) {
         let shown: Vec<[f64; 2]> = (0..t.len()).map(|i| [y[i], z[i]]).take_while(inside).collect();
         places = places.line(shown, LineStyle::new(colour, 0.7));
         let middle = 9.0 - 3.0 * k as f64;
-        let strip =
-            (0..t.len()).take_while(|i| t[*i] <= CHATTER).map(|i| [t[i], middle + x[i] / STRIP]);
-        let strip: Vec<[f64; 2]> = strip.filter(|p| (p[1] - middle).abs() <= 1.0).collect();
-        strips = strips
-            .line(vec![[0.0, middle], [CHATTER, middle]], axis)
-            .line(strip, LineStyle::new(colour, 0.7))
-            .note([0.97 * CHATTER, middle + 1.45], words, Anchor::Right);
+        let strip: Vec<[f64; 2]> = (0..t.len())
+            .take_while(|i| t[*i] <= CHATTER)
+            .map(|i| [t[i], middle + x[i] / STRIP])
+            .collect();
+        strips = strips.line(vec![[0.0, middle], [CHATTER, middle]], axis);
+        for piece in pieces_within(&strip, [middle - 1.0, middle + 1.0]) {
+            strips = strips.line(piece, LineStyle::new(colour, 0.7));
+        }
+        strips = strips.note([0.97 * CHATTER, middle + 1.45], words, Anchor::Right);
     }
     (places.markers(vec![[0.0, 0.0]], marker(MarkerShape::Star, style::MAGENTA, 6.0)), strips)
+}
+
+/// The pieces of a polyline whose second coordinate is in `[lower, upper]`, cut at its ends.
+fn pieces_within(line: &[[f64; 2]], [lower, upper]: [f64; 2]) -> Vec<Vec<[f64; 2]>> {
+    let mut pieces: Vec<Vec<[f64; 2]>> = Vec::new();
+    for ends in line.windows(2) {
+        let [from, to] = [ends[0], ends[1]];
+        let rise = to[1] - from[1];
+        // The fractions of this segment at which it passes the two levels, in order.
+        let mut inside = [0.0_f64, 1.0];
+        if rise == 0.0 {
+            if from[1] < lower || from[1] > upper {
+                continue;
+            }
+        } else {
+            let [a, b] = [(lower - from[1]) / rise, (upper - from[1]) / rise];
+            inside = [a.min(b).max(0.0), a.max(b).min(1.0)];
+        }
+        if inside[0] > inside[1] {
+            continue;
+        }
+        let at = |s: f64| match s {
+            1.0 => to,
+            _ => [from[0] + s * (to[0] - from[0]), from[1] + s * rise],
+        };
+        match pieces.last_mut() {
+            Some(piece) if piece.last() == Some(&at(inside[0])) => piece.push(at(inside[1])),
+            _ => pieces.push(vec![at(inside[0]), at(inside[1])]),
+        }
+    }
+    pieces
 }
 
 fn section_panel(

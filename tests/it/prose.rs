@@ -439,9 +439,6 @@ const PRIVATE: [&str; 19] = [
 /// Words that are somebody's field elsewhere, but no name of a part of this program.
 const PARTS: [&str; 4] = ["room", "rooms", "wall", "walls"];
 
-/// Drawn into blessed pictures, or the text of a paper: these change with their hashes.
-const BLESSED: [&str; 2] = ["figures/census/figure.rs", "figures/basin/figure.rs"];
-
 /// Whether `text`, in lower case, holds these words, not as a part of longer ones.
 fn says(text: &str, words: &str) -> bool {
     let inside = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || c == '_');
@@ -477,9 +474,6 @@ fn texts() -> Vec<(String, String)> {
 fn no_text_uses_a_private_word() {
     let mut found = Vec::new();
     for (name, text) in texts() {
-        if BLESSED.contains(&name.as_str()) {
-            continue;
-        }
         let parts = name.ends_with("src/lib.rs")
             || ["docs/architecture.md", "CONTRIBUTING.md"].contains(&name.as_str());
         // Comments and paragraphs are wrapped: two neighbouring lines are read together, without
