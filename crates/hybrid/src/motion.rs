@@ -21,7 +21,7 @@ pub(crate) use sliding::determinant_of_negative;
 
 use std::rc::Rc;
 
-use twofold_num::Dual;
+use twofold_num::{Dual, Short};
 use twofold_num::elementary::rough_pow;
 use twofold_num::linear::solve_any;
 use twofold_system::Expression;
@@ -219,7 +219,8 @@ pub enum HybridError {
         "the motion is not decided at t = {t}, state {x:?}: on {surfaces} it can go on in more \
             than one way ({ways}). Nothing is chosen here: end the run before that time (--t-end), \
             start elsewhere (--start), change a parameter (--set), choose a side (--exit \
-            at-once:plus or at-once:minus), or choose a mixture (--intersection)"
+            at-once:plus or at-once:minus), or choose a mixture (--intersection)",
+        t = Short(*t)
     )]
     Undecided {
         /// When.
@@ -232,7 +233,7 @@ pub enum HybridError {
         ways: String,
     },
     /// Surfaces that cannot be told apart.
-    #[error("at t = {t}, state {x:?}, {why}")]
+    #[error("at t = {t}, state {x:?}, {why}", t = Short(*t))]
     Stuck {
         /// When.
         t: f64,
@@ -244,7 +245,8 @@ pub enum HybridError {
     /// A domain is left.
     #[error(
         "the motion leaves the domain of the equations at t = {t}, state {x:?}: {what}. End the \
-            run before that time (--t-end), or start elsewhere (--start)"
+            run before that time (--t-end), or start elsewhere (--start)",
+        t = Short(*t)
     )]
     Domain {
         /// When.
@@ -258,7 +260,8 @@ pub enum HybridError {
     #[error(
         "switches at {surfaces} accumulate at t = {t} (error at most {error:e}), state {x:?}, and \
             nothing says how motion goes on: end the run before that time (--t-end), or describe \
-            what holds there by an [[event]]"
+            what holds there by an [[event]]",
+        t = Short(*t)
     )]
     Accumulation {
         /// When.
@@ -271,7 +274,7 @@ pub enum HybridError {
         surfaces: String,
     },
     /// Too many steps.
-    #[error("{steps} steps were made by t = {t}, the most that --max-steps allows")]
+    #[error("{steps} steps were made by t = {t}, the most that --max-steps allows", t = Short(*t))]
     Budget {
         /// The limit.
         steps: u64,
@@ -622,14 +625,16 @@ impl<'a> Follower<'a> {
             Some(x) => x.clone(),
             None => model.start().map_err(EquationError::from)?.ok_or_else(|| {
                 HybridError::Start(format!(
-                    "the system suggests no initial state; give one by --start, {n} numbers"
+                    "the system suggests no initial state; give one by --start: a number for each \
+                        of {}",
+                    model.coordinates().join(", ")
                 ))
             })?,
         };
         if x.len() != n || !x.iter().all(|v| v.is_finite()) {
             let states = model.coordinates().join(", ");
             return Err(HybridError::Start(format!(
-                "the initial state is {x:?}; give {n} finite numbers, one for each of {states}"
+                "the initial state is {x:?}; give a finite number for each of {states}"
             )));
         }
         let modes = model.definition().modes().len();

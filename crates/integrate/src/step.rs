@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
-use twofold_num::Tape;
+use twofold_num::{Short, Tape};
 use twofold_system::singular::{Ends, undefined};
 use twofold_system::{VectorField, jacobian};
 
@@ -293,7 +293,8 @@ pub enum Failure {
     /// The state or the right-hand side is infinite or not a number.
     #[error(
         "the right-hand side or the state is no longer finite at t = {t}, state {state:?}: check \
-            the parameters and the start"
+            the parameters and the start",
+        t = Short(*t)
     )]
     NotFinite {
         /// Time of the last good state.
@@ -304,7 +305,8 @@ pub enum Failure {
     /// The orbit came to a place where the equation has no value.
     #[error(
         "the orbit comes to the end of the field's domain at t = {t}, state {state:?}: {what}; \
-            change the expression, or end the run before (--t-end)"
+            change the expression, or end the run before (--t-end)",
+        t = Short(*t)
     )]
     Undefined {
         /// Time of the last good state.
@@ -317,7 +319,8 @@ pub enum Failure {
     /// The solution ends in finite time, or beyond the range of numbers.
     #[error(
         "the solution grows without bound near t = {t}, state {state:?}: end the run before \
-            (--t-end)"
+            (--t-end)",
+        t = Short(*t)
     )]
     Unbounded {
         /// When.
@@ -329,7 +332,8 @@ pub enum Failure {
     #[error(
         "the equation is not smooth at t = {t}, state {state:?}: {what}; a series cannot go on \
             there: use --method dopri5, lsoda or radau5, or make the argument the switching \
-            function h"
+            function h",
+        t = Short(*t)
     )]
     NotSmooth {
         /// When.
@@ -342,7 +346,8 @@ pub enum Failure {
     /// The step became too small to advance time.
     #[error(
         "step size underflow ({h:e}) at t = {t}, state {state:?}: the tolerances ask for more than \
-            f64 can give here; loosen them (--rtol, --atol) or compare with another --method"
+            f64 can give here; loosen them (--rtol, --atol) or compare with another --method",
+        t = Short(*t)
     )]
     StepUnderflow {
         /// Time reached.
@@ -356,7 +361,8 @@ pub enum Failure {
     #[error(
         "{limit} steps were not enough: stopped at t = {t}, state {state:?}. If the last steps \
             were tiny, the equation is stiff or not smooth there: compare with another --method; \
-            otherwise raise the limit of steps (--max-steps)"
+            otherwise raise the limit of steps (--max-steps)",
+        t = Short(*t)
     )]
     TooManySteps {
         /// Time reached.
@@ -377,7 +383,8 @@ pub enum Failure {
     /// An implicit method's nonlinear equations could not be solved even with tiny steps.
     #[error(
         "the implicit equations did not converge at t = {t}, step {h:e}, state {state:?}: the \
-            right-hand side is too rough for this method; compare with another --method"
+            right-hand side is too rough for this method; compare with another --method",
+        t = Short(*t)
     )]
     NotConverged {
         /// Time reached.

@@ -27,6 +27,7 @@ pub mod random;
 pub mod registers;
 pub mod scalar;
 pub mod series;
+mod short;
 pub mod tape;
 
 pub use decimal::{Decimal, FromDecimal};
@@ -41,4 +42,5 @@ pub use multi::MultiFloat;
 pub use pulp::Simd;
 pub use registers::{Aligned, Mask, Registers};
 pub use scalar::{Arithmetic, Elementary, Scalar};
+pub use short::Short;
 pub use tape::Tape;

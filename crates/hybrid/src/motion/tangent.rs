@@ -13,10 +13,10 @@
 use super::{Ending, Follower, HybridError, Options, Record, Sought};
 use crate::Model;
 use crate::step::{A, C, E, Step};
-use twofold_num::Dual;
 use twofold_num::elementary::{ln, rough_pow};
 use twofold_num::fit::line;
 use twofold_num::linear::{eigenvalues, solve_any};
+use twofold_num::{Dual, Short};
 use twofold_system::Expression;
 
 /// Local error of a tangent vector, relative to itself.
@@ -819,15 +819,21 @@ fn turn(
         Return::Crossings(_) => crossings >= wanted,
     };
     if !back {
-        let ending = match &outcome.ending {
-            Ending::Stopped(event) => format!("where {event} ends the run"),
-            Ending::Zeno { event, .. } => format!("where {event} accumulates"),
-            Ending::Finished | Ending::Interrupted => "and is not followed further".to_owned(),
+        let another = "give another section (--section) or start (--start)";
+        let (ending, advice) = match &outcome.ending {
+            Ending::Stopped(event) => (format!("where {event} ends the run"), another.to_owned()),
+            Ending::Zeno { event, .. } => {
+                (format!("where {event} accumulates"), another.to_owned())
+            }
+            Ending::Finished | Ending::Interrupted => (
+                "and is not followed further".to_owned(),
+                format!("follow it longer (--longest-return), or {another}"),
+            ),
         };
         let why = format!(
-            "the orbit does not come back to the section by t = {}, state {:?}, {ending}: follow \
-                it longer (--longest-return), or give another section or start",
-            outcome.t, outcome.x
+            "the orbit does not come back to the section by t = {}, state {:?}, {ending}: {advice}",
+            Short(outcome.t),
+            outcome.x
         );
         return Err(HybridError::NoOrbit(why));
     }

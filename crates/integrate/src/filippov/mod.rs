@@ -65,6 +65,7 @@ use serde::{Deserialize, Serialize};
 
 use super::driver::Observer;
 use super::step::{Failure, Flow, Statistics, Step, StopReason, Tolerance};
+use twofold_num::Short;
 
 pub use engine::{run, run_watched};
 pub use exit::{ExitRule, Side, SlidingLaw};
@@ -292,7 +293,8 @@ pub enum FilippovError {
     #[error(
         "crossings accumulate (Zeno): {crossings} in a row, each sooner than the one before, the \
             last flight took {last:e}; they come together near t = {accumulates}, state {state:?}. \
-            Start elsewhere, or end the run before that time"
+            Start elsewhere, or end the run before that time",
+        accumulates = Short(*accumulates)
     )]
     Zeno {
         /// Time reached.
@@ -309,7 +311,8 @@ pub enum FilippovError {
     /// A contact with the surface that first and second Lie derivatives do not decide.
     #[error(
         "non-transversal contact with the switching surface at t = {t}, state {state:?}: {what}. \
-            Perturb the start or the parameters"
+            Perturb the start or the parameters",
+        t = Short(*t)
     )]
     NonTransversal {
         /// Time reached.
@@ -320,7 +323,7 @@ pub enum FilippovError {
         what: &'static str,
     },
     /// Several motions are possible, and nothing says which is followed.
-    #[error("the motion is not decided at t = {t}, state {state:?}: {choice}")]
+    #[error("the motion is not decided at t = {t}, state {state:?}: {choice}", t = Short(*t))]
     Undecided {
         /// Time reached.
         t: f64,
@@ -334,7 +337,8 @@ pub enum FilippovError {
         "the switching function h jumps at t = {t}, state {state:?}: it changes sign there without \
             coming to 0, or faster than numbers resolve. Give the place of the jump as a second \
             switching surface ([second] in the system's file), or smooth the switches (--switch \
-            smoothed)"
+            smoothed)",
+        t = Short(*t)
     )]
     Jump {
         /// Time reached.
@@ -343,7 +347,7 @@ pub enum FilippovError {
         state: Vec<f64>,
     },
     /// The exit rule asks for a future that does not exist here.
-    #[error("the exit rule cannot be followed at t = {t}, state {state:?}: {why}")]
+    #[error("the exit rule cannot be followed at t = {t}, state {state:?}: {why}", t = Short(*t))]
     NoSuchExit {
         /// Time reached.
         t: f64,
@@ -366,7 +370,8 @@ pub enum FilippovError {
     /// The budget of events is used up.
     #[error(
         "{limit} events were not enough: stopped at t = {t}, state {state:?}; end the run earlier \
-            (--t-end); where switches follow each other so closely, smooth them (--switch smoothed)"
+            (--t-end); where switches follow each other so closely, smooth them (--switch smoothed)",
+        t = Short(*t)
     )]
     TooManyEvents {
         /// Time reached.
