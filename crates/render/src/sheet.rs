@@ -195,7 +195,12 @@ impl Axis {
 
     /// A linear axis that covers all finite `values` with a margin of four per cent.
     pub fn covering(title: impl Into<String>, values: impl IntoIterator<Item = f64>) -> Self {
-        let (lower, upper) = range_of(values);
+        let (mut lower, mut upper) = range_of(values);
+        // Rounding is no range.
+        if upper - lower < 1e-9 * lower.abs().max(upper.abs()) {
+            lower += 0.5 * (upper - lower);
+            upper = lower;
+        }
         let margin = 0.04 * (upper - lower);
         Self::linear(title, lower - margin, upper + margin)
     }
