@@ -51,6 +51,9 @@ pub struct Rest {
     /// Whether motion near by comes to all of these surfaces, however fast each of them switches;
     /// nothing where that decides.
     pub attracting: Option<bool>,
+    /// Whether the fields are tangent to a surface there, as at a two-fold or a fused focus: the
+    /// motion along it is not determined near the rest, and has no eigenvalues.
+    pub tangent: bool,
     /// The set of rests to which it belongs, if it is not isolated.
     pub family: Option<Family>,
     /// Eigenvalues of the linearised motion, on surfaces along them: real and imaginary parts.
@@ -72,6 +75,9 @@ impl Rest {
     pub fn kind(&self) -> String {
         if self.family.as_ref().is_some_and(|f| f.changes) {
             return "stability changes along the curve".into();
+        }
+        if self.tangent {
+            return "not decided by the linearised motion: the fields are tangent there".into();
         }
         if let Some(surface) = &self.boundary {
             return format!(
@@ -616,10 +622,11 @@ impl Search<'_> {
                     (0..n).map(|l| m.gradients[i * n + l] * m.by_weight[l * k + j]).sum();
             }
         }
+        let tangent = self.is_tangent(&m, &normal, k);
         // If the mixture vanishes, sliding is linearised by (1 - B (C B)^-1 C) A: the rows of C
         // have the eigenvalue 0, which does not belong to motion along the surfaces.
         let mut along = m.local.jacobian.clone();
-        for j in 0..if k > 0 { n } else { 0 } {
+        for j in 0..if k > 0 && !tangent { n } else { 0 } {
             let pull = |i: usize| {
                 (0..n).map(|l| m.gradients[i * n + l] * m.local.jacobian[l * n + j]).sum::<f64>()
             };
@@ -629,9 +636,9 @@ impl Search<'_> {
                 along[i * n + j] -= kept;
             }
         }
-        let mut eigenvalues = eigenvalues(&along, n)?;
+        let mut eigenvalues = if tangent { Vec::new() } else { eigenvalues(&along, n)? };
         let modulus = |e: &[f64; 2]| e[0] * e[0] + e[1] * e[1];
-        for _ in 0..k {
+        for _ in 0..if tangent { 0 } else { k } {
             let smallest = (0..eigenvalues.len())
                 .min_by(|i, j| modulus(&eigenvalues[*i]).total_cmp(&modulus(&eigenvalues[*j])))?;
             eigenvalues.remove(smallest);
@@ -647,18 +654,34 @@ impl Search<'_> {
         let name = |guard: &usize| self.equation.guards[*guard].expression.to_string();
         let on =
             on.iter().zip(&weights).map(|(g, w)| On { surface: name(g), weight: *w }).collect();
-        let attracting = if k > 0 { attracts(&normal, k) } else { None };
+        let attracting = if k > 0 && !tangent { attracts(&normal, k) } else { None };
         let behind = self.behind(config.mode, &x);
         Some(Rest {
             x,
             mode: config.mode,
             on,
             attracting,
+            tangent,
             family: None,
             eigenvalues,
             blur,
             boundary,
             behind,
+        })
+    }
+
+    /// Whether no field around a rest on `k` surfaces passes one of them, to rounding: the change of
+    /// its function's rate with the weights is far below what the rate changes by in the box.
+    fn is_tangent(&self, m: &Mixture, normal: &[f64], k: usize) -> bool {
+        let n = self.n;
+        (0..k).any(|i| {
+            let size = |l: usize| {
+                let varies: f64 =
+                    (0..n).map(|j| (m.local.jacobian[l * n + j] * self.widths[j]).abs()).sum();
+                m.gradients[i * n + l].abs() * (m.sizes[l] + varies)
+            };
+            let most = 1e-9 * (0..n).map(size).sum::<f64>();
+            normal[i * k..(i + 1) * k].iter().all(|change| change.abs() <= most)
         })
     }
 

@@ -498,6 +498,13 @@ fn rests_are_found_with_their_stability() {
     near(found[0].eigenvalues[0][0], 1.0, 1e-9);
     assert_eq!((found[0].on[0].surface.as_str(), found[0].attracting), ("x", Some(true)));
     near(found[0].on[0].weight, 0.5, 1e-12);
+    // A fused focus: both fields are tangent to x = 0 where they cancel.
+    let fused = model("states = ['x', 'y']\nf = ['y', '-x - 0.2*sign(x)']");
+    let found = rests(&fused, &[(-3.0, 3.0); 2]).unwrap();
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert!(found[0].tangent && found[0].eigenvalues.is_empty(), "{found:?}");
+    assert!(found[0].x.iter().all(|x| x.abs() < 1e-9), "{found:?}");
+    near(found[0].on[0].weight, 0.5, 1e-9);
     assert!(
         rests(&model("states = ['x']\nf = ['sin(t)']"), &[(-1.0, 1.0)])
             .unwrap_err()

@@ -498,8 +498,8 @@ pub enum RestPlace {
         surface: String,
         /// Share of the field with the function above zero.
         weight: f64,
-        /// Whether motion comes to the surface there.
-        attracting: bool,
+        /// Whether motion comes to the surface there; nothing where the fields are tangent to it.
+        attracting: Option<bool>,
     },
     /// On several at once.
     Intersection {
@@ -542,7 +542,7 @@ impl Question for GeneralRests {
                     [on] => RestPlace::Surface {
                         surface: on.surface.clone(),
                         weight: on.weight,
-                        attracting: rest.attracting == Some(true),
+                        attracting: rest.attracting,
                     },
                     several => RestPlace::Intersection {
                         surfaces: several.iter().map(|on| on.surface.clone()).collect(),

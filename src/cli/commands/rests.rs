@@ -3,7 +3,7 @@
 use serde_json::json;
 
 use crate::cli::models;
-use crate::cli::speak::{Delivery, deliver, try_delivery};
+use crate::cli::speak::{Delivery, deliver, state_in_words, try_delivery};
 use crate::cli::{CliError, Exit, ending};
 use crate::job::general::{Family, GeneralRests, RestPlace, Resting};
 use crate::job::{Executor, JobError, Question, encode};
@@ -69,6 +69,9 @@ impl Arguments {
             let number =
                 |text: &str| text.trim().parse::<f64>().map_err(|_| wrong("a bound is no number"));
             within[state] = (number(low)?, number(high)?);
+            if !(within[state].0 < within[state].1) {
+                return Err(wrong("the lower bound comes first and is less than the other"));
+            }
         }
         Ok(GeneralRests { model, within })
     }
@@ -98,9 +101,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
 }
 
 fn line(rest: &Resting, names: &[&str], with_mode: bool) -> String {
-    let point = |state: &[f64]| -> String {
-        names.iter().zip(state).map(|(n, v)| format!("{n} = {v}")).collect::<Vec<_>>().join(", ")
-    };
+    let point = |state: &[f64]| state_in_words(names, state);
     let changes = rest.family.as_ref().is_some_and(|f| f.changes);
     let on = |surfaces: &str, moves: &str| {
         format!("pseudo-equilibrium on {surfaces} = 0{}", if changes { "" } else { moves })
@@ -110,7 +111,11 @@ fn line(rest: &Resting, names: &[&str], with_mode: bool) -> String {
     let (place, weights) = match &rest.place {
         RestPlace::Field => ("equilibrium".to_owned(), String::new()),
         RestPlace::Surface { surface, weight, attracting } => {
-            let moves = if *attracting { ", which attracts" } else { ", which repels" };
+            let moves = match attracting {
+                Some(true) => ", which attracts",
+                Some(false) => ", which repels",
+                None => ", to which the fields are tangent",
+            };
             (on(surface, moves), format!(" (weight {weight})"))
         }
         RestPlace::Intersection { surfaces, weights, attracting } => {
