@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 
 use super::CliError;
-use super::models::{known, named};
+use super::models::{known, named, names_a_file};
 use super::words::{History, Inside, KickLaw, Method, Reading, Relaxation, Transition};
 use crate::integrate;
 use crate::integrate::filippov::{ExitRule, Side, SlidingLaw};
@@ -315,13 +315,9 @@ const EFFECTS: [Effect; 43] = {
         when(
             "--reading",
             |f| f.reading.is_some(),
-            |f, _| {
-                let given =
-                    (f.alpha.is_some() || f.sets("alpha")) && (f.beta.is_some() || f.sets("beta"));
-                f.caricature() && !given
-            },
+            |f, _| f.caricature() && !f.gives_what_readings_differ_in(&|_| false),
             "a reading gives the caricature's alpha and beta; leave it out with other systems, or \
-                where both are given",
+                where those that readings differ in are given",
         ),
         when(
             "--alpha",
@@ -525,7 +521,7 @@ enum Misuse {
     )]
     Exit(String),
     #[error(
-        "--system {name}: there is no such built-in system{help}; built in are {known}; give a \
+        "--system {name}: there is no such built-in system{help} Built in are {known}; give a \
             file's name for your own"
     )]
     NoSuchSystem { name: String, help: String, known: String },
@@ -535,9 +531,11 @@ enum Misuse {
     Own { flag: String, problem: String },
     #[error("--set \"{text}\": {problem}")]
     Set { text: String, problem: String },
-    #[error("{system} suggests no initial state; give one by --start, {states} numbers")]
-    NoStart { system: String, states: usize },
-    #[error("--start has {found} numbers; give {wanted}, one for each of {states}")]
+    #[error(
+        "{system} suggests no initial state; give one by --start: a number for each of {states}"
+    )]
+    NoStart { system: String, states: String },
+    #[error("--start: {found} given, {wanted} wanted, a number for each of {states}")]
     Start { found: usize, wanted: usize, states: String },
     #[error(
         "--section \"{text}\": {problem}; give one of {known} and a number, such as {example}=0"
@@ -604,19 +602,10 @@ impl RunFlags {
         let all_started = || {
             self.start.as_ref().is_some_and(|s| s.len() == starts).then(|| "start.NAME".to_owned())
         };
-        // A reading is of use where it gives a number in which readings differ.
         let both = || {
-            let values = paper::Reading::ALL.map(|r| [r.caricature().alpha, r.caricature().beta]);
-            let gives = |i: usize, flag: bool, name: &str| {
-                flag || self.sets(name)
-                    || parameter(name)
-                    || values.iter().all(|v| v[i] == values[0][i])
-            };
             let replaced = parameter("alpha") || parameter("beta");
-            (replaced
-                && gives(0, self.alpha.is_some(), "alpha")
-                && gives(1, self.beta.is_some(), "beta"))
-            .then(|| "params.alpha and params.beta".to_owned())
+            (replaced && self.gives_what_readings_differ_in(&parameter))
+                .then(|| "params.alpha and params.beta".to_owned())
         };
         let set = || {
             let names = self.set.iter().filter_map(|text| text.split('=').next());
@@ -779,7 +768,7 @@ impl RunFlags {
             None => {
                 let none = || Misuse::NoStart {
                     system: self.system_name().to_owned(),
-                    states: system.dimension(),
+                    states: system.coordinates().join(", "),
                 };
                 system.definition().start().ok_or_else(none)?.to_vec()
             }
@@ -860,6 +849,16 @@ impl RunFlags {
         })
     }
 
+    /// Whether each number in which the readings differ is given, by a flag or as `varied` says: a
+    /// reading is then of no use.
+    fn gives_what_readings_differ_in(&self, varied: &dyn Fn(&str) -> bool) -> bool {
+        let values = paper::Reading::ALL.map(|r| [r.caricature().alpha, r.caricature().beta]);
+        let numbers = [("alpha", self.alpha.is_some()), ("beta", self.beta.is_some())];
+        numbers.into_iter().enumerate().all(|(i, (name, flag))| {
+            flag || self.sets(name) || varied(name) || values.iter().all(|v| v[i] == values[0][i])
+        })
+    }
+
     /// The system that --system, --reading, --set and the caricature's own flags describe.
     fn described_system(&self) -> Result<System, Misuse> {
         let name = self.system_name();
@@ -934,8 +933,7 @@ fn from_file(name: &str) -> Result<System, Misuse> {
     let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
     // A general system's file comes here if it cannot be read as one, and so does a file's name
     // that is misspelt.
-    let is_file = name.contains(['.', '/', '\\']) || path.is_file();
-    if !is_file {
+    if !names_a_file(name) {
         let (help, known) = known(name);
         return Err(Misuse::NoSuchSystem { name: name.into(), help, known });
     }

@@ -113,7 +113,7 @@ pub fn run_of(flags: &RunFlags) -> Result<Option<GeneralRun>, CliError> {
     {
         let states = model.coordinates().join(", ");
         return Err(usage(format!(
-            "--start has {} numbers; give {}, one for each of {states}",
+            "--start: {} given, {} wanted, a number for each of {states}",
             start.len(),
             model.coordinates().len()
         )));

@@ -15,20 +15,30 @@ use crate::system::library;
 /// # Errors
 /// If there is none, or it cannot be understood.
 pub fn any_model(name: &str, set: &[String]) -> Result<Model, CliError> {
-    named(name, set, true)?.ok_or_else(|| {
-        let (near, _) = known(name);
-        CliError::Usage(format!(
-            "--system {name}: there is no such built-in system{near}; give a file's name \
-            for your own"
-        ))
-    })
+    if let Some(model) = named(name, set, true)? {
+        return Ok(model);
+    }
+    if names_a_file(name) {
+        // The reader says why it cannot be read.
+        read_text(Path::new(name))?;
+    }
+    let (near, known) = known(name);
+    Err(CliError::Usage(format!(
+        "--system {name}: there is no such built-in system{near} Built in are {known}; give a \
+            file's name for your own"
+    )))
+}
+
+/// Whether the name of a system is that of a file, which may not be there.
+pub fn names_a_file(name: &str) -> bool {
+    name.contains(['.', '/', '\\']) || Path::new(name).is_file()
 }
 
 /// The names of all built-in systems, after advice if one of them is like `name`.
 pub fn known(name: &str) -> (String, String) {
     let known: Vec<&str> = library::names().chain(library::general_names()).collect();
     let near =
-        nearest(name, &known).map_or(String::new(), |near| format!(", did you mean {near}?"));
+        nearest(name, &known).map_or(".".into(), |near| format!(". Did you mean {near}?"));
     (near, known.join(", "))
 }
 

@@ -6,7 +6,14 @@ use std::path::{Path, PathBuf};
 
 use super::CliError;
 use super::exit::part_of;
+use crate::num::Short;
 use crate::record;
+
+/// A state for people: "x = 0.2, y = 1".
+pub fn state_in_words(names: &[&str], state: &[f64]) -> String {
+    let said = |(name, x): (&&str, &f64)| format!("{name} = {}", Short(*x));
+    names.iter().zip(state).map(said).collect::<Vec<_>>().join(", ")
+}
 
 /// Prints text for people to standard output, and a newline.
 ///

@@ -46,6 +46,10 @@ impl Question for GeneralOrbit {
         json
     }
 
+    fn label(&self) -> String {
+        "closed orbit".into()
+    }
+
     fn extent(&self) -> f64 {
         self.run.options.t_start + self.settle
     }

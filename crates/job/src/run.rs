@@ -48,7 +48,9 @@ impl Question for Run {
             .schedule
             .restart_every
             .map_or_else(String::new, |t| format!(", restarts every {t}"));
-        format!("{} to t = {}{every}", self.0.method.name.name(), self.0.t_end)
+        let method = &self.0.method;
+        let bits = method.precision.map_or_else(String::new, |bits| format!(" ({bits} bits)"));
+        format!("{}{bits} to t = {}{every}", method.name.name(), self.0.t_end)
     }
 
     fn extent(&self) -> f64 {

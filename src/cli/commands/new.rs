@@ -43,7 +43,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         Some(name) => library::text(name).or_else(|| library::general(name)).ok_or_else(|| {
             let (near, known) = models::known(name);
             CliError::Usage(format!(
-                "--from {name}: there is no such built-in system{near}; built in are {known}"
+                "--from {name}: there is no such built-in system{near} Built in are {known}"
             ))
         })?,
     };

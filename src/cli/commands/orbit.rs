@@ -13,7 +13,7 @@ use crate::cli::exit::part_of;
 use crate::cli::flags::{RunFlags, Use};
 use crate::cli::general;
 use crate::cli::progress::Progress;
-use crate::cli::speak::{Delivery, deliver, is_standard_output, try_delivery};
+use crate::cli::speak::{Delivery, deliver, is_standard_output, state_in_words, try_delivery};
 use crate::cli::{CliError, Exit};
 use crate::hybrid::motion::Record;
 use crate::hybrid::motion::tangent::Return;
@@ -241,6 +241,9 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
             encode::json(&answer, &json!({ "kind": question.kind(), "question": question.json() }))
         }
     };
+    if !matches!(format, Format::Text) {
+        say_branch(question.along.as_ref(), &answer, &progress);
+    }
     finish(&answer, &progress, out, &bytes)
 }
 
@@ -286,15 +289,7 @@ fn of_general(arguments: &Arguments, question: &GeneralOrbit) -> Result<Exit, Cl
                 let _ = writeln!(text, "{label:<13} {what}");
             };
             line("period", format!("{period}"));
-            line(
-                "point",
-                names
-                    .iter()
-                    .zip(&point)
-                    .map(|(n, x)| format!("{n} = {x}"))
-                    .collect::<Vec<_>>()
-                    .join(", "),
-            );
+            line("point", state_in_words(&names, &point));
             line("multipliers", complex(&multipliers));
             let stability = match () {
                 () if (largest - 1.0).abs() < 1e-6 => {
@@ -311,7 +306,16 @@ fn of_general(arguments: &Arguments, question: &GeneralOrbit) -> Result<Exit, Cl
             text.into_bytes()
         }
     };
+    if !matches!(format, Format::Text) {
+        say_branch(question.along.as_ref(), &answer, &progress);
+    }
     finish(&answer, &progress, out, &bytes)
+}
+
+/// Says how a branch ends and where it bifurcates, for people who have its rows written to a file.
+fn say_branch(along: Option<&Along>, answer: &Answer, progress: &Progress) {
+    let Some(along) = along else { return };
+    branch_lines(along, answer, &mut |label, what| progress.line(&format!("{label}: {what}")));
 }
 
 /// Delivers an answer; of an interrupted branch, as a part.
@@ -394,10 +398,7 @@ fn text(question: &ClosedOrbit, answer: &Answer) -> Result<String, CliError> {
         ),
     );
     line("period", format!("{period}"));
-    line(
-        "point",
-        names.iter().zip(&point).map(|(n, x)| format!("{n} = {x}")).collect::<Vec<_>>().join(", "),
-    );
+    line("point", state_in_words(&names, &point));
     let error: f64 = answer.fact("multiplier_error").map_err(fact)?;
     line("multipliers", format!("{}, each +- {error:.1e}", complex(&multipliers)));
     line(
@@ -450,6 +451,9 @@ fn branch_lines(along: &Along, answer: &Answer, line: &mut dyn FnMut(&str, Strin
 }
 
 fn complex(numbers: &[[f64; 2]]) -> String {
+    if numbers.is_empty() {
+        return "none: with one state there is no direction off the orbit".into();
+    }
     let said = |m: &[f64; 2]| {
         if m[1] == 0.0 { format!("{:.9}", m[0]) } else { format!("{:.9} {:+.9} i", m[0], m[1]) }
     };
@@ -459,12 +463,7 @@ fn complex(numbers: &[[f64; 2]]) -> String {
 /// The rest for people.
 fn at_rest(question: &ClosedOrbit, rest: &Rest) -> String {
     let names = question.system.coordinates();
-    let state = names
-        .iter()
-        .zip(&rest.state)
-        .map(|(n, x)| format!("{n} = {x}"))
-        .collect::<Vec<_>>()
-        .join(", ");
+    let state = state_in_words(&names, &rest.state);
     let stability = match (rest.stability, rest.rate()) {
         (RestStability::Attracts, Some(rate)) => {
             format!("attracts, by {rate:.6e} per unit time in the end")

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 
 use crate::cli::flags::{RunFlags, Use};
+use super::run::said_how_it_ended;
 use crate::cli::general;
 use crate::cli::progress::Progress;
 use crate::cli::speak::{deliver, is_standard_output, try_delivery};
@@ -247,7 +248,8 @@ fn draw_general(
     try_delivery(Some(&arguments.out))?;
     let progress = Progress::new(arguments.quiet);
     let answer = Executor::new(None, &progress).ask(&run)?;
-    let mut small_print = vec![general_small_print(&run)];
+    let end: f64 = answer.fact("t").map_err(JobError::from)?;
+    let mut small_print = vec![general_small_print(&run, end)];
     if answer.stop == Stop::Interrupted {
         small_print.push("an interrupted run: this is what was computed until then".into());
     }
@@ -261,13 +263,15 @@ fn draw_general(
         .provenance("Data-SHA256", record::Hash::of(&encode::bits(&answer.tables)).as_str());
     sheet.searchable_svg = arguments.searchable;
     write(&sheet, &arguments.out, format)?;
-    Ok(Exit::Fine)
+    Ok(said_how_it_ended(&run, &answer))
 }
 
-/// The run of a general system in words.
-pub(super) fn general_small_print(run: &GeneralRun) -> String {
+/// The run of a general system up to the time `end` in words.
+pub(super) fn general_small_print(run: &GeneralRun, end: f64) -> String {
     let o = &run.options;
-    let (from, to, rtol) = (number(o.t_start), number(o.t_end), number(o.rtol));
+    let (from, rtol) = (number(o.t_start), number(o.rtol));
+    // A time that the run found has all digits.
+    let to = if end == o.t_end { number(end) } else { format!("{end:.6}") };
     format!("*t* = {from} … {to}, event-driven, {}, rtol {rtol}", o.method.name())
 }
 

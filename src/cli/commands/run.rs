@@ -151,7 +151,7 @@ fn general_run(arguments: &Arguments, run: &GeneralRun) -> Result<Exit, CliError
         },
         &reached,
     );
-    monitor.done(&format!("{count} rows"));
+    monitor.done(&if found.is_ok() { format!("{count} rows") } else { "failed".into() });
     match failed {
         Some(CliError::Output(e)) if e.kind() == io::ErrorKind::BrokenPipe => {
             return Ok(Exit::Fine);
@@ -197,7 +197,7 @@ fn general_run(arguments: &Arguments, run: &GeneralRun) -> Result<Exit, CliError
 }
 
 /// Says why a run ended before its time, if it did by what its file says.
-fn said_how_it_ended(run: &GeneralRun, answer: &Answer) -> Exit {
+pub(super) fn said_how_it_ended(run: &GeneralRun, answer: &Answer) -> Exit {
     if let Some(zeno) = answer.facts.get("zeno") {
         let name = zeno["event"].as_str().unwrap_or_default();
         // Motion can rest on the surface of an event that sets a state; a mode has none.

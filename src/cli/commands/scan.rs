@@ -171,7 +171,7 @@ impl Arguments {
                         .position(|n| left.is_some_and(|s| s.trim() == *n));
                     let (title, print) = (
                         run.model.definition().title().to_owned(),
-                        vec![general_small_print(&run)],
+                        vec![general_small_print(&run, run.options.t_end)],
                     );
                     let method = options.method.name();
                     (Base::from(run), title, print, fixed, method)

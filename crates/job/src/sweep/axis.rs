@@ -56,6 +56,9 @@ pub enum Coordinate {
     Method,
 }
 
+/// Number of [`PLAIN`] coordinates that general systems have, too: the first ones.
+const FOR_ALL: usize = 6;
+
 /// The coordinates without a dot, by name.
 const PLAIN: [(&str, Coordinate); 16] = [
     ("rtol", Coordinate::Rtol),
@@ -63,6 +66,7 @@ const PLAIN: [(&str, Coordinate); 16] = [
     ("tolerance", Coordinate::Tolerance),
     ("max-step", Coordinate::MaxStep),
     ("t-end", Coordinate::TEnd),
+    ("method", Coordinate::Method),
     ("interval", Coordinate::Interval),
     ("eps", Coordinate::Eps),
     ("eps-prime", Coordinate::EpsPrime),
@@ -73,7 +77,6 @@ const PLAIN: [(&str, Coordinate); 16] = [
     ("kick-size", Coordinate::KickSize),
     ("seed", Coordinate::Seed),
     ("stream", Coordinate::Stream),
-    ("method", Coordinate::Method),
 ];
 
 /// Values along an axis. All are computed with portable arithmetic: the same bits on every machine.
@@ -195,11 +198,15 @@ impl FromStr for Coordinate {
             Some(("shift", name)) if !name.is_empty() => Ok(Coordinate::Shift(name.to_owned())),
             _ => PLAIN.iter().find(|(name, _)| *name == text).map(|(_, c)| c.clone()).ok_or_else(
                 || {
-                    let known: Vec<&str> = PLAIN.iter().map(|(name, _)| *name).collect();
+                    let known = |places: &[(&'static str, Coordinate)]| -> String {
+                        places.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ")
+                    };
+                    let (all, some) = PLAIN.split_at(FOR_ALL);
                     format!(
                         "\"{text}\" cannot be varied; choose among params.NAME, start.NAME, \
-                        shift.NAME, {}",
-                        known.join(", ")
+                        shift.NAME, {}; of systems with h, plus and minus also {}",
+                        known(all),
+                        known(some)
                     )
                 },
             ),
