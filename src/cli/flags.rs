@@ -63,7 +63,7 @@ pub struct RunFlags {
     /// Initial field of a relay whose start lies inside its band [default: sign].
     #[arg(long, value_enum, help_heading = "System")]
     pub inside: Option<Inside>,
-    /// Width of the layer of a smoothed switch, or half the band of a hysteretic one [default:
+    /// Width of the layer of a smoothed switch, half the width of a hysteretic one [default:
     /// 0.001; with --switch delayed none, which is the sharp rule].
     #[arg(long, allow_hyphen_values = true, help_heading = "System")]
     pub eps: Option<f64>,

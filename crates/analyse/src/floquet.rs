@@ -74,6 +74,9 @@ pub struct ClosedOrbit {
     pub iterations: usize,
 }
 
+/// Step limit for one return. Newton's method may come to states from which a return takes days.
+const MOST_STEPS: u64 = 10_000_000;
+
 /// Why no closed orbit was found.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Error {
@@ -90,6 +93,15 @@ pub enum Error {
         from: Vec<f64>,
         /// Time given.
         within: f64,
+    },
+    /// The orbit takes too many steps.
+    #[error(
+        "the orbit from {from:?} took {MOST_STEPS} steps without coming back to the plane: start \
+            nearer to the closed orbit"
+    )]
+    TooLong {
+        /// Start on the plane.
+        from: Vec<f64>,
     },
     /// Newton's method did not converge.
     #[error(
@@ -306,6 +318,9 @@ fn returned<const N: usize, const M: usize, T: VectorField<M>>(
     let passes = (tangent.eval(&state)[plane.axis] > 0.0) == plane.upward;
     stepper.restart(tangent, t, state, settings.longest_return, settings.max_step)?;
     while t < settings.longest_return {
+        if stepper.statistics().steps >= MOST_STEPS {
+            return Err(Error::TooLong { from: Failure::state(&u) });
+        }
         let step = stepper.step(tangent)?;
         let (t0, state0) = (step.t0, step.x0);
         let found = passages.through_plane(&step, plane.axis, plane.value);

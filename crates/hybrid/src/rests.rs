@@ -670,8 +670,8 @@ impl Search<'_> {
         })
     }
 
-    /// Whether no field around a rest on `k` surfaces passes one of them, to rounding: the change of
-    /// its function's rate with the weights is far below what the rate changes by in the box.
+    /// Whether all fields around a rest on `k` surfaces are tangent to one of them, to rounding:
+    /// its function's rate changes with the weights far less than in the box.
     fn is_tangent(&self, m: &Mixture, normal: &[f64], k: usize) -> bool {
         let n = self.n;
         (0..k).any(|i| {

@@ -244,9 +244,9 @@ fn root_between(q: &[f64], mut low: f64, mut high: f64) -> f64 {
     u
 }
 
-/// Whether Newton's method has come to its end. This is asked of its own step, not of one within the
-/// bounds: there the rounding of a value may say the wrong side of zero, and what is left to halve
-/// is most of the bracket.
+/// Whether Newton's method has come to its end, by its own step and not by one within the bounds:
+/// there the rounding of a value may give the wrong side of zero, so that most of the bracket is
+/// still to be halved.
 fn settled(newton: f64, u: f64) -> bool {
     (newton - u).abs() <= 2.0 * f64::EPSILON * u
 }

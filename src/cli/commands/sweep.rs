@@ -29,7 +29,8 @@ const DRAW_SEED: u64 = 2013;
 
 /// Vary any number of a run, and say where each run ends: a row each, on standard output (or
 /// --out), and how often each end occurred on standard error. Without --over, 40 starts whose first
-/// component is shifted a little further each time.
+/// component is shifted a little further each time. Without --section, ends of systems with h, plus
+/// and minus are judged by their crossings of the second state's zero.
 ///
 /// Rows are written to FILE.journal as they finish; --resume goes on with it after a kill, and
 /// `twofold sweep merge` puts parts together: the same bytes, whatever the parts, their order and

@@ -370,7 +370,8 @@ pub enum FilippovError {
     /// The budget of events is used up.
     #[error(
         "{limit} events were not enough: stopped at t = {t}, state {state:?}; end the run earlier \
-            (--t-end); where switches follow each other so closely, smooth them (--switch smoothed)",
+            (--t-end); where switches follow each other so closely, smooth them (--switch \
+            smoothed)",
         t = Short(*t)
     )]
     TooManyEvents {
