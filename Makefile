@@ -149,7 +149,7 @@ second-opinion: ## the first theorem proved by CAPD, another group's library: ma
 .PHONY: forge
 forge: ## forge every number of every certificate, alone and in groups, and write proofs/forgeries.md (some twenty minutes)
 	@$(CARGO) test --release --locked --test it verify:: -- --ignored --nocapture > target/forge.log || { cat target/forge.log; exit 1; }
-	@{ printf '# Forged certificates\n\nWritten by `make forge` (tests/it/verify.rs). Numbers of forgeries; every one that is certainly false is refused.\n\n'; \
+	@{ printf '# Forged certificates\n\nWritten by `make forge` (tests/it/verify.rs), %s. Numbers of forgeries; every one that is certainly false is refused.\n\n' "$$(date +%Y-%m-%d)"; \
 	grep '^|' target/forge.log; } > proofs/forgeries.md
 
 # The theorems that take seconds each; the others are checked by their certificates alone.
