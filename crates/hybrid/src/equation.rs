@@ -453,14 +453,23 @@ impl Equation {
 
     /// The equations for the structure of this configuration.
     pub fn compiled(&self, at: &Configuration) -> Rc<Compiled> {
+        self.compiled_with(at, &[])
+    }
+
+    /// The same, with these guards among the active ones even where the equations do not ask them.
+    pub fn compiled_with(&self, at: &Configuration, also: &[usize]) -> Rc<Compiled> {
         let mut key = vec![at.mode as i8];
         key.extend(
             self.guards.iter().zip(&at.sides).filter(|(g, _)| g.chooses).map(|(_, s)| *s as i8),
         );
+        if !also.is_empty() {
+            key.push(i8::MIN);
+            key.extend(also.iter().flat_map(|g| (*g as u32).to_le_bytes()).map(|b| b as i8));
+        }
         if let Some(found) = self.known.borrow().get(&key) {
             return found.clone();
         }
-        let made = Rc::new(self.compile(at));
+        let made = Rc::new(self.compile(at, also));
         let mut known = self.known.borrow_mut();
         // A long run among very many structures keeps memory flat.
         if known.len() >= 4096 {
@@ -470,7 +479,7 @@ impl Equation {
         made
     }
 
-    fn compile(&self, at: &Configuration) -> Compiled {
+    fn compile(&self, at: &Configuration, also: &[usize]) -> Compiled {
         let (mut active, mut deciding) = (Vec::new(), Vec::new());
         let n = self.dimension();
         let tape = Tape::record(self.variables(), |v| {
@@ -485,6 +494,9 @@ impl Equation {
                 if let When::Becomes(e) = &event.when {
                     writer.condition(e);
                 }
+            }
+            for guard in also {
+                writer.guards.entry(*guard).or_insert(None);
             }
             writer.write_guards();
             for (i, guard) in &writer.guards {

@@ -623,6 +623,13 @@ impl Search<'_> {
             }
         }
         let tangent = self.is_tangent(&m, &normal, k);
+        // Where each field vanishes by itself it is a boundary equilibrium of each.
+        let varies = |l: usize| -> f64 {
+            (0..n).map(|j| (m.local.jacobian[l * n + j] * self.widths[j]).abs()).sum()
+        };
+        if tangent && (0..n).all(|l| m.sizes[l] <= 1e-9 * varies(l)) {
+            return None;
+        }
         // If the mixture vanishes, sliding is linearised by (1 - B (C B)^-1 C) A: the rows of C
         // have the eigenvalue 0, which does not belong to motion along the surfaces.
         let mut along = m.local.jacobian.clone();

@@ -1797,3 +1797,46 @@ fn the_domain_of_a_switching_function_ends() {
         near(end(&text, 3.0)[0], want, 1e-9);
     }
 }
+
+/// What a surface's other side asks is a part of sliding on it, and what ends sliding may be asked
+/// on one side only, or nowhere afterwards.
+#[test]
+fn sliding_sees_the_conditions_of_both_sides() {
+    for f in [
+        "if(x > 1 and t < 2, -1, 1)",
+        "if(x > 1, if(t < 2, -1, 1), 1)",
+        "if(x <= 1, 1, if(t >= 2, 1, -1))",
+        "if(t < 2, -sign(x - 1), 1)",
+        "if(t < 2, if(x > 1, -1, 1), 1)",
+        "-sign(x - 1)*(t < 2) + (t >= 2)",
+        "if(x > 1, -1, 1) + 2*(x > 1)*(t > 2)",
+    ] {
+        // It slides on x = 1 from t = 1 to 2.
+        near(end(&format!("states = ['x']\nstart = [0]\nf = ['{f}']"), 4.0)[0], 3.0, 1e-12);
+        near(end(&format!("states = ['x']\nstart = [0]\nf = ['{f}']"), 1.9)[0], 1.0, 1e-12);
+    }
+    // And rests where nothing moves it any more.
+    near(
+        end("states = ['x']\nstart = [0]\nf = ['if(t < 2, -sign(x - 1), 0)']", 4.0)[0],
+        1.0,
+        1e-12,
+    );
+    // Half of the time above x = 1, and a quarter from t = 2 on: y is the integral of 4 there.
+    let mixed = |start: f64, condition: &str| {
+        format!(
+            "states = ['x', 'y', 'z']\nstart = [{start}, 0, 0]\n\
+             f = ['if(x > 1, if({condition}, -1, -3), 1)', 'if(x > 1, 4, 0)', '1']"
+        )
+    };
+    for condition in ["t < 2", "z < 2", "2 - t > 0", "not z >= 2"] {
+        near(end(&mixed(0.0, condition), 4.0)[1], 4.0, 1e-9);
+        // The condition changes long before it is asked for the first time.
+        near(end(&mixed(-4.0, condition), 7.0)[1], 2.0, 1e-9);
+    }
+    // y rests on y = 0 until t = 2; then half of the time is above x = 0.
+    let two = "states = ['x', 'y']\nstart = [-1, -0.5]\n\
+        f = ['-sign(x)', 'if(t < 2, -sign(y), 1 + heaviside(x))']";
+    let found = end(two, 3.0);
+    near(found[0], 0.0, 1e-12);
+    near(found[1], 1.5, 1e-9);
+}

@@ -6,9 +6,12 @@ use super::*;
 
 /// Most surfaces on which a rule chooses a mixture.
 const MOST_CORNERS: usize = 3;
+/// Functions that meet of which all sides are tried to see which depend on each other.
+const MOST_TRIED: usize = 4;
 
-/// A configuration, where its guards stand, and what they do there.
-type Vertex = (Configuration, Vec<Option<usize>>, Rates);
+/// A configuration, the places of the guards that are zero, what they do there, and which of them
+/// its equations ask.
+type Vertex = (Configuration, Vec<Option<usize>>, Rates, Vec<bool>);
 
 impl Follower<'_> {
     /// The size of the terms that an expression is a sum of, with states as large as they have been
@@ -158,17 +161,27 @@ impl Follower<'_> {
                 config.sides[*guard] = if plus(i) { highs[i] } else { lows[i] };
             }
             follower.ask_new(&mut config);
-            let (compiled, rates) = follower.rates(&config);
+            let own = follower.equation.compiled(&config);
+            let asked = zero.iter().map(|g| own.place(*g).is_some()).collect();
+            let (compiled, rates) = follower.rates_with(&config, &zero);
             let place: Vec<Option<usize>> = zero.iter().map(|g| compiled.place(*g)).collect();
-            (config, place, rates)
+            (config, place, rates, asked)
         };
         let k = zero.len();
         // Sets of functions that depend on each other.
         let sets = if k == 1 {
             vec![vec![0]]
         } else {
-            let (config, place0, base) = vertex(self, &|_| false);
-            let compiled = self.equation.compiled(&config);
+            let (config, place0, ..) = vertex(self, &|_| false);
+            let compiled = self.equation.compiled_with(&config, &zero);
+            // A side may act on a function on one side of a third one alone: all sides of a few
+            // functions are tried, of many those next to all low ones.
+            let patterns: Vec<Vec<bool>> = if k <= MOST_TRIED {
+                (0..1_usize << k).map(|p| (0..k).map(|i| p >> i & 1 == 1).collect()).collect()
+            } else {
+                (0..=k).map(|one| (0..k).map(|i| i + 1 == one).collect()).collect()
+            };
+            let mut known: HashMap<Vec<bool>, Vertex> = HashMap::new();
             let mut coupled = vec![false; k * k];
             for j in 0..k {
                 // Without a way from the side to a function nothing has to be computed.
@@ -184,15 +197,21 @@ impl Follower<'_> {
                 if !self.equation.chooses(zero[j]) && !(0..k).any(other) {
                     continue;
                 }
-                let (_, place, rates) = vertex(self, &|i| i == j);
-                for i in 0..k {
-                    let (Some(a), Some(b)) = (place0[i], place[i]) else {
-                        coupled[i * k + j] = i != j;
-                        continue;
-                    };
-                    let scale = base.terms[a] + rates.terms[b];
-                    coupled[i * k + j] =
-                        i != j && (base.first[a] - rates.first[b]).abs() > 1e-12 * scale;
+                for without in patterns.iter().filter(|pattern| !pattern[j]) {
+                    let mut with = without.clone();
+                    with[j] = true;
+                    for pattern in [without, &with] {
+                        if !known.contains_key(pattern) {
+                            known.insert(pattern.clone(), vertex(self, &|i| pattern[i]));
+                        }
+                    }
+                    let ((_, from, low, _), (_, to, high, _)) = (&known[without], &known[&with]);
+                    for i in (0..k).filter(|i| *i != j) {
+                        coupled[i * k + j] |= from[i].zip(to[i]).is_none_or(|(a, b)| {
+                            let scale = low.terms[a] + high.terms[b];
+                            (low.first[a] - high.first[b]).abs() > 1e-12 * scale
+                        });
+                    }
                 }
             }
             groups(k, |i, j| coupled[i * k + j])
@@ -220,17 +239,18 @@ impl Follower<'_> {
                     let made = vertex(follower, &all);
                     cache.insert(plus.clone(), made);
                 }
-                let (_, place, rates) = &cache[&plus];
+                let (_, place, rates, asked) = &cache[&plus];
                 let first: Vec<f64> =
                     set.iter().map(|i| place[*i].map_or(f64::NAN, |p| rates.first[p])).collect();
                 let direction: Vec<f64> =
                     set.iter().map(|i| place[*i].map_or(0.0, |p| rates.direction(p))).collect();
-                (rates.field.clone(), first, direction)
+                let asked: Vec<bool> = set.iter().map(|i| asked[*i]).collect();
+                (rates.field.clone(), first, direction, asked)
             };
             // Fields that are the same on both sides decide nothing and need nothing decided.
             if set.len() == 1 {
-                let (low, _, d0) = at(self, vec![false]);
-                let (high, _, d1) = at(self, vec![true]);
+                let (low, _, d0, _) = at(self, vec![false]);
+                let (high, _, d1, _) = at(self, vec![true]);
                 if same(&low, &high) {
                     let side = if d1[0] != 0.0 { d1[0] } else { d0[0] };
                     let present = self.config.sides[zero[set[0]]];
@@ -241,7 +261,7 @@ impl Follower<'_> {
                 // A comparison of what rests, such as a counter: equality is what it says.
                 let guard = zero[set[0]];
                 let rests = |follower: &mut Self, plus: bool| {
-                    let (_, place, rates) = vertex(follower, &|i| i == set[0] && plus);
+                    let (_, place, rates, _) = vertex(follower, &|i| i == set[0] && plus);
                     place[set[0]].is_some_and(|p| rates.terms[p] == 0.0 && rates.second[p] == 0.0)
                 };
                 if self.equation.chooses(guard) && rests(self, false) && rests(self, true) {
@@ -254,24 +274,28 @@ impl Follower<'_> {
                 let slides: Vec<usize> =
                     (0..set.len()).filter(|i| assignment[*i] == Way::Stay).collect();
                 let plus: Vec<bool> = assignment.iter().map(|w| *w == Way::Plus).collect();
-                let (_, base, direction) = at(self, plus.clone());
-                let goes = |i: usize, d: f64| match assignment[i] {
-                    Way::Plus => d > 0.0,
-                    Way::Minus => d < 0.0,
-                    Way::Stay => true,
-                };
-                if slides.is_empty() {
-                    return (0..set.len()).all(|i| goes(i, direction[i]));
-                }
+                let (_, base, direction, mut asked) = at(self, plus.clone());
                 let mut columns = Vec::new();
                 for s in &slides {
                     let mut flipped = plus.clone();
                     flipped[*s] = true;
                     columns.push(at(self, flipped));
                 }
+                for column in &columns {
+                    asked.iter_mut().zip(&column.3).for_each(|(asked, there)| *asked |= there);
+                }
+                let goes = |i: usize, d: f64| match assignment[i] {
+                    Way::Plus => d > 0.0,
+                    // What is not asked there and stays zero changes nothing.
+                    Way::Minus => d < 0.0 || d == 0.0 && !asked[i],
+                    Way::Stay => true,
+                };
+                if slides.is_empty() {
+                    return (0..set.len()).all(|i| goes(i, direction[i]));
+                }
                 let m = slides.len();
                 let mut matrix = vec![0.0; m * m];
-                for (c, (_, rates, _)) in columns.iter().enumerate() {
+                for (c, (_, rates, ..)) in columns.iter().enumerate() {
                     for (r, s) in slides.iter().enumerate() {
                         matrix[r * m + c] = rates[*s] - base[*s];
                     }
@@ -291,7 +315,7 @@ impl Follower<'_> {
                     for vertex in 0..1_usize << m {
                         let mut on = plus.clone();
                         slides.iter().enumerate().for_each(|(i, s)| on[*s] = vertex >> i & 1 == 1);
-                        let (field, rates, _) = at(self, on);
+                        let (field, rates, ..) = at(self, on);
                         fields.push(field);
                         speeds.push(rates);
                     }
@@ -324,7 +348,7 @@ impl Follower<'_> {
                 }
                 (0..set.len()).filter(|i| !slides.contains(i)).all(|i| {
                     let added =
-                        || columns.iter().zip(&weights).map(|((_, r, _), w)| w * (r[i] - base[i]));
+                        || columns.iter().zip(&weights).map(|((_, r, ..), w)| w * (r[i] - base[i]));
                     let (rate, size) = (
                         base[i] + added().sum::<f64>(),
                         added().fold(base[i].abs(), |a, v| a + v.abs()),

@@ -26,10 +26,11 @@ impl Follower<'_> {
         for guard in &sliding {
             config.sides[*guard] = self.low(*guard);
         }
+        let also = self.asked_beyond(&mut config, &sliding);
         self.slides.fill(false);
         sliding.iter().for_each(|guard| self.slides[*guard] = true);
         self.sliding = sliding;
-        self.compiled = self.equation.compiled(&config);
+        self.compiled = self.equation.compiled_with(&config, &also);
         self.variables = self.load(&config);
         self.config = config;
         self.separate = self.separate();
@@ -56,6 +57,40 @@ impl Follower<'_> {
                 () => '-',
             })
             .collect();
+    }
+
+    /// The guards that the equations ask on other sides of what is slid upon, where `config` is the
+    /// lower one, and not there: the field on those sides is a part of the motion, too. Those that
+    /// were not asked before get the sides that they are on.
+    fn asked_beyond(&mut self, config: &mut Configuration, sliding: &[usize]) -> Vec<usize> {
+        let chooses: Vec<usize> =
+            sliding.iter().copied().filter(|g| self.equation.chooses(*g)).collect();
+        if chooses.is_empty() {
+            return Vec::new();
+        }
+        let here = self.equation.compiled(config);
+        let mut also = Vec::new();
+        // All corners of a few surfaces; of many each by itself.
+        let k = chooses.len();
+        let corners: Vec<usize> =
+            if k <= MOST_TOGETHER { (1..1 << k).collect() } else { Vec::new() };
+        let flips = corners
+            .into_iter()
+            .map(|corner| (0..k).filter(|i| corner >> i & 1 == 1).collect::<Vec<_>>())
+            .chain((0..if k > MOST_TOGETHER { k } else { 0 }).map(|i| vec![i]));
+        for flip in flips {
+            let mut flipped = config.clone();
+            flip.iter().for_each(|i| flipped.sides[chooses[*i]] = self.high(chooses[*i]));
+            self.ask_new(&mut flipped);
+            for guard in &self.equation.compiled(&flipped).active {
+                if !here.active.contains(guard) && !also.contains(guard) {
+                    config.sides[*guard] = flipped.sides[*guard];
+                    also.push(*guard);
+                }
+            }
+        }
+        also.sort_unstable();
+        also
     }
 
     /// For several surfaces slid upon of which none changes another's speed: which of them each
@@ -345,7 +380,16 @@ impl Follower<'_> {
     /// The compiled equation of a configuration, and the rates of its watched values at the present
     /// point.
     pub(super) fn rates(&mut self, config: &Configuration) -> (Rc<Compiled>, Rates) {
-        let compiled = self.equation.compiled(config);
+        self.rates_with(config, &[])
+    }
+
+    /// The same, with the rates of these guards even where the equations do not ask them.
+    pub(super) fn rates_with(
+        &mut self,
+        config: &Configuration,
+        also: &[usize],
+    ) -> (Rc<Compiled>, Rates) {
+        let compiled = self.equation.compiled_with(config, also);
         let variables = self.load(config);
         let n = self.n;
         let mut field = vec![0.0; n];
