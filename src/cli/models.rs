@@ -37,8 +37,7 @@ pub fn names_a_file(name: &str) -> bool {
 /// The names of all built-in systems, after advice if one of them is like `name`.
 pub fn known(name: &str) -> (String, String) {
     let known: Vec<&str> = library::names().chain(library::general_names()).collect();
-    let near =
-        nearest(name, &known).map_or(".".into(), |near| format!(". Did you mean {near}?"));
+    let near = nearest(name, &known).map_or(".".into(), |near| format!(": did you mean {near}?"));
     (near, known.join(", "))
 }
 

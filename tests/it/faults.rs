@@ -104,7 +104,7 @@ fn wrong_numbers_are_named() {
         (vec!["--restart", "-20"], vec!["--restart"]),
         (vec!["--kick-every", "0"], vec!["--kick-every"]),
         (vec!["--kick-every", "0.3", "--kick-size", "-1"], vec!["--kick-size"]),
-        (vec!["--start", "1,2"], vec!["--start", "give 3, one for each of x, y, z"]),
+        (vec!["--start", "1,2"], vec!["--start", "3 wanted, a number for each of x, y, z"]),
         (vec!["--start", "1,2,NaN"], vec!["--start"]),
         (vec!["--section", "q=0"], vec!["--section", "x, y, z", "y=0"]),
         (vec!["--section", "y"], vec!["--section", "y=0"]),
@@ -485,6 +485,35 @@ fn an_interrupted_sweep_keeps_its_rows() {
     let part = twofold(&["sweep", "merge", journal.to_str().unwrap(), "--quiet"]);
     assert!(String::from_utf8(part.stdout).unwrap().lines().count() >= 5);
     refuses(&twofold(&["sweep", "--t-end", "300", "--out", to]), 2, &["--resume"]);
+}
+
+/// A table of another sweep is not gone on with, and nothing is left beside it that would be in the
+/// way of its own sweep.
+#[test]
+fn a_refused_resume_leaves_nothing_behind() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("sweep.csv");
+    let to = out.to_str().unwrap();
+    let sweep = |alphas: &str, resume: &[&str]| {
+        let over = format!("params.alpha={alphas}");
+        let own = ["sweep", "--t-end", "5", "--quiet", "--over", &over, "--out", to];
+        twofold(&[&own, resume].concat())
+    };
+    assert!(sweep("0.1,0.2", &[]).status.success());
+    let table = std::fs::read(&out).unwrap();
+    refuses(&sweep("0.1,0.3", &["--resume"]), 2, &["sweep.csv", "different sweeps"]);
+    assert_eq!(files(folder.path()), ["sweep.csv"]);
+    assert!(sweep("0.1,0.2", &["--resume"]).status.success());
+    assert_eq!(std::fs::read(&out).unwrap(), table);
+    // A table in JSON is not read again.
+    let json = folder.path().join("sweep.json");
+    let again =
+        ["sweep", "--t-end", "5", "--runs", "2", "--quiet", "--out", json.to_str().unwrap()];
+    assert!(twofold(&again).status.success());
+    refuses(&twofold(&[&again[..], &["--resume"]].concat()), 2, &["sweep.json", "JSON"]);
+    assert_eq!(files(folder.path()), ["sweep.csv", "sweep.json"]);
+    refuses(&twofold(&["audit", json.to_str().unwrap()]), 2, &["FILE.csv"]);
+    refuses(&twofold(&["audit", to, "--rows", "0"]), 2, &["--rows 0"]);
 }
 
 /// Killed without warning and gone on with, whole or in parts: the same bytes.

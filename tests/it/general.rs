@@ -391,7 +391,7 @@ fn wrong_files_and_flags_are_refused() {
             &["c.toml:5:8", "no mode `on`"],
         ),
         ("d.json", r#"{"states": ["x"], "f": ["y"]}"#, &["d.json, f.1", "unknown name `y`"]),
-        ("e.toml", "states = ['x']\nf = ['1']", &["--start, 1 numbers"]),
+        ("e.toml", "states = ['x']\nf = ['1']", &["--start: a number for each of x"]),
     ] {
         fs::write(at.join(file), text).unwrap();
         refused(at, &["run", "--quiet", "--system", file], 2, expected);
@@ -427,7 +427,7 @@ fn wrong_files_and_flags_are_refused() {
     ball(&["--exit", "all"], 2, &["at-once:plus or at-once:minus"]);
     ball(&["--set", "q=1"], 2, &["no parameter `q`", "g, r"]);
     ball(&["--set", "r=1"], 2, &["--set \"r=1\": `r` is 1", "below 1"]);
-    ball(&["--start", "1"], 2, &["--start has 1 numbers; give 2"]);
+    ball(&["--start", "1"], 2, &["--start: 1 given, 2 wanted"]);
     ball(&["--section", "x - w = 0"], 2, &["unknown name `w`"]);
     ball(&["--section", "x > v = 0"], 2, &["a condition is no number"]);
     ball(&["--section", "x = 0", "--every", "1"], 2, &["--every has no effect"]);

@@ -251,7 +251,7 @@ fn a_file_on_the_command_line() {
     problem(&["--set", "gian=2"], &["--set \"gian=2\"", "did you mean `gain`?"]);
     problem(&["--set", "gain"], &["there is no \"=\""]);
     problem(&["--set", "gain=two"], &["not a decimal number"]);
-    problem(&["--start", "1,2,3"], &["--start has 3 numbers; give 2, one for each of x, v"]);
+    problem(&["--start", "1,2,3"], &["--start: 3 given, 2 wanted, a number for each of x, v"]);
     problem(&["--alpha", "0.1"], &["--alpha", "belongs to the caricature"]);
     problem(&["--section", "y=0"], &["no such coordinate", "x, v"]);
     fs::write(file, good.replace("gain*v", "gian*v")).unwrap();

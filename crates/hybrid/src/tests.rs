@@ -1798,8 +1798,8 @@ fn the_domain_of_a_switching_function_ends() {
     }
 }
 
-/// What a surface's other side asks is a part of sliding on it, and what ends sliding may be asked
-/// on one side only, or nowhere afterwards.
+/// Conditions of a surface's other side are a part of sliding on it, and a condition that ends
+/// sliding may be asked on one side only, or nowhere afterwards.
 #[test]
 fn sliding_sees_the_conditions_of_both_sides() {
     for f in [

@@ -66,6 +66,9 @@ struct Report {
 
 pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let progress = Progress::new(arguments.quiet);
+    if arguments.rows == 0 && !arguments.all {
+        return Err(CliError::Usage("--rows 0 checks nothing: give a number above 0".into()));
+    }
     // Everything is read before the first second of computing is spent.
     let subjects = arguments.what.iter().map(|what| read(what)).collect::<Result<Vec<_>, _>>()?;
     let mut reports = Vec::new();
@@ -103,6 +106,12 @@ fn read(what: &str) -> Result<Sweeps, CliError> {
     if what.to_ascii_lowercase().ends_with(".csv") {
         let bytes = record::files::read(Path::new(what))?;
         return Ok(vec![(what.to_owned(), rows_of(what, &bytes)?)]);
+    }
+    if Path::new(what).is_file() {
+        return Err(CliError::Usage(format!(
+            "{}: only finished tables of `twofold sweep` in CSV are checked (FILE.csv)",
+            harmless(what)
+        )));
     }
     let figure = chosen(&[what.to_owned()])?.remove(0);
     let sweeps = figures::data(&figure.id);

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 
-use crate::cli::flags::{RunFlags, Use};
 use super::run::said_how_it_ended;
+use crate::cli::flags::{RunFlags, Use};
 use crate::cli::general;
 use crate::cli::progress::Progress;
 use crate::cli::speak::{deliver, is_standard_output, try_delivery};

@@ -62,10 +62,9 @@ impl Arguments {
             };
             let (name, range) = text.split_once('=').ok_or_else(|| wrong("there is no \"=\""))?;
             let (low, high) = range.split_once("..").ok_or_else(|| wrong("there is no \"..\""))?;
-            let state = names
-                .iter()
-                .position(|n| *n == name.trim())
-                .ok_or_else(|| wrong("there is no such state"))?;
+            let state = names.iter().position(|n| *n == name.trim()).ok_or_else(|| {
+                wrong(&format!("there is no such state among {}", names.join(", ")))
+            })?;
             let number =
                 |text: &str| text.trim().parse::<f64>().map_err(|_| wrong("a bound is no number"));
             within[state] = (number(low)?, number(high)?);

@@ -41,8 +41,8 @@ const DRAW_SEED: u64 = 2013;
     args_conflicts_with_subcommands = true,
     after_help = "What can be varied: params.NAME, start.NAME, shift.NAME (added to the start), \
         rtol, atol, tolerance (both), max-step, t-end,\n\
-    interval (between restarts), eps, eps-prime, sigma, kick-every, kick-size, seed, stream, \
-    method.\n\
+    interval (between restarts), eps, eps-prime, delay, band, sigma, kick-every, kick-size, seed, \
+    stream, method.\n\
     Values: a,b,c; FROM..TO:COUNT; FROM..TO:log:COUNT; STEP*COUNT; FROM..TO and FROM..TO:log drawn \
     at random; seed=FIRST..LAST.\n\n\
     Examples:\n  \
@@ -262,19 +262,29 @@ fn open(
         );
         return Err(refuse(&path, why));
     }
-    if lines.is_empty() {
-        journal.append(&rows.journal_heading())?;
-    } else {
-        let heading = rows.journal_heading();
+    let heading = rows.journal_heading();
+    if !lines.is_empty() {
         let old = Rows::from_journal(&lines).map_err(|e| refuse(&path, e.to_string()))?;
         take(arguments, rows, old, &path)?;
-        if !lines.contains(&heading) {
-            journal.append(&heading)?;
+    }
+    if arguments.resume && out.exists() {
+        let old = if format == Format::Json {
+            let why =
+                "a finished table in JSON is not read again; write CSV, or leave out --resume";
+            Err(refuse(out, why.into()))
+        } else {
+            read_rows(out)
+        };
+        if let Err(error) = old.and_then(|old| take(arguments, rows, old, out)) {
+            // A journal of this sweep beside a table of another one would be in the way of both.
+            if lines.is_empty() {
+                journal.remove()?;
+            }
+            return Err(error);
         }
     }
-    if arguments.resume && out.exists() && format != Format::Json {
-        let old = read_rows(out)?;
-        take(arguments, rows, old, out)?;
+    if !lines.contains(&heading) {
+        journal.append(&heading)?;
     }
     Ok(journal)
 }

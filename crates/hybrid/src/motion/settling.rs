@@ -286,7 +286,7 @@ impl Follower<'_> {
                 }
                 let goes = |i: usize, d: f64| match assignment[i] {
                     Way::Plus => d > 0.0,
-                    // What is not asked there and stays zero changes nothing.
+                    // A function that is not asked there and stays zero changes nothing.
                     Way::Minus => d < 0.0 || d == 0.0 && !asked[i],
                     Way::Stay => true,
                 };
