@@ -514,6 +514,11 @@ fn a_refused_resume_leaves_nothing_behind() {
     assert_eq!(files(folder.path()), ["sweep.csv", "sweep.json"]);
     refuses(&twofold(&["audit", json.to_str().unwrap()]), 2, &["FILE.csv"]);
     refuses(&twofold(&["audit", to, "--rows", "0"]), 2, &["--rows 0"]);
+    // Nor does a flag that is refused after the journal was begun.
+    let many = folder.path().join("many.csv");
+    let many = ["sweep", "--t-end", "5", "--threads", "2000", "--out", many.to_str().unwrap()];
+    refuses(&twofold(&many), 2, &["--threads"]);
+    assert_eq!(files(folder.path()), ["sweep.csv", "sweep.json"]);
 }
 
 /// Killed without warning and gone on with, whole or in parts: the same bytes.

@@ -218,7 +218,18 @@ fn computed(arguments: &Arguments) -> Result<Exit, CliError> {
     if arguments.resume {
         progress.line(&format!("{} rows are there, {} to compute", rows.len(), pending.left()));
     }
-    let rows = compute(rows, pending, journal.as_mut(), arguments.threads, &progress)?;
+    let none_yet = rows.is_empty();
+    let rows = match compute(rows, pending, journal.as_mut(), arguments.threads, &progress) {
+        Ok(rows) => rows,
+        Err(error) => {
+            // A flag that was refused computed nothing: no journal stays that holds nothing.
+            let refused = matches!(error, CliError::Usage(_) | CliError::Threads { .. });
+            if let Some(journal) = journal.filter(|_| refused && none_yet) {
+                journal.remove()?;
+            }
+            return Err(error);
+        }
+    };
     let wanted = arguments.shard.count(&sweep);
     let left = rows.missing_count(arguments.shard);
     if left > 0
