@@ -68,7 +68,8 @@ impl Arguments {
             let number =
                 |text: &str| text.trim().parse::<f64>().map_err(|_| wrong("a bound is no number"));
             within[state] = (number(low)?, number(high)?);
-            if !(within[state].0 < within[state].1) {
+            let (low, high) = within[state];
+            if low.partial_cmp(&high) != Some(std::cmp::Ordering::Less) {
                 return Err(wrong("the lower bound comes first and is less than the other"));
             }
         }
