@@ -21,9 +21,9 @@ pub(crate) use sliding::determinant_of_negative;
 
 use std::rc::Rc;
 
-use twofold_num::{Dual, Short};
 use twofold_num::elementary::rough_pow;
 use twofold_num::linear::solve_any;
+use twofold_num::{Dual, Short};
 use twofold_system::Expression;
 
 use crate::definition::{Direction, When};
