@@ -159,98 +159,22 @@ def hysteretic(alpha):
 
 
 HIRES_0 = [1, 0, 0, 0, 0, 0, 0, 0.0057]
+# Tolerances of the test problems, and those about NDSolve's default of the paper's system.
+DECADES = [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10]
+ABOUT_DEFAULT = [1e-6, 1e-7, 10**-7.97727, 1e-9, 1e-10]
+START = [0.2, 0, -1]
 # name, (f, jacobian), start, end, step cap, tolerances, atol over rtol
 PROBLEMS = [
-    (
-        "robertson",
-        (robertson, robertson_jac),
-        [1, 0, 0],
-        4e5,
-        np.inf,
-        [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10],
-        1e-4,
-    ),
-    (
-        "van-der-pol-1",
-        van_der_pol(1),
-        [2, 0],
-        20,
-        np.inf,
-        [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10],
-        1,
-    ),
-    (
-        "van-der-pol-1000",
-        van_der_pol(1000),
-        [2, 0],
-        2000,
-        np.inf,
-        [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10],
-        1,
-    ),
-    (
-        "oregonator",
-        (oregonator, oregonator_jac),
-        [1, 2, 3],
-        360,
-        np.inf,
-        [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10],
-        1,
-    ),
-    (
-        "hires",
-        (hires, hires_jac),
-        HIRES_0,
-        321.8122,
-        np.inf,
-        [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10],
-        1e-2,
-    ),
-    (
-        "lorenz",
-        (lorenz, lorenz_jac),
-        [1, 1, 1],
-        10,
-        np.inf,
-        [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10],
-        1,
-    ),
-    (
-        "smoothed-printed",
-        smoothed(1e-3),
-        [0.2, 0, -1],
-        10,
-        0.25,
-        [1e-6, 1e-7, 10**-7.97727, 1e-9, 1e-10],
-        1,
-    ),
-    (
-        "smoothed-reconstructed",
-        smoothed(1e-1),
-        [0.2, 0, -1],
-        10,
-        0.25,
-        [1e-6, 1e-7, 10**-7.97727, 1e-9, 1e-10],
-        1,
-    ),
-    (
-        "hysteretic-printed",
-        hysteretic(1e-3),
-        [0.2, 0, -1, 1],
-        10,
-        0.25,
-        [1e-6, 1e-7, 10**-7.97727, 1e-9, 1e-10],
-        1,
-    ),
-    (
-        "hysteretic-reconstructed",
-        hysteretic(1e-1),
-        [0.2, 0, -1, 1],
-        10,
-        0.25,
-        [1e-6, 1e-7, 10**-7.97727, 1e-9, 1e-10],
-        1,
-    ),
+    ("robertson", (robertson, robertson_jac), [1, 0, 0], 4e5, np.inf, DECADES, 1e-4),
+    ("van-der-pol-1", van_der_pol(1), [2, 0], 20, np.inf, DECADES, 1),
+    ("van-der-pol-1000", van_der_pol(1000), [2, 0], 2000, np.inf, DECADES, 1),
+    ("oregonator", (oregonator, oregonator_jac), [1, 2, 3], 360, np.inf, DECADES, 1),
+    ("hires", (hires, hires_jac), HIRES_0, 321.8122, np.inf, DECADES, 1e-2),
+    ("lorenz", (lorenz, lorenz_jac), [1, 1, 1], 10, np.inf, DECADES, 1),
+    ("smoothed-printed", smoothed(1e-3), START, 10, 0.25, ABOUT_DEFAULT, 1),
+    ("smoothed-reconstructed", smoothed(1e-1), START, 10, 0.25, ABOUT_DEFAULT, 1),
+    ("hysteretic-printed", hysteretic(1e-3), [*START, 1], 10, 0.25, ABOUT_DEFAULT, 1),
+    ("hysteretic-reconstructed", hysteretic(1e-1), [*START, 1], 10, 0.25, ABOUT_DEFAULT, 1),
 ]
 
 
