@@ -40,6 +40,8 @@ pub struct FloquetOptions {
     pub iterations: usize,
     /// Give up on a return after this time.
     pub longest_return: f64,
+    /// And after so many steps: Newton's method may come to states from which one takes days.
+    pub most_steps: u64,
 }
 
 impl Default for FloquetOptions {
@@ -50,6 +52,7 @@ impl Default for FloquetOptions {
             closed: 1e-9,
             iterations: 30,
             longest_return: 1e4,
+            most_steps: 10_000_000,
         }
     }
 }
@@ -74,9 +77,6 @@ pub struct ClosedOrbit {
     pub iterations: usize,
 }
 
-/// Step limit for one return. Newton's method may come to states from which a return takes days.
-const MOST_STEPS: u64 = 10_000_000;
-
 /// Why no closed orbit was found.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Error {
@@ -96,12 +96,14 @@ pub enum Error {
     },
     /// The orbit takes too many steps.
     #[error(
-        "the orbit from {from:?} took {MOST_STEPS} steps without coming back to the plane: start \
-            nearer to the closed orbit"
+        "the orbit from {from:?} took {steps} steps without coming back to the plane: start nearer \
+            to the closed orbit"
     )]
     TooLong {
         /// Start on the plane.
         from: Vec<f64>,
+        /// Steps given.
+        steps: u64,
     },
     /// Newton's method did not converge.
     #[error(
@@ -318,8 +320,8 @@ fn returned<const N: usize, const M: usize, T: VectorField<M>>(
     let passes = (tangent.eval(&state)[plane.axis] > 0.0) == plane.upward;
     stepper.restart(tangent, t, state, settings.longest_return, settings.max_step)?;
     while t < settings.longest_return {
-        if stepper.statistics().steps >= MOST_STEPS {
-            return Err(Error::TooLong { from: Failure::state(&u) });
+        if stepper.statistics().steps >= settings.most_steps {
+            return Err(Error::TooLong { from: Failure::state(&u), steps: settings.most_steps });
         }
         let step = stepper.step(tangent)?;
         let (t0, state0) = (step.t0, step.x0);
@@ -580,6 +582,8 @@ mod tests {
         };
         let short = of(FloquetOptions { longest_return: 6.0, ..FloquetOptions::default() });
         assert_eq!(short, Err(Error::NoReturn { from: vec![1.2, 0.0], within: 6.0 }));
+        let few = of(FloquetOptions { most_steps: 10, ..FloquetOptions::default() });
+        assert_eq!(few, Err(Error::TooLong { from: vec![1.2, 0.0], steps: 10 }));
         // After one iteration it still misses itself, by what Newton's method makes of a start 0.2
         // off.
         let Err(Error::NotConverged { residual, iterations: 1 }) =
