@@ -96,18 +96,20 @@ pub struct RunFlags {
     /// Final time [default: 150; of an exponent 10000].
     #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
     pub t_end: Option<f64>,
-    /// Integration method [default: lsoda; dopri5 with --switch filippov, delayed or relay].
+    /// Integration method [default: lsoda; dopri5 with --switch filippov, delayed or relay, and of
+    /// general systems, which take dopri5, radau5 and taylor].
     #[arg(long, value_enum, help_heading = "Method")]
     pub method: Option<Method>,
     /// Relative tolerance [default: 10^-7.97727, NDSolve's; with taylor-extended 1e-32 or what
-    /// --precision allows; of exponents 1e-9, of closed orbits 1e-11].
+    /// --precision allows; of exponents 1e-9, of closed orbits 1e-11, of general systems 1e-10].
     #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
     pub rtol: Option<f64>,
-    /// Absolute tolerance [default: that of --rtol's default].
+    /// Absolute tolerance [default: that of --rtol's default; of general systems by the states'
+    /// sizes].
     #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
     pub atol: Option<f64>,
     /// Longest step, inf for any [default: a tenth of the time between restarts or kicks,
-    /// NDSolve's].
+    /// NDSolve's; of general systems inf].
     #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
     pub max_step: Option<f64>,
     /// Number of steps after which the run is given up [default: 400000000].

@@ -107,13 +107,14 @@ fn read(what: &str) -> Result<Sweeps, CliError> {
         let bytes = record::files::read(Path::new(what))?;
         return Ok(vec![(what.to_owned(), rows_of(what, &bytes)?)]);
     }
-    if Path::new(what).is_file() {
+    let named = chosen(&[what.to_owned()]);
+    if named.is_err() && Path::new(what).is_file() {
         return Err(CliError::Usage(format!(
             "{}: only finished tables of `twofold sweep` in CSV are checked (FILE.csv)",
             harmless(what)
         )));
     }
-    let figure = chosen(&[what.to_owned()])?.remove(0);
+    let figure = named?.remove(0);
     let sweeps = figures::data(&figure.id);
     if sweeps.is_empty() {
         let id = figure.id.to_string();
