@@ -13,6 +13,11 @@ const MOST_TRIED: usize = 4;
 /// its equations ask.
 type Vertex = (Configuration, Vec<Option<usize>>, Rates, Vec<bool>);
 
+/// The guards that are not asked.
+fn others(guards: &[usize], asked: &[bool]) -> Vec<usize> {
+    guards.iter().zip(asked).filter(|(_, asked)| !**asked).map(|(guard, _)| *guard).collect()
+}
+
 impl Follower<'_> {
     /// The size of the terms that an expression is a sum of, with states as large as they have been
     /// in this run: what rounding is measured by.
@@ -162,8 +167,8 @@ impl Follower<'_> {
             }
             follower.ask_new(&mut config);
             let own = follower.equation.compiled(&config);
-            let asked = zero.iter().map(|g| own.place(*g).is_some()).collect();
-            let (compiled, rates) = follower.rates_with(&config, &zero);
+            let asked: Vec<bool> = zero.iter().map(|g| own.place(*g).is_some()).collect();
+            let (compiled, rates) = follower.rates_with(&config, &others(&zero, &asked));
             let place: Vec<Option<usize>> = zero.iter().map(|g| compiled.place(*g)).collect();
             (config, place, rates, asked)
         };
@@ -172,15 +177,18 @@ impl Follower<'_> {
         let sets = if k == 1 {
             vec![vec![0]]
         } else {
-            let (config, place0, ..) = vertex(self, &|_| false);
-            let compiled = self.equation.compiled_with(&config, &zero);
+            let (config, place0, _, asked) = vertex(self, &|_| false);
+            let compiled = self.equation.compiled_with(&config, &others(&zero, &asked));
             // A side may act on a function on one side of a third one alone: all sides of a few
-            // functions are tried, of many those next to all low ones.
-            let patterns: Vec<Vec<bool>> = if k <= MOST_TRIED {
-                (0..1_usize << k).map(|p| (0..k).map(|i| p >> i & 1 == 1).collect()).collect()
-            } else {
-                (0..=k).map(|one| (0..k).map(|i| i + 1 == one).collect()).collect()
+            // functions are tried, of many those next to all low ones. Mostly none is.
+            let sides = || -> Vec<Vec<bool>> {
+                if k <= MOST_TRIED {
+                    (0..1_usize << k).map(|p| (0..k).map(|i| p >> i & 1 == 1).collect()).collect()
+                } else {
+                    (0..=k).map(|one| (0..k).map(|i| i + 1 == one).collect()).collect()
+                }
             };
+            let mut patterns = Vec::new();
             let mut known: HashMap<Vec<bool>, Vertex> = HashMap::new();
             let mut coupled = vec![false; k * k];
             for j in 0..k {
@@ -196,6 +204,9 @@ impl Follower<'_> {
                 let other = |i: usize| i != j && acts(&place0[i]);
                 if !self.equation.chooses(zero[j]) && !(0..k).any(other) {
                     continue;
+                }
+                if patterns.is_empty() {
+                    patterns = sides();
                 }
                 for without in patterns.iter().filter(|pattern| !pattern[j]) {
                     let mut with = without.clone();
