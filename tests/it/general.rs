@@ -920,3 +920,46 @@ fn sensitivities_of_a_run() {
     near(table.numbers("start.v")[v], 0.0, 1e-12);
     near(table.numbers("params.belt")[v], 1.0, 1e-9);
 }
+
+/// A picture says how its run ended, a branch that is written to a file where it bifurcates, a rest
+/// at which the fields are tangent that it has no linear motion.
+#[test]
+fn pictures_branches_and_rests_say_what_they_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let ball = "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-9.81']\n[[event]]\nname = \
+        'impact'\nwhen = 'x'\ndirection = 'down'\nset = { v = '-0.8*v' }";
+    fs::write(at.join("ball.toml"), ball).unwrap();
+    let (code, _, err) =
+        twofold_in(at, &["plot", "--quiet", "--system", "ball.toml", "--out", "ball.svg"]);
+    assert!(
+        code == 0 && err.contains("impact happens infinitely often before t = 4.0637"),
+        "{err}"
+    );
+    let (code, _, err) = twofold_in(
+        at,
+        &[
+            "orbit",
+            "--system",
+            "buck",
+            "--period",
+            "400e-6",
+            "--settle",
+            "0.05",
+            "--along",
+            "input=24.4..24.6:4",
+            "--out",
+            "branch.csv",
+        ],
+    );
+    assert!(code == 0 && err.contains("period-doubling: at input = 24.516"), "{err}");
+    fs::write(at.join("fused.toml"), "states = ['x', 'y']\nf = ['y', '-x - 0.2*sign(x)']").unwrap();
+    let within = ["--within", "x=-3..3", "--within", "y=-3..3"];
+    let rests = good(at, &[&["rests", "--system", "fused.toml"][..], &within].concat());
+    let rests = String::from_utf8(rests).unwrap();
+    assert!(rests.contains("to which the fields are tangent: x = 0, y = 0"), "{rests}");
+    assert_eq!(rests.lines().count(), 1, "{rests}");
+    refused(at, &["rests", "--system", "none.toml"], 2, &["cannot read none.toml"]);
+    let turned = ["rests", "--system", "fused.toml", "--within", "x=3..-3"];
+    refused(at, &turned, 2, &["the lower bound comes first"]);
+}

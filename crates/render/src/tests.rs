@@ -543,3 +543,18 @@ fn a_picture_that_claims_too_much_is_refused_before_memory_is_asked_for() {
         assert!(decode_png(&bytes[..end]).is_err());
     }
 }
+
+#[test]
+fn an_axis_covers_its_values_and_no_rounding() {
+    let covers = |values: &[f64]| {
+        let axis = Axis::covering("", values.iter().copied());
+        (axis.lower, axis.upper)
+    };
+    let (lower, upper) = covers(&[0.0, 1.0, f64::NAN]);
+    assert!((lower + 0.04).abs() < 1e-15 && (upper - 1.04).abs() < 1e-15);
+    // A billionth of its size is a range still, roundings of one value are none.
+    let (lower, upper) = covers(&[1.0, 1.0 + 2e-9]);
+    assert!(lower < 1.0 && upper > 1.0 + 2e-9);
+    let (lower, upper) = covers(&[0.1 - 2e-17, 0.1, 0.1 + 2e-17]);
+    assert!(lower == upper && (lower - 0.1).abs() < 1e-16);
+}
