@@ -176,8 +176,8 @@ impl Store {
     }
 
     /// The entries, sorted by path. Only what the program wrote is one: a plain file at
-    /// XX/KEY.answer that is an answer with its digest, or a damaged one that begins as the answer
-    /// to KEY does. Links are not followed, and everything else is passed over.
+    /// XX/KEY.answer that is an answer with its digest, or a damaged one that begins as answers do.
+    /// Links are not followed, and everything else is passed over.
     ///
     /// # Errors
     ///
@@ -201,7 +201,7 @@ impl Store {
                     continue;
                 };
                 let whole = read(&bytes).ok().map(|(header, _)| header);
-                if whole.is_some() || is_entry_of(key, &bytes) {
+                if whole.is_some() || was_entry(key, &bytes) {
                     let current =
                         whole.is_some_and(|h| h.numerics == NUMERICS && h.key.as_str() == key);
                     entries.push(Entry {
@@ -244,13 +244,10 @@ fn names(folder: &Path, wanted: impl Fn(&FileType) -> bool) -> Result<Vec<String
     Ok(names)
 }
 
-/// Whether these bytes begin as an answer to `key` does, of any version of the numerics. The rest
-/// may be damaged.
-fn is_entry_of(key: &str, bytes: &[u8]) -> bool {
-    header_of(bytes).is_ok_and(|(header, _)| {
-        serde_json::from_slice::<Value>(header)
-            .is_ok_and(|header| header["key"].as_str() == Some(key))
-    })
+/// Whether a file of this name that begins so was an answer, of any version of the numerics. The
+/// rest may be damaged.
+fn was_entry(key: &str, bytes: &[u8]) -> bool {
+    bytes.starts_with(MAGIC) && key.len() == DIGEST && key.bytes().all(|b| b.is_ascii_hexdigit())
 }
 
 /// An entry of a store, from outside.
@@ -415,6 +412,8 @@ mod tests {
         fs::write(store.path(&key), &whole[..whole.len() - 1]).unwrap();
         assert!(!store.entries().unwrap()[0].current, "damaged, and ours by its header");
         assert_eq!(store.prune(|_| true).unwrap(), whole.len() as u64 - 1);
+        fs::write(store.path(&key), &whole[..20]).unwrap();
+        assert_eq!(store.prune(|entry| !entry.current).unwrap(), 20, "its header is cut, too");
         assert!(notes.iter().all(|note| fs::read(note).unwrap() == b"work"));
         assert!(at("store/zz.answer").exists());
         assert_eq!(elsewhere.get(&key, &question), Kept::Answer(answer.clone()));

@@ -170,7 +170,8 @@ fn section_panels(
         }
     }
     let middle = wording::number(0.5 * picture.panels[0].run.t_end);
-    let late = format!("*t* > {middle}, as in the paper");
+    let as_there = if picture.alterations.is_empty() { ", as in the paper" } else { "" };
+    let late = format!("*t* > {middle}{as_there}");
     sheet = sheet.legend(LegendEntry::new(LegendKey::Dots(DotStyle::late()), late));
     if halves.contains(&Half::Early) {
         let early = format!("*t* ≤ {middle}");

@@ -114,6 +114,12 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
             Some(manifest)
         }
     };
+    if let Some(folder) = arguments.expected.as_ref().filter(|folder| !folder.is_dir()) {
+        return Err(CliError::Usage(format!(
+            "--expected {}: there is no such folder; it holds figN/expected.json",
+            folder.display()
+        )));
+    }
     // Every manifest is read before the first second of computing is spent.
     let manifests: Vec<Result<Manifest, CliError>> = figures
         .iter()

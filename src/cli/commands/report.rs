@@ -105,7 +105,11 @@ fn report(arguments: &Arguments) -> Result<Exit, CliError> {
     Ok(Exit::Fine)
 }
 
-/// The committed manifests and pictures; none if the folder is not there.
+/// The committed manifests and pictures.
+///
+/// # Errors
+///
+/// If the folder that was named is none.
 pub fn references(given: Option<&Path>) -> Result<Vec<FileBytes>, CliError> {
     let folder = given.unwrap_or(Path::new("figures"));
     // Away from a checkout, those that this program was built with: hashes only, no pictures.
@@ -119,8 +123,11 @@ pub fn references(given: Option<&Path>) -> Result<Vec<FileBytes>, CliError> {
         };
         return Ok(figures::all().iter().filter_map(embedded).collect());
     }
-    if !folder.exists() {
-        return Ok(Vec::new());
+    if !folder.is_dir() {
+        return Err(CliError::Usage(format!(
+            "--expected {}: there is no such folder; it holds figN/expected.json",
+            folder.display()
+        )));
     }
     Ok(figures::references_in(folder)?)
 }

@@ -107,12 +107,14 @@ impl<'a> Turns<'a> {
         let mut from = n - blocks * length;
         if let Some(s) = settled {
             // A fast approach fits within one block: follow it point by point through the linear
-            // neighbourhood.
+            // neighbourhood, equally far back whatever the run's length, on which a block's
+            // depends. No further: small chaos may stay in that neighbourhood, too.
             let near = self.distances[..s]
                 .iter()
                 .rposition(|d| *d > th.linear_range * extent)
                 .map_or(0, |i| i + 1);
-            from = from.min(s).min(near.max(from.min(s).saturating_sub(length)));
+            let reach = th.block * self.period;
+            from = from.min(s).min(near.max(from.min(s).saturating_sub(reach)));
         }
         (blocks > 0 || settled.is_some()).then_some(Captured { from, blocks, settled })
     }
@@ -212,10 +214,18 @@ impl<'a> Turns<'a> {
         Some(largest)
     }
 
-    /// Mean distance from the centres in the last block.
-    pub fn radius(&self) -> f64 {
-        let last = &self.distances[self.distances.len().saturating_sub(self.block * self.period)..];
+    /// Mean distance from the centres in the last block, of a settled run without its approach.
+    pub fn radius(&self, captured: &Captured) -> f64 {
+        let block = self.distances.len().saturating_sub(self.block * self.period);
+        let last = &self.distances[captured.settled.map_or(block, |s| s.max(block))..];
         last.iter().sum::<f64>() / last.len() as f64
+    }
+
+    /// Whether the last quarter of the run reaches twice as far from the centres as all before it.
+    pub fn grow(&self) -> bool {
+        let largest = |d: &[f64]| d.iter().fold(0.0_f64, |a, b| a.max(*b));
+        let (before, last) = self.distances.split_at(self.distances.len() / 4 * 3);
+        largest(last) > 2.0 * largest(before)
     }
 
     /// Mean duration of a turn in the last block.
@@ -776,10 +786,18 @@ mod tests {
             (0..40).map(|i| if i < 20 { 9.0 } else { [1.0, 3.0][i % 2] }).collect();
         let points = at(&distances);
         let of = |block: usize| around(&points, &times, &[[0.0; 2]; 2], block);
-        assert_eq!((of(9).duration(), of(10).radius()), (0.5, 2.0));
+        let radius = |block: usize, settled: Option<usize>| {
+            of(block).radius(&Captured { from: 0, blocks: 0, settled })
+        };
+        assert_eq!((of(9).duration(), radius(10, None)), (0.5, 2.0));
         // As many turns as there are: of 40 points, 19.
         assert!((of(20).duration() - (times[39] - times[1]) / 19.0).abs() < 1e-15);
-        assert_eq!(of(20).radius(), 5.5);
+        assert_eq!(radius(20, None), 5.5);
+        // What a settled run was on its way counts no more.
+        assert_eq!(
+            (radius(20, Some(20)), radius(10, Some(4)), radius(10, Some(39))),
+            (2.0, 2.0, 3.0)
+        );
     }
 
     #[test]

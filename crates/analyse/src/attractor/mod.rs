@@ -219,12 +219,12 @@ fn deterministic(
             lyapunov: question.lyapunov,
             bands: occupancy::bands(&points[points.len() / 2..], th),
         }
-    } else if no > yes {
+    } else if no > yes && !turns.grow() {
         let whole = Captured { from: 0, blocks: 0, settled: None };
         Verdict::QuasiPeriodic(describe(&turns, &whole, split, th))
     } else {
-        // A tie, or points that look irregular beside an exponent that is not above zero: neither
-        // is claimed.
+        // A tie, points that look irregular beside an exponent that is not above zero, or regular
+        // motion that reaches further and further out: nothing is claimed.
         Verdict::Undecided { lyapunov: question.lyapunov }
     }
 }
@@ -247,7 +247,7 @@ fn describe(turns: &Turns<'_>, captured: &Captured, split: &Split, th: &Threshol
         period: turns.period,
         points: list,
         duration: turns.duration(),
-        radius: turns.radius(),
+        radius: turns.radius(captured),
         captured_at: times[captured.from],
         settled_at: captured.settled.map(|i| times[i]),
         approach: turns.approach(captured),
@@ -381,6 +381,44 @@ mod tests {
                     "{shown_from}: {e:?}"
                 );
             }
+        }
+    }
+
+    #[test]
+    fn a_capture_has_one_time_however_long_the_run_goes_on() {
+        // Irregular for 700 returns, then towards a dot by 3 % a return, unevenly, so that only
+        // points and not blocks tell the approach.
+        let mut x = 0.4;
+        let mut sea = || {
+            x = 3.97 * x * (1.0 - x);
+            [1.0 + x, 1.0 + x * x]
+        };
+        let mut points: Vec<[f64; 2]> = (0..700).map(|_| sea()).collect();
+        let falls = |i: i32| {
+            0.25 * f64::from(1 + i % 2) * twofold_num::elementary::exp(-0.03 * f64::from(i))
+        };
+        points.extend((0..20_000).map(|i| [1.5 + falls(i), 1.5]));
+        // Within a tenth of the extent, 0.28, from 0.5 exp(-0.58) on.
+        for n in [1100, 1300, 2000, 3000, 5000, 20_700] {
+            let e = judge(points[..n].iter().copied(), |_| true);
+            let cycle = e.verdict.cycle().unwrap_or_else(|| panic!("{n}: {e:?}"));
+            assert!(e.name == "periodic" && cycle.captured_at == 720.0, "{n}: {cycle:?}");
+        }
+    }
+
+    #[test]
+    fn a_spiral_that_grows_without_end_is_on_no_ring() {
+        // Twelve per cent further out a return; a ring of that rotation beside it.
+        for (growth, name) in [(0.11, "undecided"), (0.0, "quasi-periodic")] {
+            let e = judge(
+                (0..400).map(|i| {
+                    let r = twofold_num::elementary::exp(growth * f64::from(i));
+                    let a = 2.3 * f64::from(i);
+                    [r * twofold_num::elementary::cos(a), r * twofold_num::elementary::sin(a)]
+                }),
+                |_| true,
+            );
+            assert_eq!(e.name, name, "{e:?}");
         }
     }
 
