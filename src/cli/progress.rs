@@ -17,7 +17,6 @@ use crate::job;
 static BARS: OnceLock<MultiProgress> = OnceLock::new();
 
 /// Takes bars off the screen.
-#[cfg(unix)]
 fn clear() {
     if let Some(bars) = BARS.get() {
         // A terminal that went away shows none.

@@ -11,6 +11,7 @@ use toml::value::Datetime;
 
 use super::words::Ask;
 use super::{Folder, FolderError, Source};
+use crate::analyse::branch::Change;
 use crate::analyse::counts::wilson;
 use crate::job::general::MeanRate;
 use crate::job::{Answer, AnyQuestion, Executor, JobError, Table};
@@ -65,7 +66,8 @@ pub struct ClaimFile {
     is: Option<Spanned<u64>>,
     /// Whether two attractors are the same.
     same: Option<Spanned<bool>>,
-    /// The kind of a bifurcation.
+    /// The kind of a bifurcation: period-doubling, fold, branching, torus, hopf, vanishing,
+    /// grazing, discontinuity-induced or set-valued.
     kind: Option<Spanned<String>>,
     /// The parameter's value at it.
     at: Option<Spanned<f64>>,
@@ -340,16 +342,26 @@ impl Claim {
                 let same = c.same.as_ref().ok_or_else(|| missing("`same`, true or false"))?;
                 Check::Attractors { same: *same.get_ref(), within: tolerance(Some(ALIKE))? }
             }
-            _ => Check::Bifurcation {
-                kind: c
-                    .kind
-                    .as_ref()
-                    .ok_or_else(|| missing("`kind`, such as period-doubling"))?
-                    .get_ref()
-                    .clone(),
-                at: number(&c.at, "`at`")?,
-                within: tolerance(None)?,
-            },
+            _ => {
+                let kind =
+                    c.kind.as_ref().ok_or_else(|| missing("`kind`, such as period-doubling"))?;
+                let kinds = Change::ALL.map(Change::word);
+                if !kinds.contains(&kind.get_ref().as_str()) {
+                    return Err(wrong(
+                        kind.span(),
+                        format!("there is no bifurcation `{}`", kind.get_ref()),
+                        nearest(kind.get_ref(), &kinds)
+                            .map_or(format!("there are {}", kinds.join(", ")), |near| {
+                                format!("did you mean `{near}`?")
+                            }),
+                    ));
+                }
+                Check::Bifurcation {
+                    kind: kind.get_ref().clone(),
+                    at: number(&c.at, "`at`")?,
+                    within: tolerance(None)?,
+                }
+            }
         };
         if let Some(odds) = &c.odds {
             let OddsFile { starts, spread, at_least, .. } = odds.get_ref();

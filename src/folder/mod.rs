@@ -199,15 +199,13 @@ struct PanelFile {
     /// The measure whose table is drawn.
     of: Option<Spanned<String>>,
     /// Its table [default: the first].
-    table: Option<String>,
+    table: Option<Spanned<String>>,
     /// The horizontal column.
-    x: Option<String>,
+    x: Option<Spanned<String>>,
     /// The vertical columns.
-    #[serde(default)]
-    y: Vec<String>,
+    y: Option<Spanned<Vec<String>>>,
     /// Dots instead of a line.
-    #[serde(default)]
-    dots: bool,
+    dots: Option<Spanned<bool>>,
     /// Titles of the two axes of columns [default: the columns' names].
     labels: Option<Spanned<[String; 2]>>,
     /// Names of the vertical columns in the legend [default: their own].
@@ -228,6 +226,58 @@ enum Draw {
     Halves,
     /// A path in space with the surface where h = 0.
     Surface,
+}
+
+impl Draw {
+    fn word(self) -> &'static str {
+        match self {
+            Draw::Series => "series",
+            Draw::Plane => "plane",
+            Draw::Space => "space",
+            Draw::Section => "section",
+            Draw::Columns => "columns",
+            Draw::Halves => "halves",
+            Draw::Surface => "surface",
+        }
+    }
+}
+
+impl PanelFile {
+    /// Refuses keys that do nothing in a panel drawn so.
+    fn acts(&self, origin: &Origin, draw: Draw) -> Result<(), FolderError> {
+        fn at<T>(value: Option<&Spanned<T>>) -> Option<Range<usize>> {
+            value.map(Spanned::span)
+        }
+        let columns = draw == Draw::Columns;
+        let scored = matches!(draw, Draw::Halves | Draw::Surface);
+        let keys = [
+            ("run", at(self.run.as_ref()), !columns),
+            ("in", self.r#in.keys().next().map(Spanned::span), !columns),
+            ("axes", at(self.axes.as_ref()), !columns),
+            ("camera", at(self.camera.as_ref()), matches!(draw, Draw::Space | Draw::Surface)),
+            ("says", at(self.says.as_ref()), scored),
+            ("repeats", at(self.repeats.as_ref()), scored),
+            ("points", at(self.points.as_ref()), !scored),
+            ("of", at(self.of.as_ref()), columns),
+            ("table", at(self.table.as_ref()), columns),
+            ("x", at(self.x.as_ref()), columns),
+            ("y", at(self.y.as_ref()), columns),
+            ("dots", at(self.dots.as_ref()), columns),
+            ("labels", at(self.labels.as_ref()), columns),
+            ("names", at(self.names.as_ref()), columns),
+        ];
+        for (key, at, _) in keys.into_iter().filter(|(_, _, acts)| !acts) {
+            let Some(at) = at else { continue };
+            let help = match key {
+                "of" => "give run = { ... }",
+                "says" | "repeats" => "draw it as halves or surface, or score it in claims.toml",
+                _ => "leave it out",
+            };
+            let why = format!("`{key}` has no effect on draw = \"{}\"", draw.word());
+            return Err(FolderError::at(origin, at, why, Some(help.to_owned())));
+        }
+        Ok(())
+    }
 }
 
 /// Drawing of a panel: its own, or else its figure's.
@@ -504,6 +554,7 @@ impl Folder {
                     Some(help),
                 ));
             };
+            panel.acts(origin, *draw.get_ref())?;
             let drawn = Drawn {
                 draw,
                 axes: panel.axes.as_ref().or(figure.axes.as_ref()),
@@ -535,17 +586,6 @@ impl Folder {
                 views.push((view, draw.span()));
                 question
             } else {
-                for (key, at) in [
-                    ("says", panel.says.as_ref().map(Spanned::span)),
-                    ("repeats", panel.repeats.as_ref().map(Spanned::span)),
-                ] {
-                    if let Some(at) = at {
-                        let why = format!("`{key}` has no effect on a panel drawn in this way");
-                        let help =
-                            "draw it as halves or surface, or score it in claims.toml".to_owned();
-                        return Err(FolderError::at(origin, at, why, Some(help)));
-                    }
-                }
                 let plot = self.plot(origin, panel, place, said.as_ref(), &drawn)?;
                 let question = plot.question.clone();
                 plots.push(plot);
@@ -697,33 +737,22 @@ impl Folder {
         let points = panel.points.as_ref().map(|points| self.points(origin, points)).transpose()?;
         let draw = *drawn.draw.get_ref();
         if draw == Draw::Columns {
-            let idle = [
-                ("run", panel.run.as_ref().map(Spanned::span)),
-                ("axes", panel.axes.as_ref().map(Spanned::span)),
-            ];
-            if let Some((key, Some(at))) = idle.into_iter().find(|(_, at)| at.is_some()) {
-                return Err(wrong(
-                    at,
-                    format!("`{key}` has no effect on draw = \"columns\""),
-                    "leave it out",
-                ));
-            }
-            let (Some(of), Some(x), false) = (&panel.of, &panel.x, panel.y.is_empty()) else {
+            let y = panel.y.as_ref().map(Spanned::get_ref).filter(|y| !y.is_empty());
+            let (Some(of), Some(x), Some(y)) = (&panel.of, &panel.x, y) else {
                 let help = "give of = \"MEASURE\", x = \"COLUMN\" and y = [\"COLUMN\"]";
                 return Err(wrong(drawn.draw.span(), "columns of which table?".into(), help));
             };
             let names = panel.names.as_ref().map(|n| n.get_ref().clone()).unwrap_or_default();
-            if let Some(given) = panel.names.as_ref().filter(|n| n.get_ref().len() != panel.y.len())
-            {
-                let why = format!("{} names for {} columns", names.len(), panel.y.len());
+            if let Some(given) = panel.names.as_ref().filter(|n| n.get_ref().len() != y.len()) {
+                let why = format!("{} names for {} columns", names.len(), y.len());
                 return Err(wrong(given.span(), why, "give one for each of y"));
             }
             let source = self.source(origin, of)?;
             let columns = Columns {
-                table: panel.table.clone(),
-                x: x.clone(),
-                y: panel.y.clone(),
-                dots: panel.dots,
+                table: panel.table.as_ref().map(|t| t.get_ref().clone()),
+                x: x.get_ref().clone(),
+                y: y.clone(),
+                dots: panel.dots.as_ref().is_some_and(|d| *d.get_ref()),
                 labels: panel.labels.as_ref().map(|l| l.get_ref().clone()),
                 names,
             };
@@ -734,19 +763,6 @@ impl Folder {
                 drawing: Drawing::Columns(columns),
                 points,
             });
-        }
-        let idle = [
-            ("of", panel.of.as_ref().map(Spanned::span)),
-            ("labels", panel.labels.as_ref().map(Spanned::span)),
-            ("names", panel.names.as_ref().map(Spanned::span)),
-        ];
-        if let Some((key, Some(at))) = idle.into_iter().find(|(_, at)| at.is_some()) {
-            let help = if key == "of" { "give run = { ... }" } else { "leave it out" };
-            return Err(wrong(
-                at,
-                format!("`{key}` has an effect on draw = \"columns\" alone"),
-                help,
-            ));
         }
         let Some(said) = said else {
             return Err(wrong(

@@ -211,7 +211,7 @@ fn papers_that_ship_are_reproduced() {
 fn what_is_wrong_in_a_folder_is_said_with_its_place() {
     let reading = "[readings.a]\nabout = \"\"\nextends = \"b\"\n[readings.b]\nabout \
         = \"\"\nextends = \"a\"\n[run]";
-    let cases: [(&str, &str, &str, &[&str]); 22] = [
+    let cases: [(&str, &str, &str, &[&str]); 25] = [
         (
             "paper.toml",
             "rtol = 1e-9",
@@ -310,7 +310,25 @@ fn what_is_wrong_in_a_folder_is_said_with_its_place() {
             "figures/fig1.toml",
             "draw = \"series\"",
             "labels = [\"t\", \"x\"]\ndraw = \"series\"",
-            &["`labels` has an effect on draw = \"columns\" alone"],
+            &["`labels` has no effect on draw = \"series\""],
+        ),
+        (
+            "figures/fig1.toml",
+            "draw = \"series\"",
+            "dots = true\ndraw = \"series\"",
+            &["`dots` has no effect on draw = \"series\"", "fig1.toml:9:8"],
+        ),
+        (
+            "figures/fig1.toml",
+            "draw = \"series\"",
+            "camera = [1, 2]\ndraw = \"series\"",
+            &["`camera` has no effect on draw = \"series\""],
+        ),
+        (
+            "claims.toml",
+            "check = \"value\"\nof = \"cycle\"\nread = \"period\"",
+            "check = \"bifurcation\"\nkind = \"foldd\"\nat = 1\nof = \"cycle\"",
+            &["there is no bifurcation `foldd`", "did you mean `fold`?"],
         ),
         (
             "figures/fig1.toml",

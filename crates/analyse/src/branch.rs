@@ -353,6 +353,19 @@ pub enum Change {
 }
 
 impl Change {
+    /// All kinds.
+    pub const ALL: [Change; 9] = [
+        Change::PeriodDoubling,
+        Change::Fold,
+        Change::Branching,
+        Change::Torus,
+        Change::Hopf,
+        Change::Vanishing,
+        Change::Grazing,
+        Change::DiscontinuityInduced,
+        Change::SetValued,
+    ];
+
     /// The word for it.
     pub fn word(self) -> &'static str {
         match self {

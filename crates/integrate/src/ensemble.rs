@@ -258,15 +258,16 @@ impl<'a, E: BatchedField<N>, O: Observer<N>, M: Fn(usize) -> O, const N: usize>
             // No other processor has wider registers here.
             #[cfg(target_arch = "x86_64")]
             InstructionSet::Avx2 if let Some(set) = pulp::x86::V3::try_new() => {
-                self.side_by_side(set)
+                self.side_by_side(set);
+                None
             }
             #[cfg(target_arch = "x86_64")]
             InstructionSet::Avx512 if let Some(set) = pulp::x86::V4::try_new() => {
-                self.side_by_side(set)
+                self.side_by_side(set);
+                None
             }
-            _ => return Some(self),
+            _ => Some(self),
         }
-        None
     }
 }
 
