@@ -123,10 +123,11 @@ impl Orbit {
     }
 
     /// The rate per unit time at which neighbours approach it in the end, negative if they leave;
-    /// none where they arrive in finite time (all multipliers zero).
+    /// none where they arrive in finite time (all multipliers zero), or where the largest
+    /// multiplier is not told from zero.
     pub fn rate(&self) -> Option<f64> {
         let largest = self.largest_modulus();
-        (largest > 0.0).then(|| -ln(largest) / self.period)
+        (largest > self.multiplier_error).then(|| -ln(largest) / self.period)
     }
 }
 
@@ -1182,6 +1183,9 @@ mod tests {
         assert!((rate(&[[2.4, 3.2], [2.4, -3.2]]).unwrap() + std::f64::consts::LN_2).abs() < 1e-15);
         // Neighbours that arrive in finite time have none.
         assert_eq!((rate(&[[0.0; 2]; 2]), rate(&[])), (None, None));
+        // Nor is one known of a multiplier that may be zero.
+        let within = |error| Orbit { multiplier_error: error, ..with(0.0, &[[1e-9, 0.0]]) }.rate();
+        assert!(within(1e-8).is_none() && within(1e-10).is_some());
         assert_eq!(with(0.0, &[[0.6, 0.7]]).stability(), Stability::Stable);
         assert_eq!(with(0.0, &[[0.6, -0.9]]).stability(), Stability::Unstable);
     }

@@ -23,6 +23,7 @@ use crate::job::orbit::Along;
 use crate::job::rest::{Rest, Stability as RestStability};
 use crate::job::spec::Observation;
 use crate::job::{Answer, AnyQuestion, ClosedOrbit, Executor, JobError, Question, Stop, encode};
+use crate::num::elementary::ln;
 
 /// Find a closed orbit through a plane by Newton's method, with its period and Floquet multipliers;
 /// with --along, follow it as a parameter changes, through folds, and say where it loses its
@@ -414,9 +415,14 @@ fn text(question: &ClosedOrbit, answer: &Answer) -> Result<String, CliError> {
                     decide"
                     .into()
             }
-            (Stability::Stable, None) => "attracts in finite time (all multipliers are \
-                zero)"
-                .into(),
+            (Stability::Stable, None) if multipliers.iter().all(|m| *m == [0.0; 2]) => {
+                "attracts in finite time (all multipliers are zero)".into()
+            }
+            (Stability::Stable, None) => format!(
+                "attracts, by more than {:.1e} per unit time: the multipliers are zero within \
+                    their error",
+                -ln(error) / period
+            ),
             (Stability::Stable, Some(rate)) => format!(
                 "attracts, by {rate:.6e} per unit time in \
                 the end"
@@ -477,9 +483,14 @@ fn at_rest(question: &ClosedOrbit, rest: &Rest) -> String {
     };
     let numbers =
         if rest.eigenvalues.is_empty() { "none".into() } else { complex(&rest.eigenvalues) };
+    let end = match rest.stability {
+        RestStability::Attracts => "The motion comes to rest: there is no closed orbit near.",
+        RestStability::Repels | RestStability::Neutral => {
+            "The search ends at this point: no closed orbit was found. Give another --start."
+        }
+    };
     format!(
-        "{:<13} {state}\n{:<13} {numbers}\n{:<13} {stability}\nThe motion comes to rest: there is \
-            no closed orbit near.\n",
+        "{:<13} {state}\n{:<13} {numbers}\n{:<13} {stability}\n{end}\n",
         rest.word(),
         "eigenvalues",
         "stability"
