@@ -32,7 +32,7 @@ pub struct ClaimFile {
     /// Its own words, a few of them.
     #[serde(default)]
     quote: String,
-    /// The day on which the rule was fixed.
+    /// The day on which the rule was fixed, as a date of TOML: 2026-11-27, without quotes.
     decided: Datetime,
     /// Remarks beside the outcome: what was tried, what the paper leaves open.
     #[serde(default)]
@@ -58,7 +58,7 @@ pub struct ClaimFile {
     equals: Option<Spanned<f64>>,
     /// Largest difference that still agrees.
     within: Option<Spanned<f64>>,
-    /// Less or greater.
+    /// `less` or `greater`.
     relation: Option<Spanned<String>>,
     /// Number with which the value is compared.
     than: Option<Spanned<f64>>,

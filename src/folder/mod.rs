@@ -160,7 +160,8 @@ struct FigureFile {
     columns: Option<Spanned<usize>>,
     /// The readings of which it has a picture [default: all].
     readings: Option<Vec<Spanned<String>>>,
-    /// Kind of drawing of panels that do not say it.
+    /// Kind of drawing of panels that do not say it: `series`, `plane`, `space`, `section`,
+    /// `columns` (a measure's table), `halves` or `surface`.
     draw: Option<Spanned<Draw>>,
     /// States on the axes of panels that do not say it.
     axes: Option<Spanned<Vec<String>>>,
@@ -179,18 +180,19 @@ struct PanelFile {
     /// A few words.
     #[serde(default)]
     title: String,
-    /// Kind of drawing [default: the figure's].
+    /// Kind of drawing, as for the figure [default: the figure's].
     draw: Option<Spanned<Draw>>,
     /// The run that it shows; of `draw = "columns"` nothing.
     run: Option<Spanned<Words>>,
     /// Changes of the run in a reading.
     #[serde(default)]
     r#in: BTreeMap<Spanned<String>, Spanned<Words>>,
-    /// The paper's claim about a section or path drawn as `halves` or `surface`; the picture shows
-    /// the verdict.
+    /// The paper's claim about a panel drawn as `halves` or `surface`; the picture shows the
+    /// verdict: `{ section = "periodic" }`, `"chaos"`, `"partly-washed-out"` or `{ period = 3 }` of
+    /// a section, `"less-organised-than-next"` or `"differs-from-next"` of a path.
     says: Option<Spanned<PanelClaim>>,
-    /// Committed runs that repeat it, by study and name; the picture shows the share that supports
-    /// the claim.
+    /// Committed runs that repeat it, "STUDY/PANEL" such as "census/7(i)"; the picture shows the
+    /// share that supports the claim.
     repeats: Option<Spanned<String>>,
     /// States on the axes.
     axes: Option<Spanned<Vec<String>>>,
@@ -210,7 +212,7 @@ struct PanelFile {
     labels: Option<Spanned<[String; 2]>>,
     /// Names of the vertical columns in the legend [default: their own].
     names: Option<Spanned<Vec<String>>>,
-    /// Numbers of the paper to be drawn over it.
+    /// Numbers of the paper to be drawn over it, one table `{ name = "...", file = "..." }`.
     points: Option<Spanned<PointsFile>>,
 }
 

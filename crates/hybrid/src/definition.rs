@@ -159,7 +159,8 @@ pub struct EventEntry {
     /// An expression whose zero is met, or a condition that becomes true.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub when: Option<String>,
-    /// The direction in which `when` passes zero: up, down or both.
+    /// The direction in which `when` passes zero: up, down or both [default: both; a condition
+    /// fires when it becomes true].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub direction: Option<Direction>,
     /// New values of states, by name; they see the values before this event.
@@ -174,7 +175,7 @@ pub struct EventEntry {
     /// Whether the run ends there.
     #[serde(default)]
     pub stop: bool,
-    /// Fires at the multiples of this time after the run's start.
+    /// Fires at the multiples of this time, counted from t = 0, that come after the run's start.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub every: Option<Constant>,
     /// Fires at this time, or at these, the run's start included.
@@ -258,7 +259,7 @@ pub struct Document {
     /// Events, a table `[[event]]` each: what happens at moments.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub event: Vec<EventEntry>,
-    /// Tables of data by name: each is a function of time.
+    /// Tables of data by name; expressions use the bare name, its value at the time t.
     #[serde(default)]
     pub tables: Ordered<TableEntry>,
 }

@@ -8,7 +8,7 @@ use super::guard::Redoable;
 use super::starting_step::starting_step;
 use super::step::{
     Driven, DrivenStepper, Failure, Interpolant, Statistics, Steady, Step, Stepper, Tolerance,
-    finite,
+    finite, is_last,
 };
 use twofold_num::elementary::{rough_exp2, rough_log2, sqrt};
 use twofold_system::VectorField;
@@ -243,7 +243,7 @@ impl<const N: usize> Dopri5<N> {
         loop {
             let remaining = self.t_end - t0;
             // Reach the end exactly; do not leave a remainder too small to step over.
-            let last = self.h * 1.000_000_1 >= remaining;
+            let last = is_last(t0, self.h, self.t_end, 1.000_000_1);
             let h = if last { remaining } else { self.h };
             if h.abs() <= t0.abs() * f64::EPSILON || h < f64::MIN_POSITIVE {
                 return Err(Failure::StepUnderflow { t: t0, h, state: Failure::state(&x0) });

@@ -598,7 +598,12 @@ impl<S: Simd, O: Observer<N>, const N: usize, const K: usize> State<S, O, N, K> 
         let of = |parts: [S::f64s; K]| Registers::<S, K>::new(set, parts);
         let (t0, x0, k1) = (of(self.t), vector(set, &self.x), vector(set, &self.fsal));
         let remaining = of(self.t_end) - t0;
-        let last = remaining.at_most(of(self.h) * number(1.000_000_1), set);
+        // As step::is_last.
+        let reached = t0 + of(self.h);
+        let rest = of(self.t_end) - reached;
+        let last = remaining
+            .at_most(of(self.h) * number(1.000_000_1), set)
+            .or(rest.at_most(reached.size() * number(f64::EPSILON), set));
         let h = last.select(remaining, of(self.h));
 
         let mut f =

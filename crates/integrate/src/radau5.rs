@@ -13,7 +13,7 @@ use super::linear::Lu;
 use super::starting_step::starting_step;
 use super::step::{
     Driven, DrivenStepper, Failure, Interpolant, Statistics, Steady, Step, Stepper, Tolerance,
-    finite,
+    finite, is_last,
 };
 use twofold_num::elementary::{rough_pow, sqrt};
 use twofold_system::VectorField;
@@ -356,7 +356,7 @@ impl<const N: usize> Radau5<N> {
             }
             let remaining = self.t_end - t0;
             // Reach the end exactly; do not leave a remainder too small to step over.
-            let last = self.h * 1.000_1 >= remaining;
+            let last = is_last(t0, self.h, self.t_end, 1.000_1);
             let h = if last { remaining } else { self.h };
             if h.abs() <= t0.abs() * f64::EPSILON || h < f64::MIN_POSITIVE {
                 return Err(Failure::StepUnderflow { t: t0, h, state: Failure::state(&x0) });

@@ -32,7 +32,7 @@ use std::sync::Arc;
 
 use nalgebra::SVector;
 
-use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance, finite};
+use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance, finite, is_last};
 use twofold_num::elementary::{exp, ln, rough_pow};
 use twofold_num::series::{Constants, LayerKind, MarkKind, Solution};
 use twofold_num::tape::Node;
@@ -783,7 +783,7 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
         let h = self.regular_step(accurate.min(self.max_step).min(remaining.to_f64()));
         let h = self.resolved_step(h);
         let switch = self.first_switch(h);
-        let mut last = switch.is_none() && h * 1.000_000_1 >= remaining.to_f64();
+        let mut last = switch.is_none() && is_last(t0, h, self.t_end.to_f64(), 1.000_000_1);
         if switch.is_none() && (h <= t0.abs() * f64::EPSILON || h < f64::MIN_POSITIVE) {
             return Err(self.stuck(Failure::StepUnderflow {
                 t: t0,

@@ -773,6 +773,26 @@ fn nothing_is_asked_beyond_the_end() {
     }
 }
 
+/// Equal steps to an end late in time leave a remainder of a last digit: the last step takes it.
+#[test]
+fn a_remainder_that_no_step_can_be_made_of_belongs_to_the_last_step() {
+    fn ends(mut method: impl Stepper<3>, t0: f64, t_end: f64, cap: f64) {
+        let field = caricature(Transition::Tanh, 1.0);
+        method.restart(&field, t0, START.into(), t_end, cap).unwrap();
+        while method.step(&field).unwrap().t1 < t_end {}
+    }
+    for i in 0..200 {
+        let t0 = 194_106.0 + 0.618 * f64::from(i);
+        let t_end = t0 + 2e-7 * (1.0 + f64::from(i % 17));
+        let cap = (t_end - t0) / 16.0;
+        ends(Dopri5::new(tolerance(1e-6)), t0, t_end, cap);
+        ends(Radau5::new(tolerance(1e-6)), t0, t_end, cap);
+        ends(Lsoda::new(tolerance(1e-6)), t0, t_end, cap);
+        ends(Taylor::<3>::new(tolerance(1e-6)), t0, t_end, cap);
+        ends(Layered::new(tolerance(1e-6)), t0, t_end, cap);
+    }
+}
+
 /// A lane tells of those steps, and of no others, of which a run alone cannot say by the
 /// interpolant's reach that they miss the plane.
 #[test]

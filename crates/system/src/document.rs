@@ -255,7 +255,7 @@ pub struct Document {
     pub references: Vec<String>,
     /// One to sixteen states, in order: a name, or a table (below).
     pub states: Vec<StateEntry>,
-    /// Start of runs without `--start`: a number for each state.
+    /// Start of runs: a number for each state. Without it runs need `--start`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start: Option<Vec<Decimal>>,
     /// The two or three states that pictures show: horizontal, (depth,) vertical.

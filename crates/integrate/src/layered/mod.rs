@@ -33,7 +33,7 @@ use self::contact::{Contact, MOST};
 use self::crossing::{Collocation, Crossing, Layer, Section};
 use self::sliding::Sliding;
 use super::Dopri5;
-use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance, finite};
+use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance, finite, is_last};
 use twofold_num::elementary::{exp, ln, rough_exp2, rough_log2};
 use twofold_num::polynomial::{Flow, NotPolynomial, Series};
 use twofold_num::{Given, Tape};
@@ -312,7 +312,7 @@ impl<const N: usize> Layered<N> {
         let accurate = rough_exp2(-log) * self.safety;
         let remaining = self.t_end - self.t;
         let mut h = accurate.min(self.max_step);
-        let mut last = h * 1.000_000_1 >= remaining;
+        let mut last = is_last(self.t, h, self.t_end, 1.000_000_1);
         if last {
             h = remaining;
         }
@@ -404,7 +404,7 @@ impl<const N: usize> Layered<N> {
         let mut reached = reached?;
         let longest = self.max_step.min(self.t_end - self.t);
         let whole = self.crossing.whole();
-        let last = self.t + whole * 1.000_000_1 >= self.t_end;
+        let last = is_last(self.t, whole, self.t_end, 1.000_000_1);
         let mut x = self.crossing.end;
         if whole > longest {
             (reached, x) = self.crossing.after(longest);

@@ -17,7 +17,7 @@ use super::crossing::Layer;
 use crate::Dopri5;
 use crate::dopri5::tableau::*;
 use crate::dopri5::{Dense, control};
-use crate::step::{Failure, finite};
+use crate::step::{Failure, finite, is_last};
 use twofold_num::Given;
 use twofold_num::elementary::{rough_exp2, rough_log2, tanh};
 use twofold_system::VectorField;
@@ -71,7 +71,7 @@ impl Sliding {
         loop {
             let remaining = inner.t_end - t0;
             // As Dopri5 does: reach the end exactly, leave no tiny remainder.
-            let last = inner.h * 1.000_000_1 >= remaining;
+            let last = is_last(t0, inner.h, inner.t_end, 1.000_000_1);
             let h = if last { remaining } else { inner.h };
             if h.abs() <= t0.abs() * f64::EPSILON || h < f64::MIN_POSITIVE {
                 return Err(Failure::StepUnderflow { t: t0, h, state: Failure::state(&x0) });
