@@ -459,6 +459,17 @@ impl Claim {
         let own: Vec<AnyQuestion> =
             self.reads().map(|name| folder.sources[name].question.clone()).collect();
         let answers = ask(&own)?;
+        if let Check::Period { .. } | Check::Attractors { .. } = self.check {
+            for (name, answer) in self.reads().zip(&answers) {
+                let one = answer.table("section").is_some_and(|table| states(table).len() == 1);
+                if one && !folder.sources[name].said.has_section_in_time() {
+                    return Err(JobError::Other(format!(
+                        "{name}: a section of a system with one state is one point and says \
+                            nothing of its motion; read an orbit's period, or a column"
+                    )));
+                }
+            }
+        }
         let (mut agrees, mut found) = self.check.of(&answers).map_err(JobError::Other)?;
         let mut hashes: Vec<String> =
             answers.iter().map(|a| a.hash().as_str().to_owned()).collect();
@@ -682,7 +693,9 @@ impl Check {
                 ))
             }
             Check::Attractors { same, within } => {
-                let (a, b) = (section(first)?, section(answers.last().unwrap_or(first))?);
+                let a = section(first).map_err(|e| format!("`of`: {e}"))?;
+                let b =
+                    section(answers.last().unwrap_or(first)).map_err(|e| format!("`and`: {e}"))?;
                 let distance = apart(&a, &b)?;
                 let alike = distance <= *within;
                 let word = if alike { "the same attractor" } else { "different attractors" };

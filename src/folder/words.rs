@@ -117,6 +117,14 @@ fn add(flags: &mut Vec<Flag>, flag: Flag) {
 }
 
 impl Said {
+    /// Whether the section that is asked for depends on the time.
+    pub fn has_section_in_time(&self) -> bool {
+        let is_time = |text: &String| {
+            text.split(|c: char| !(c.is_alphanumeric() || c == '_')).any(|name| name == "t")
+        };
+        self.flags.iter().any(|flag| flag.name == "section" && flag.values.iter().any(is_time))
+    }
+
     /// The words of a question over those that hold for all (`defaults`, of the file `common`): a
     /// later word replaces an earlier one, and parameters (`set`) add up.
     ///

@@ -125,6 +125,26 @@ fn a_claim_that_does_not_hold_differs() {
     assert!(code == 3 && said.contains("what fails is not blessed"), "{said}");
 }
 
+/// All crossings of a section of one state are one point, whatever the motion does.
+#[test]
+fn a_section_of_one_state_is_not_scored() {
+    let place = small();
+    let root = place.path().join("p");
+    let measure = "\n[crossings]\nrun = { system = \"systems/relay.toml\", t-end = 100, section = \
+                   \"x=0\" }\n";
+    let claim = "\n[[claim]]\nid = \"one\"\nplace = \"-\"\nsays = \"-\"\ndecided = 2026-11-27\ncheck = \
+                 \"period\"\nof = \"crossings\"\nis = 1\n";
+    for (file, more) in [("measures.toml", measure), ("claims.toml", claim)] {
+        let text = fs::read_to_string(root.join(file)).unwrap();
+        fs::write(root.join(file), text + more).unwrap();
+    }
+    let (code, out, said) = paper(&["make", "--quiet"], &root);
+    assert!(
+        code == 3 && out.contains("crossings: a section of a system with one state"),
+        "{out}{said}"
+    );
+}
+
 /// The ratio of a number at two values of a parameter: with it the exponent of a law is scored.
 #[test]
 fn a_ratio_is_of_two_measures() {

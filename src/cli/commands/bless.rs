@@ -25,7 +25,7 @@ use crate::record::{self, Manifest};
 pub struct Arguments {
     /// Figures to bless, such as fig7; all if none is named.
     figures: Vec<String>,
-    /// Why the reference changes; kept in figures/CHANGES.md.
+    /// Why the reference changes; kept in figures/CHANGES.md. Must be given.
     #[arg(long, value_name = "TEXT")]
     reason: String,
     /// Folder that holds figN/expected.json.

@@ -20,7 +20,7 @@ use crate::record::{self, Layer, Manifest, listed};
 #[command(after_help = "Examples:\n  twofold check fig5 fig6\n  twofold check --json --quiet > \
         check.json\n  twofold check --against ~/their-pictures")]
 pub struct Arguments {
-    /// Figures to check, such as fig7; all if none is named.
+    /// Figures to check, such as fig7 (any other word lists their names); all if none is named.
     figures: Vec<String>,
     /// Reference to check against instead of figures/figN/expected.json: another manifest, or a
     /// folder with published pictures (PNG, named like ours). A picture holds by the first of these

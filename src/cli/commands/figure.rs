@@ -11,7 +11,7 @@ use crate::cli::{self, CliError, Exit, FigureFlags};
         twofold figure fig7 --t-end 100 --fresh"
 )]
 pub struct Arguments {
-    /// Figures to make, such as fig7; all if none is named.
+    /// Figures to make, such as fig7 (any other word lists their names); all if none is named.
     figures: Vec<String>,
     #[command(flatten)]
     flags: FigureFlags,

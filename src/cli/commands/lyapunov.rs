@@ -17,7 +17,7 @@ use crate::job::{AnyQuestion, Executor, JobError, LargestExponent, Question, Sto
 use crate::num::elementary::log10;
 
 /// The largest Lyapunov exponent of the orbit from the start, with its 95 % interval: the mean rate
-/// at which a tangent vector grows.
+/// at which a tangent vector grows. Of Filippov motion and of general systems all exponents.
 ///
 /// Above zero: neighbours part exponentially. Zero in the interval: a closed orbit, a torus, or
 /// growth that is not exponential. Below: a rest. The interval holds the scatter of averages over

@@ -32,7 +32,8 @@ use crate::record::files::Growing;
     twofold run --switch filippov --exit random:exponential:0.5 --t-end 80 --out orbit.csv\n  \
     twofold run --system wheel --t-end 60 --format json --out wheel.json\n  \
     twofold run --system my.toml --set gain=2 --t-end 1e6 --every 10 --out long.csv\n  \
-    fig7 --only ii --reading printed --print-spec | twofold run --spec - --out section.csv")]
+    twofold figure fig7 --only ii --reading printed --print-spec | \
+        twofold run --spec - --out section.csv")]
 pub struct Arguments {
     #[command(flatten)]
     flags: RunFlags,
