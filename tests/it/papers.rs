@@ -132,8 +132,8 @@ fn a_section_of_one_state_is_not_scored() {
     let root = place.path().join("p");
     let measure = "\n[crossings]\nrun = { system = \"systems/relay.toml\", t-end = 100, section = \
                    \"x=0\" }\n";
-    let claim = "\n[[claim]]\nid = \"one\"\nplace = \"-\"\nsays = \"-\"\ndecided = 2026-11-27\ncheck = \
-                 \"period\"\nof = \"crossings\"\nis = 1\n";
+    let claim = "\n[[claim]]\nid = \"one\"\nplace = \"-\"\nsays = \"-\"\ndecided = 2026-11-27\n\
+                 check = \"period\"\nof = \"crossings\"\nis = 1\n";
     for (file, more) in [("measures.toml", measure), ("claims.toml", claim)] {
         let text = fs::read_to_string(root.join(file)).unwrap();
         fs::write(root.join(file), text + more).unwrap();
@@ -346,7 +346,7 @@ fn what_is_wrong_in_a_folder_is_said_with_its_place() {
         ),
         (
             "claims.toml",
-            "check = \"value\"\nof = \"cycle\"\nread = \"period\"",
+            "check = \"value\"\nof = \"cycle\"\nread = \"period\"\nequals = 2.1972245773362196",
             "check = \"bifurcation\"\nkind = \"foldd\"\nat = 1\nof = \"cycle\"",
             &["there is no bifurcation `foldd`", "did you mean `fold`?"],
         ),

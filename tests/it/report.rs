@@ -643,6 +643,7 @@ fn a_place_without_figures_is_an_error() {
 fn without_references_it_says_so() {
     let bench = Bench::new();
     fs::remove_dir_all(bench.expected()).unwrap();
+    fs::create_dir(bench.expected()).unwrap();
     let said = bench.run(&[]);
     assert!(said.contains("0 of 2 pictures match"), "{said}");
     let html = bench.read("index.html");

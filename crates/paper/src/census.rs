@@ -707,7 +707,8 @@ pub fn text(found: &[Found; 2], reference: impl Fn(&str) -> Option<&'static str>
             let reading = one.reading.word();
             let _ = writeln!(
                 text,
-                "Seen to be captured in runs to t = {end}, {name}, {reading} reading: {share} ({}).",
+                "Seen to be captured in runs to t = {end}, {name}, {reading} reading: {share} \
+                    ({}).",
                 in_words(n)
             );
         }

@@ -793,7 +793,7 @@ mod tests {
         // As many turns as there are: of 40 points, 19.
         assert!((of(20).duration() - (times[39] - times[1]) / 19.0).abs() < 1e-15);
         assert_eq!(radius(20, None), 5.5);
-        // What a settled run was on its way counts no more.
+        // The way to where a run settles does not count.
         assert_eq!(
             (radius(20, Some(20)), radius(10, Some(4)), radius(10, Some(39))),
             (2.0, 2.0, 3.0)
