@@ -241,12 +241,17 @@ impl Step {
                 }
             }
             let Some(change) = solve_any(&matrix, &right, 0.0) else { return false };
-            let mut size = 0.0_f64;
-            for (k, (z, d)) in z.iter_mut().zip(&change).enumerate() {
-                *z += d;
-                let scale = self.x[k % n].abs().max(z.abs()).max(f64::MIN_POSITIVE);
-                size = size.max(d.abs() / scale);
-            }
+            z.iter_mut().zip(&change).for_each(|(z, d)| *z += d);
+            // A state that comes back to zero is as large as on its way.
+            let scale = |i: usize| {
+                (0..3).fold(self.x[i].abs().max((h * self.k[0][i]).abs()), |most, s| {
+                    most.max(z[s * n + i].abs())
+                })
+            };
+            let size = change.iter().enumerate().fold(0.0_f64, |most, (k, d)| {
+                let relative = d.abs() / scale(k % n).max(f64::MIN_POSITIVE);
+                if most.is_nan() || relative.is_nan() { f64::NAN } else { most.max(relative) }
+            });
             if size <= 1e-14 || (size <= 1e-11 && size >= 0.5 * last) {
                 settled = true;
                 break;

@@ -779,6 +779,28 @@ fn stiff_motion_is_followed_by_the_implicit_method() {
     assert!(end(1e-8) < 1e-8 && end(1e-11) < 1e-11, "{} {}", end(1e-8), end(1e-11));
 }
 
+/// A flight that ends where it began is a step whose state comes back to zero.
+#[test]
+fn a_ball_bounces_until_it_rests_by_every_method() {
+    use crate::motion::Method;
+    let ends = [Method::Dopri5, Method::Radau5, Method::Taylor].map(|method| {
+        [1e-5, 1e-8, 1e-11].map(|rtol| {
+            let options = Options { t_end: 10.0, rtol, method, ..Options::default() };
+            let mut last = 0.0;
+            let outcome = follow(&shipped("bouncing-ball"), &options, &mut |p| {
+                last = if p.event.is_some() { p.t } else { last };
+                true
+            });
+            assert_eq!(outcome.unwrap().ending, Ending::Finished, "{method:?} {rtol}");
+            last
+        })
+    });
+    let zeno = (2.0_f64 / 9.81).sqrt() * 1.8 / 0.2;
+    for end in ends.as_flattened() {
+        near(*end, zeno, 1e-4);
+    }
+}
+
 /// Dry friction against a relay: each turn loses a third of the last one's speed squared, and after
 /// infinitely many the block rests.
 #[test]
