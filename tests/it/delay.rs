@@ -324,6 +324,59 @@ fn committed_growth_has_the_powers_of_the_chatters_phase() {
     are(figures::delay::smooth_powers(&growth, figures::delay::LARGE, 1e-2), [-0.5, 0.0, 0.0], 0.1);
 }
 
+/// The page of the delayed switch gives the powers and growths of the committed data.
+#[test]
+fn the_page_says_what_the_growth_is() {
+    let page =
+        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/delay.md")).unwrap();
+    let page = page.split_whitespace().collect::<Vec<_>>().join(" ");
+    let growth = figures::delay::growth().unwrap();
+    let power = |(value, error): (f64, f64), digits: usize| {
+        format!("{value:.digits$} ± {error:.digits$}").replace('-', "−")
+    };
+    let small =
+        figures::delay::smooth_powers(&growth, figures::delay::SMALL, figures::delay::SMALL_EPS);
+    let large = figures::delay::smooth_powers(&growth, figures::delay::LARGE, 1e-2);
+    for said in small.into_iter().chain(large).map(|p| power(p, 2)).chain(
+        ["sharp", "relay"]
+            .into_iter()
+            .flat_map(|rule| figures::delay::sharp_powers(&growth, rule))
+            .map(|p| power(p, 3)),
+    ) {
+        assert!(page.contains(&said), "docs/delay.md does not say {said}");
+    }
+    // The geometric mean of the starts' growths along, with two digits.
+    let [ratios, parameters, along] = ["ratio", "parameter", "along"].map(|c| growth.numbers(c));
+    for (ratio, eps) in [(0.03, 1e-2), (0.1, 1e-3), (0.3, 1e-5), (0.5, 1e-4), (1.0, 1e-3)] {
+        let logs: Vec<f64> = (0..growth.len())
+            .filter(|i| ratios[*i] == ratio && parameters[*i] == eps)
+            .map(|i| ln(along[i]))
+            .collect();
+        let mean = (logs.iter().sum::<f64>() / logs.len() as f64).exp();
+        let said = match mean {
+            m if m < 10.0 => format!("{m:.1}"),
+            m if m < 100.0 => format!("{m:.0}"),
+            m => {
+                let (digits, power) = format!("{m:.1e}")
+                    .split_once('e')
+                    .map(|(d, p)| (d.to_owned(), p.to_owned()))
+                    .unwrap();
+                let raised: String = power
+                    .chars()
+                    .map(|c| "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(c as usize - 48).unwrap())
+                    .collect();
+                format!("{digits}·10{raised}")
+            }
+        };
+        let row = page.split(&format!("| {ratio} | ")).nth(1).unwrap();
+        let cells = row.split(" | ").take(4).map(|c| c.trim_end_matches(" |")).collect::<Vec<_>>();
+        assert!(
+            cells.iter().any(|c| c.split(' ').next() == Some(&said)),
+            "{ratio} {eps}: {said}, {cells:?}"
+        );
+    }
+}
+
 /// Over a uniform phase the exits' distribution does not depend on the delay, or a small band,
 /// while the phase of each exit does. One exit of a distribution is 0.0043.
 #[test]
