@@ -20,7 +20,7 @@ use twofold::job::recording::Data;
 use twofold::job::simulate::simulate;
 use twofold::job::spec::*;
 use twofold::job::{Executor, Run};
-use twofold::num::elementary::ln;
+use twofold::num::elementary::{exp, ln};
 use twofold::paper::claims::claims;
 use twofold::paper::similarity::{Rule, Similar, WAYS};
 use twofold::paper::{Reading, figures};
@@ -352,7 +352,7 @@ fn the_page_says_what_the_growth_is() {
             .filter(|i| ratios[*i] == ratio && parameters[*i] == eps)
             .map(|i| ln(along[i]))
             .collect();
-        let mean = (logs.iter().sum::<f64>() / logs.len() as f64).exp();
+        let mean = exp(logs.iter().sum::<f64>() / logs.len() as f64);
         let said = match mean {
             m if m < 10.0 => format!("{m:.1}"),
             m if m < 100.0 => format!("{m:.0}"),
