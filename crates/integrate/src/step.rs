@@ -473,8 +473,8 @@ const GROWTHS: f64 = 20.0;
 /// Part of 1 + t in which a method may have stepped over the end of a domain.
 const BEHIND: f64 = 1e-12;
 
-/// Whether a step of `h` from `t` is the last one before `t_end`: it comes there to `share` - 1 of
-/// itself, or leaves so little that no step can be made of it.
+/// Whether a step of `h` from `t` is the last one before `t_end`: made longer by the factor `share`
+/// it would reach it, or it leaves so little that no step can be made of it.
 pub(crate) fn is_last(t: f64, h: f64, t_end: f64, share: f64) -> bool {
     let t1 = t + h;
     h * share >= t_end - t || t_end - t1 <= t1.abs() * f64::EPSILON

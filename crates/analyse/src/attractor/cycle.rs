@@ -10,6 +10,11 @@ use twofold_num::fit::{Line, line, median};
 
 type Point = [f64; 2];
 
+/// So much further than all before the last quarter of a run reaches if it grows without end: what
+/// stays on a ring or an attractor reaches as far as before. No part of the [`Thresholds`], which
+/// every committed file of a sweep repeats.
+const GROWTH: f64 = 2.0;
+
 /// Consecutive points of one direction, taken as turns around a cycle.
 pub(super) struct Turns<'a> {
     points: &'a [Point],
@@ -221,11 +226,11 @@ impl<'a> Turns<'a> {
         last.iter().sum::<f64>() / last.len() as f64
     }
 
-    /// Whether the last quarter of the run reaches twice as far from the centres as all before it.
-    pub fn grow(&self) -> bool {
+    /// Whether the last quarter of the run reaches much further from the centres than all before.
+    pub fn grows(&self) -> bool {
         let largest = |d: &[f64]| d.iter().fold(0.0_f64, |a, b| a.max(*b));
         let (before, last) = self.distances.split_at(self.distances.len() / 4 * 3);
-        largest(last) > 2.0 * largest(before)
+        largest(last) > GROWTH * largest(before)
     }
 
     /// Mean duration of a turn in the last block.

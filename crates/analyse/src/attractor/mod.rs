@@ -17,7 +17,7 @@
 //!    tie, or an exponent consistent with zero where the points look irregular, is
 //!    [`Verdict::Undecided`].
 //!
-//! Every limit is in [`Thresholds`].
+//! Every limit is in [`Thresholds`], but for that of motion which grows without end.
 //!
 //! Why not the exponent alone? Because systems near a two-fold spiral at rates of 1e-5 to 1e-4 per
 //! unit time: over 10^5 the exponent of such a run cannot be told from zero, while its points say
@@ -219,7 +219,7 @@ fn deterministic(
             lyapunov: question.lyapunov,
             bands: occupancy::bands(&points[points.len() / 2..], th),
         }
-    } else if no > yes && !turns.grow() {
+    } else if no > yes && !turns.grows() {
         let whole = Captured { from: 0, blocks: 0, settled: None };
         Verdict::QuasiPeriodic(describe(&turns, &whole, split, th))
     } else {

@@ -43,7 +43,8 @@ pub struct Thresholds {
     /// Distance from the cycle, as a fraction of the extent, within which a fast approach is
     /// fitted: near enough that the return map is linear there.
     pub linear_range: f64,
-    /// Turns of the cycle that are judged together when a run is followed backwards from its end.
+    /// Turns of the cycle that are judged together when a run is followed backwards from its end,
+    /// and most turns for which a fast approach is followed further back.
     pub block: usize,
     /// Largest thickness of an invariant curve: the root mean square difference of ln(distance from
     /// the centre) between neighbours in angle, over sqrt 2, after a linear trend in time. Smooth
