@@ -443,8 +443,8 @@ const EFFECTS: [Effect; 43] = {
             "--exit",
             |f| f.exit.is_some(),
             |f, c| f.filippov() && (c.is_a_run() || c == Use::Exponent),
-            "smoothed and hysteretic motion leaves repelling sliding by itself, and a closed orbit \
-                has no repelling sliding; leave it out, or use --switch filippov",
+            "it ends the repelling sliding of a run with --switch filippov; other motion leaves it \
+                by itself, and a closed orbit has none; leave it out",
         ),
         when(
             "--intersection",

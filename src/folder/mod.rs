@@ -246,7 +246,7 @@ impl Draw {
 
 impl PanelFile {
     /// Refuses keys that do nothing in a panel drawn so.
-    fn acts(&self, origin: &Origin, draw: Draw) -> Result<(), FolderError> {
+    fn refuse_idle_keys(&self, origin: &Origin, draw: Draw) -> Result<(), FolderError> {
         fn at<T>(value: Option<&Spanned<T>>) -> Option<Range<usize>> {
             value.map(Spanned::span)
         }
@@ -556,7 +556,7 @@ impl Folder {
                     Some(help),
                 ));
             };
-            panel.acts(origin, *draw.get_ref())?;
+            panel.refuse_idle_keys(origin, *draw.get_ref())?;
             let drawn = Drawn {
                 draw,
                 axes: panel.axes.as_ref().or(figure.axes.as_ref()),
