@@ -32,7 +32,8 @@ use crate::model::Model;
 use crate::range::Range;
 use crate::roots::{PLACES, at_fraction, first, first_of_polynomial, first_of_series, stays};
 use crate::selection::{
-    Intersection, MOST_TOGETHER, Mixture, Way, groups, mixture, nearest_of_hull, possibilities,
+    Intersection, MOST_TOGETHER, Mixture, Way, attraction, groups, hold, leads_away, mixture,
+    nearest_of_hull, possibilities, turn, turn_of_position, velocities_differ,
 };
 use crate::step::Step;
 
@@ -600,11 +601,16 @@ struct Rates {
 }
 
 impl Rates {
+    /// The first derivative, zero where only rounding is left.
+    fn first_or_zero(&self, i: usize) -> f64 {
+        if self.first[i].abs() > SMALLEST_SLOPE * self.terms[i] { self.first[i] } else { 0.0 }
+    }
+
     /// -1, 0 or +1: the sign of the first derivative, or of the second where the first is zero.
     fn direction(&self, i: usize) -> f64 {
-        let small = SMALLEST_SLOPE * self.terms[i];
-        if self.first[i].abs() > small {
-            self.first[i].signum()
+        let first = self.first_or_zero(i);
+        if first != 0.0 {
+            first.signum()
         } else if self.second[i] != 0.0 && self.second[i].is_finite() {
             self.second[i].signum()
         } else {

@@ -222,6 +222,155 @@ pub(crate) fn nearest_of_hull(vectors: &[Vec<f64>]) -> Vec<f64> {
     nearest
 }
 
+/// Growth with each turn up to which turns do not lead away from a point: what grows by nothing to
+/// leading order needs infinitely many turns, and so for ever, to come from zero to any distance.
+const MOST_GROWTH: f64 = 1.0 + 1e-9;
+
+/// Whether bit `i` of a field's number, the side of function i, is the positive one: as a sign.
+fn side(field: usize, i: usize) -> f64 {
+    if field >> i & 1 == 1 { 1.0 } else { -1.0 }
+}
+
+/// Growth of the distance with each turn around a point where two functions are zero that have
+/// these rates in the four fields; none if the fields do not turn (Filippov 1988, sec. 19).
+pub(crate) fn turn(rates: &[[f64; 2]; 4]) -> Option<f64> {
+    let growth = |clockwise: bool| {
+        (0..4).try_fold(1.0, |growth, field| {
+            // In each quadrant one function comes to zero, and the other grows from it.
+            let outward = |i: usize| side(field, i) * rates[field][i];
+            let falls = usize::from((field == 0 || field == 3) == clockwise);
+            let (inward, onward) = (-outward(falls), outward(1 - falls));
+            (inward > 0.0 && onward > 0.0).then(|| growth * (onward / inward))
+        })
+    };
+    growth(false).or_else(|| growth(true))
+}
+
+/// Positive where fields with these rates do not turn away from a point where two functions are
+/// zero.
+pub(crate) fn hold(rates: &[[f64; 2]; 4]) -> f64 {
+    turn(rates).map_or(1.0, |growth| MOST_GROWTH - growth)
+}
+
+/// [`turn`] where function 0 has no rate in any field at the point, and its accelerations come from
+/// function 1: a position and its speed.
+pub(crate) fn turn_of_position(accelerations: &[f64; 4], rates: &[f64; 4]) -> Option<f64> {
+    let sense = (accelerations[3] * rates[3]).signum();
+    let turns = (0..4).all(|field| {
+        let a = accelerations[field];
+        side(field, 0) * a < 0.0 && a * rates[field] * sense > 0.0
+    });
+    // A flight at constant acceleration begins with the square of the speed 2 a s and ends so.
+    let way = |field: usize| side(field, 0) * sense * side(field, 1);
+    let square = (0..4).fold(1.0, |square, field| {
+        let a = accelerations[field].abs();
+        if way(field) > 0.0 { square / a } else { square * a }
+    });
+    turns.then(|| square.sqrt())
+}
+
+/// Whether such turns lead away.
+pub(crate) fn leads_away(growth: f64) -> bool {
+    growth > MOST_GROWTH
+}
+
+/// Positive where s' = a + M w, with w of each function 0 on its negative and 1 on its positive
+/// side, does not turn away from s = 0: the least of the groups of functions that depend on each
+/// other. `a` and M are such that s' = 0 for weights between. Two functions are
+/// decided by their [`turn`]; more attract if C M + M^T C is negative definite for a diagonal C > 0
+/// (then the sum of c (|s| - s u), with u the signs that the weights stand for, falls always).
+pub(crate) fn attraction(a: &[f64], matrix: &[f64]) -> f64 {
+    let k = a.len();
+    let of_group = |group: &Vec<usize>| match group.as_slice() {
+        [one] => -matrix[one * k + one],
+        [i, j] => {
+            let rate = |field: usize, row: usize| {
+                let on = |bit: usize, column: usize| {
+                    if field >> bit & 1 == 1 { matrix[row * k + column] } else { 0.0 }
+                };
+                a[row] + on(0, *i) + on(1, *j)
+            };
+            hold(&std::array::from_fn(|field| [rate(field, *i), rate(field, *j)]))
+        }
+        more => {
+            let row = |i: &usize| more.iter().map(|j| matrix[i * k + j]).collect::<Vec<_>>();
+            let part: Vec<f64> = more.iter().flat_map(row).collect();
+            if is_diagonally_stable(&part, more.len()) { 1.0 } else { -1.0 }
+        }
+    };
+    groups(k, |i, j| matrix[i * k + j] != 0.0).iter().map(of_group).fold(f64::INFINITY, f64::min)
+}
+
+/// Whether C M + M^T C is negative definite for a diagonal matrix C > 0. C is separated from all
+/// vectors that speak against the last one, one more each time.
+fn is_diagonally_stable(m: &[f64], k: usize) -> bool {
+    const MOST_CUTS: usize = 60;
+    let mut against: Vec<Vec<f64>> =
+        (0..k).map(|i| (0..k).map(|j| if i == j { 1.0 } else { 0.0 }).collect()).collect();
+    let mut c = vec![1.0; k];
+    for _ in 0..MOST_CUTS {
+        let form: Vec<f64> =
+            (0..k * k).map(|p| c[p / k] * m[p] + c[p % k] * m[p % k * k + p / k]).collect();
+        let size = form.iter().fold(0.0_f64, |sum, v| sum + v.abs());
+        // The direction of its largest eigenvalue, by powers of what has none below zero.
+        let mut x: Vec<f64> = (0..k).map(|i| 1.0 + 0.1 * i as f64).collect();
+        let mut largest = f64::INFINITY;
+        for _ in 0..400 {
+            let image: Vec<f64> = (0..k)
+                .map(|i| size * x[i] + (0..k).map(|j| form[i * k + j] * x[j]).sum::<f64>())
+                .collect();
+            let length = image.iter().map(|v| v * v).sum::<f64>().sqrt();
+            x = image.iter().map(|v| v / length).collect();
+            largest = length - size;
+        }
+        if largest < -1e-9 * size {
+            return true;
+        }
+        let gain = |i: usize| -x[i] * (0..k).map(|j| m[i * k + j] * x[j]).sum::<f64>();
+        let cut: Vec<f64> = (0..k).map(gain).collect();
+        let length = cut.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+        against.push(cut.iter().map(|v| v / length).collect());
+        c = nearest_of_hull(&against);
+        if !against.iter().all(|v| v.iter().zip(&c).map(|(v, c)| v * c).sum::<f64>() > 0.0) {
+            return false;
+        }
+    }
+    false
+}
+
+/// Whether mixtures of fields that stay on surfaces have more than one velocity: some component of
+/// the fields is no sum of a constant and multiples of the functions' rates.
+pub(crate) fn velocities_differ(fields: &[Vec<f64>], rates: &[Vec<f64>]) -> bool {
+    let count = fields.len();
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let most = |row: &[f64]| row.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+    let mut basis: Vec<Vec<f64>> = Vec::new();
+    let rest = |basis: &[Vec<f64>], mut row: Vec<f64>| {
+        for _ in 0..2 {
+            for b in basis {
+                let share = dot(&row, b);
+                row.iter_mut().zip(b).for_each(|(v, b)| *v -= share * b);
+            }
+        }
+        row
+    };
+    let known = std::iter::once(vec![1.0; count])
+        .chain((0..rates[0].len()).map(|r| rates.iter().map(|rate| rate[r]).collect()));
+    for row in known {
+        let size = most(&row);
+        let new = rest(&basis, row);
+        let length = dot(&new, &new).sqrt();
+        if length > 1e-12 * size {
+            basis.push(new.iter().map(|v| v / length).collect());
+        }
+    }
+    (0..fields[0].len()).any(|i| {
+        let row: Vec<f64> = fields.iter().map(|f| f[i]).collect();
+        let size = most(&row);
+        most(&rest(&basis, row)) > 1e-9 * size
+    })
+}
+
 /// All assignments of ways to `k` functions that are consistent; `consistent` says whether one is.
 pub(crate) fn possibilities(k: usize, mut consistent: impl FnMut(&[Way]) -> bool) -> Vec<Vec<Way>> {
     let ways = [Way::Plus, Way::Minus, Way::Stay];

@@ -225,6 +225,9 @@ impl Step {
             }
         }
         let mut z = vec![0.0; m];
+        let mut reach: Vec<f64> = (0..n)
+            .map(|i| self.x[i].abs().max((h * self.k[0][i]).abs()).max(f64::MIN_POSITIVE))
+            .collect();
         let (mut f, mut last, mut settled) = (vec![vec![0.0; n]; 3], f64::INFINITY, false);
         for _ in 0..12 {
             for s in 0..3 {
@@ -242,14 +245,10 @@ impl Step {
             }
             let Some(change) = solve_any(&matrix, &right, 0.0) else { return false };
             z.iter_mut().zip(&change).for_each(|(z, d)| *z += d);
-            // A state that comes back to zero is as large as on its way.
-            let scale = |i: usize| {
-                (0..3).fold(self.x[i].abs().max((h * self.k[0][i]).abs()), |most, s| {
-                    most.max(z[s * n + i].abs())
-                })
-            };
+            // A state that comes back to zero is as large as on its way, in the iterations, too.
+            z.iter().enumerate().for_each(|(k, z)| reach[k % n] = reach[k % n].max(z.abs()));
             let size = change.iter().enumerate().fold(0.0_f64, |most, (k, d)| {
-                let relative = d.abs() / scale(k % n).max(f64::MIN_POSITIVE);
+                let relative = d.abs() / reach[k % n];
                 if most.is_nan() || relative.is_nan() { f64::NAN } else { most.max(relative) }
             });
             if size <= 1e-14 || (size <= 1e-11 && size >= 0.5 * last) {

@@ -842,7 +842,7 @@ fn a_ball_that_lies_on_the_floor_stays_there() {
 fn mixtures_with_other_velocities_are_refused() {
     for f in [
         "'-sign(x)', '-sign(y)', 'sign(x)*sign(y)'",
-        "'-sign(x) - 0.5*sign(x)*sign(y)', '-sign(y) + 0.3*sign(x)*sign(y)', '0'",
+        "'-sign(x) - 0.5*sign(x)*sign(y)', '-sign(y) + 0.3*sign(x)*sign(y)', 'sign(x)*sign(y)'",
     ] {
         let text = format!("states = ['x', 'y', 'z']\nstart = [1, 0.8, 0]\nf = [{f}]");
         let error = run(&model(&text), 3.0).1.unwrap_err().to_string();
@@ -853,6 +853,89 @@ fn mixtures_with_other_velocities_are_refused() {
             "{error}"
         );
     }
+}
+
+/// Products of sides act on the surfaces themselves: all mixtures that stay have one velocity.
+#[test]
+fn mixtures_with_one_velocity_are_followed() {
+    for (f, z) in [
+        ("'-sign(x)', '-sign(y)*(2 + sign(x))', '1'", 4.0),
+        ("'-sign(x) - 0.5*sign(x)*sign(y)', '-sign(y) + 0.3*sign(x)*sign(y)', '0'", 0.0),
+        // z' is 1 and twice the speed of x.
+        ("'-sign(x)*(2 + sign(y))', '-sign(y)', '1 - 2*sign(x)*(2 + sign(y))'", 4.0 - 2.0),
+    ] {
+        let text = format!("states = ['x', 'y', 'z']\nstart = [1, 0.7, 0]\nf = [{f}]");
+        let x = end(&text, 4.0);
+        assert!(x[0].abs() < 1e-12 && x[1].abs() < 1e-12, "{f}: {x:?}");
+        near(x[2], z, 1e-9);
+    }
+}
+
+/// Around a corner whose fields turn, the distance grows by ((1 + a)/(1 - a))^4 with each turn,
+/// behind a position and its speed by a factor of sqrt((1 + a)/(1 - a)) each half turn.
+#[test]
+fn a_corner_that_is_turned_around_holds_or_is_left() {
+    let refused = |text: &str| {
+        let error = run(&model(text), 3.0).1.unwrap_err();
+        assert!(error.to_string().contains("turn away"), "{error}\n{text}");
+        let HybridError::Undecided { t, .. } = error else { panic!("{error}") };
+        t
+    };
+    let turning = |a: &str, start: &str| {
+        format!(
+            "states = ['x', 'y', 'z']\nstart = [{start}]\nf = ['sign(y) + {a}*sign(x)', \
+             '-sign(x) + {a}*sign(y)', '1 + 0.5*sign(x)']"
+        )
+    };
+    assert_eq!(refused(&turning("0.2", "0, 0, 0")), 0.0);
+    let planar = "states = ['x', 'y']\nstart = [0, 0]\nf = ['sign(y) + sign(x)/5', '-sign(x) + \
+        sign(y)/5']";
+    assert_eq!(refused(planar), 0.0);
+    let position = |a: &str| {
+        format!("states = ['x', 'v']\nstart = [0, 0]\nf = ['v', '-sign(x) + {a}*sign(v)']")
+    };
+    let error = run(&model(&position("0.5")), 3.0).1.unwrap_err();
+    assert!(matches!(error, HybridError::Undecided { .. }), "{error}");
+    assert_eq!(end(&position("-0.5"), 3.0), [0.0, 0.0]);
+    // Turns that grow by nothing need for ever.
+    let x = end(&turning("0", "0, 0, 0"), 3.0);
+    assert_eq!(x[..2], [0.0, 0.0]);
+    near(x[2], 3.0, 1e-14);
+    // Infinitely many switches in finite time, and then along the corner.
+    let text = turning("-0.2", "0.5, 0.1, 0");
+    let x = end(&text, 9.0);
+    assert!(x[0].abs() < 1e-12 && x[1].abs() < 1e-12, "{x:?}");
+    // The integral of sign(x) is that of what x and y fall by: 1.04 (1, y) = (-0.2 x - y, ...).
+    near(x[2], 9.0 + 0.5 * (-0.2 * -0.5 - -0.1) / 1.04, 1e-9);
+    // Where growth begins while the motion stays there, it is not decided any more.
+    for method in [Method::Dopri5, Method::Radau5, Method::Taylor] {
+        let text = turning("0.2*(z - 1)", "0.1, 0, 0");
+        let options = Options { t_end: 3.0, method, ..Options::default() };
+        let error = follow(&model(&text), &options, &mut |_| true).unwrap_err();
+        let HybridError::Undecided { x, .. } = &error else { panic!("{method:?}: {error}") };
+        near(x[2], 1.0, 1e-6);
+    }
+}
+
+/// Of three relays: whether they hold each other, or turn each other away.
+#[test]
+fn three_relays_that_act_on_each_other() {
+    let of = |f: &str| {
+        let text =
+            format!("states = ['x', 'y', 'z', 'w']\nstart = [0.2, 0.3, -0.1, 0]\nf = [{f}, '1']");
+        run(&model(&text), 6.0).1
+    };
+    for f in [
+        "'-sign(x) + 0.5*sign(y)', '-sign(y) + 0.5*sign(z)', '-sign(z) - 0.5*sign(x)'",
+        "'-sign(x)', '-sign(y) + 3*sign(x)', '-sign(z) + 5*sign(y) - 2*sign(x)'",
+    ] {
+        let x = of(f).unwrap_or_else(|e| panic!("{e}\n{f}")).x;
+        assert!(x[..3].iter().all(|x| x.abs() < 1e-12) && (x[3] - 6.0).abs() < 1e-12, "{x:?}");
+    }
+    let f = "'-sign(y)', '-sign(z)', '-sign(x)'";
+    let text = format!("states = ['x', 'y', 'z', 'w']\nstart = [0, 0, 0, 0]\nf = [{f}, '1']");
+    let error = run(&model(&text), 3.0).1.unwrap_err().to_string();
+    assert!(error.contains("turn away"), "{error}");
 }
 
 /// On two relays with z' = 1 + sign(x) sign(y): equal weights give z' = 1, the shortest velocity of

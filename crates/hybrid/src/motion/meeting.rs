@@ -69,6 +69,9 @@ impl Follower<'_> {
                     }
                     let zero = self.sliding.clone();
                     match self.options.exit {
+                        _ if zero.len() > 1 => {
+                            return Err(self.ceases_to_be_the_only_motion());
+                        }
                         Exit::Undecided => {
                             return Err(self.undecided(
                                 &zero,
@@ -143,8 +146,10 @@ impl Follower<'_> {
             if self.comes_to_rest(t) {
                 return Ok(None);
             }
-            let surfaces = self.names(&[guard]);
-            return Err(HybridError::Accumulation { t, error, x: self.x.clone(), surfaces });
+            if !self.comes_to_meeting()? {
+                let surfaces = self.names(&[guard]);
+                return Err(HybridError::Accumulation { t, error, x: self.x.clone(), surfaces });
+            }
         }
         fired.sort_unstable();
         self.happen(definition, &fired, &zero, observe)
@@ -535,17 +540,7 @@ impl Follower<'_> {
         let n = self.n;
         let values = self.watched_values();
         let largest = self.size.iter().fold(0.0_f64, |most, s| most.max(*s));
-        let near: Vec<(usize, usize)> = self
-            .compiled
-            .active
-            .iter()
-            .enumerate()
-            // On the wrong side of another a function may have no value.
-            .filter(|(place, guard)| {
-                !self.equation.guards[**guard].whole && !(values[*place].abs() > 1e-6 * largest)
-            })
-            .map(|(place, guard)| (place, *guard))
-            .collect();
+        let near = self.nearly_zero(&values);
         if near.is_empty() || near.len() > MOST_TOGETHER {
             return false;
         }
@@ -588,6 +583,11 @@ impl Follower<'_> {
         if !nearest_of_hull(&parts).iter().all(|v| v.abs() <= 1e-6) {
             return false;
         }
+        if let [(_, a), (_, b)] = near.as_slice()
+            && self.turns_away(&x, [*a, *b])
+        {
+            return false;
+        }
         // A field that leads to its own side for a short time leads away.
         let brief = 1e-4 * moves.iter().map(|i| self.size[*i] / fastest[*i]).fold(left, f64::min);
         for vertex in 0..fields.len() {
@@ -613,6 +613,38 @@ impl Follower<'_> {
         let (config, sliding) = (self.config.clone(), self.sliding.clone());
         self.adopt(config, sliding);
         true
+    }
+
+    /// The functions that are zero but for a millionth of the states, by place and guard.
+    fn nearly_zero(&self, values: &[f64]) -> Vec<(usize, usize)> {
+        let largest = self.size.iter().fold(0.0_f64, |most, s| most.max(*s));
+        let active = self.compiled.active.iter().copied().enumerate();
+        // On the wrong side of another a function may have no value.
+        let near = |(place, guard): &(usize, usize)| {
+            !self.equation.guards[*guard].whole && !(values[*place].abs() > 1e-6 * largest)
+        };
+        active.filter(near).collect()
+    }
+
+    /// Whether switches that accumulate come together where several functions are zero. If they are
+    /// zero to rounding the motion goes on from there, as the fields decide; else its turns do.
+    fn comes_to_meeting(&mut self) -> Result<bool, HybridError> {
+        let values = self.watched_values();
+        let near = self.nearly_zero(&values);
+        if near.len() < 2 {
+            return Ok(false);
+        }
+        let rounding =
+            |e: &Expression| 1e3 * f64::EPSILON * self.magnitude(e).max(self.terms_now(e));
+        let at = |(place, guard): &(usize, usize)| {
+            values[*place].abs() <= rounding(&self.equation.guards[*guard].expression)
+        };
+        if near.iter().all(at) {
+            self.x = self.nearest_meeting(&near, &values);
+            let zero: Vec<usize> = near.iter().map(|(_, guard)| *guard).collect();
+            self.settle(&zero)?;
+        }
+        Ok(true)
     }
 
     /// The gradients of functions, by place and guard, in the states at the present point.

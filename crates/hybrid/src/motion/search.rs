@@ -200,18 +200,23 @@ impl Follower<'_> {
                 // Each attracts by itself: the one that is nearest to doing so no more counts.
                 determinant = jumps.iter().map(|j| -j).fold(f64::INFINITY, f64::min);
             } else if !self.corners.is_empty() {
-                let (found, _) = self.corner_mixture(t, x);
+                let (found, fields, rates) = self.corner_mixture(t, x);
                 (weights, others) =
                     found.margins.iter().map(|[plus, minus]| (*plus, *minus)).unzip();
-                determinant = 1.0;
+                determinant = self.corners_hold(&fields, &rates);
             } else {
                 let (a, matrix) = self.sliding_equations(t, x, &field0);
                 let k = a.len();
                 let b: Vec<f64> = a.iter().map(|v| -v).collect();
                 weights = solve_any(&matrix, &b, 0.0).unwrap_or_else(|| vec![f64::NAN; k]);
                 // Attracting where minus the matrix has a positive determinant, which a single
-                // surface's jump of speed is.
+                // surface's jump of speed is, and where fields do not turn away.
+                let holds =
+                    if self.may_turn_away() { attraction(&a, &matrix) } else { f64::INFINITY };
                 determinant = determinant_of_negative(matrix, k);
+                if holds < determinant {
+                    determinant = holds;
+                }
             }
         }
         out.clear();

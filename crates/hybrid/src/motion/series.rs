@@ -358,6 +358,8 @@ impl Follower<'_> {
                 return Some(c);
             }
             Sought::Pole(_) => return None,
+            // Whether fields turn away is no function with a series.
+            Sought::Repelling if self.may_turn_away() => return None,
             Sought::Repelling => return own(Followed::Attraction),
             Sought::Release(place) => return own(Followed::Push(place)),
         };

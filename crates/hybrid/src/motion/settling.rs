@@ -256,12 +256,16 @@ impl Follower<'_> {
                 let direction: Vec<f64> =
                     set.iter().map(|i| place[*i].map_or(0.0, |p| rates.direction(p))).collect();
                 let asked: Vec<bool> = set.iter().map(|i| asked[*i]).collect();
-                (rates.field.clone(), first, direction, asked)
+                let known: Vec<f64> = set
+                    .iter()
+                    .map(|i| place[*i].map_or(f64::NAN, |p| rates.first_or_zero(p)))
+                    .collect();
+                (rates.field.clone(), first, direction, asked, known)
             };
             // Fields that are the same on both sides decide nothing and need nothing decided.
             if set.len() == 1 {
-                let (low, _, d0, _) = at(self, vec![false]);
-                let (high, _, d1, _) = at(self, vec![true]);
+                let (low, _, d0, ..) = at(self, vec![false]);
+                let (high, _, d1, ..) = at(self, vec![true]);
                 if same(&low, &high) {
                     let side = if d1[0] != 0.0 { d1[0] } else { d0[0] };
                     let present = self.config.sides[zero[set[0]]];
@@ -281,11 +285,12 @@ impl Follower<'_> {
                     continue;
                 }
             }
+            let mut may_turn_away = false;
             let found = possibilities(set.len(), |assignment| {
                 let slides: Vec<usize> =
                     (0..set.len()).filter(|i| assignment[*i] == Way::Stay).collect();
                 let plus: Vec<bool> = assignment.iter().map(|w| *w == Way::Plus).collect();
-                let (_, base, direction, mut asked) = at(self, plus.clone());
+                let (_, base, direction, mut asked, _) = at(self, plus.clone());
                 let mut columns = Vec::new();
                 for s in &slides {
                     let mut flipped = plus.clone();
@@ -321,14 +326,28 @@ impl Follower<'_> {
                     if d0 * d1 >= 0.0 && !along_one {
                         return false;
                     }
-                } else if self.options.intersection != Intersection::Undecided {
-                    let (mut fields, mut speeds) = (Vec::new(), Vec::new());
+                } else {
+                    let rule = self.rule();
+                    let chosen = self.options.intersection != Intersection::Undecided;
+                    let (mut fields, mut speeds, mut known) = (Vec::new(), Vec::new(), Vec::new());
                     for vertex in 0..1_usize << m {
                         let mut on = plus.clone();
                         slides.iter().enumerate().for_each(|(i, s)| on[*s] = vertex >> i & 1 == 1);
-                        let (field, rates, ..) = at(self, on);
+                        let (field, rates, .., first) = at(self, on);
                         fields.push(field);
                         speeds.push(rates);
+                        known.push(slides.iter().map(|s| first[*s]).collect::<Vec<f64>>());
+                    }
+                    let holds = || match known.as_slice() {
+                        [a, b, c, d] => hold(&[a, b, c, d].map(|rates| [rates[0], rates[1]])),
+                        _ => attraction(
+                            &slides.iter().map(|s| base[*s]).collect::<Vec<_>>(),
+                            &matrix,
+                        ),
+                    };
+                    if !chosen && !(holds() > 0.0) {
+                        may_turn_away = true;
+                        return false;
                     }
                     // If all mixtures have one velocity, there is nothing to choose.
                     if mixtures_differ(&fields) {
@@ -338,9 +357,7 @@ impl Follower<'_> {
                             .map(|rates| slides.iter().map(|s| rates[*s]).collect())
                             .collect();
                         let order = self.order_of(&guards);
-                        let Some(found) =
-                            mixture(&self.options.intersection, &order, &fields, &own)
-                        else {
+                        let Some(found) = mixture(&rule, &order, &fields, &own) else {
                             return false;
                         };
                         let rate = |i: usize| {
@@ -378,6 +395,10 @@ impl Follower<'_> {
                     let names: Vec<usize> = set.iter().map(|i| zero[*i]).collect();
                     return Err(match self.options.intersection {
                         Intersection::Order(_) if names.len() > 1 => self.no_mixture(&names),
+                        _ if may_turn_away => self.undecided(
+                            &names,
+                            "it may stay, or turn away by infinitely many switches at any time",
+                        ),
                         _ => {
                             self.undecided(&names, "no way is consistent to first and second order")
                         }
@@ -443,7 +464,25 @@ impl Follower<'_> {
             }
             let size = corner.iter().chain(&base).fold(0.0_f64, |most, v| most.max(v.abs()));
             differ = sum.iter().zip(&corner).any(|(p, c)| (p - c).abs() > 1e-9 * size);
-            if differ && self.options.intersection == Intersection::Undecided {
+            let undecided = self.options.intersection == Intersection::Undecided;
+            let mut several = || {
+                if stay.len() > MOST_CORNERS {
+                    return true;
+                }
+                let (mut fields, mut rates) = (Vec::new(), Vec::new());
+                for corner in 0..1_usize << stay.len() {
+                    let on = |i: usize| {
+                        stay.iter().position(|s| *s == i).is_some_and(|p| corner >> p & 1 == 1)
+                    };
+                    let (_, place, here, _) =
+                        vertex(self, &|i| ways[i] == Way::Plus || (ways[i] == Way::Stay && on(i)));
+                    let rate = |s: &usize| place[*s].map_or(f64::NAN, |p| here.first[p]);
+                    rates.push(stay.iter().map(rate).collect());
+                    fields.push(here.field);
+                }
+                velocities_differ(&fields, &rates)
+            };
+            if differ && undecided && several() {
                 let names: Vec<usize> = stay.iter().map(|i| zero[*i]).collect();
                 let ways = "sliding on all of them, where mixtures of the fields have different \
                     velocities";
@@ -484,8 +523,13 @@ impl Follower<'_> {
                 return Err(HybridError::Stuck { t: self.t, x: self.x.clone(), why });
             }
             self.take_corners();
+            if self.tangents.is_some() {
+                return Err(self.no_tangents(
+                    "the motion follows a mixture of more fields than their surfaces decide",
+                ));
+            }
             let (t, x) = (self.t, self.x.clone());
-            let (found, _) = self.corner_mixture(t, &x);
+            let (found, ..) = self.corner_mixture(t, &x);
             let all = found.weights.iter().chain(found.margins.iter().flatten());
             if !all.into_iter().all(|w| (-1e-9..=1.0 + 1e-9).contains(w)) {
                 return Err(self.no_mixture(&self.sliding));
@@ -493,6 +537,64 @@ impl Follower<'_> {
         }
         self.no_side_is_left_open(&zero)?;
         self.follow_jumps(&zero)
+    }
+
+    /// Whether the motion slides on several surfaces that may act on each other, and no rule says
+    /// that it stays there.
+    pub(super) fn may_turn_away(&self) -> bool {
+        self.sliding.len() > 1
+            && self.separate.is_none()
+            && self.options.intersection == Intersection::Undecided
+    }
+
+    /// Sliding on several surfaces goes on where the motion is not decided any more.
+    pub(super) fn ceases_to_be_the_only_motion(&self) -> HybridError {
+        self.undecided(
+            &self.sliding,
+            "sliding on all of them ceases to be the only motion: it may go on with another \
+                velocity, or turn away at any time",
+        )
+    }
+
+    /// The rule that chooses among mixtures. If all have one velocity it does not matter which.
+    pub(super) fn rule(&self) -> Intersection {
+        match &self.options.intersection {
+            Intersection::Undecided => Intersection::HullLeastNorm,
+            rule => rule.clone(),
+        }
+    }
+
+    /// Whether motion may turn away from a point where two functions are zero: fields turn around
+    /// it, to first order or as a position and its speed do, and each turn is longer than the one
+    /// before.
+    pub(super) fn turns_away(&mut self, x: &[f64], guards: [usize; 2]) -> bool {
+        let before = std::mem::replace(&mut self.x, x.to_vec());
+        let (mut first, mut second) = ([[f64::NAN; 2]; 4], [[f64::NAN; 2]; 4]);
+        for field in 0..4 {
+            let mut config = self.config.clone();
+            for (i, guard) in guards.iter().enumerate() {
+                config.sides[*guard] =
+                    if field >> i & 1 == 1 { self.high(*guard) } else { self.low(*guard) };
+            }
+            let (compiled, rates) = self.rates(&config);
+            for (i, guard) in guards.iter().enumerate() {
+                if let Some(place) = compiled.place(*guard) {
+                    first[field][i] = rates.first_or_zero(place);
+                    second[field][i] = rates.second[place];
+                }
+            }
+        }
+        self.x = before;
+        let position = |i: usize| {
+            if !first.iter().all(|rates| rates[i] == 0.0) {
+                return None;
+            }
+            // Fields are numbered by the side of the position first.
+            let order = if i == 0 { [0, 1, 2, 3] } else { [0, 2, 1, 3] };
+            turn_of_position(&order.map(|f| second[f][i]), &order.map(|f| first[f][1 - i]))
+        };
+        let growth = turn(&first).or_else(|| position(0)).or_else(|| position(1));
+        growth.is_some_and(leads_away)
     }
 
     /// A function that stays zero while the motion slides on another's zero has no side that the

@@ -186,7 +186,7 @@ impl Follower<'_> {
                 }
             }
         } else if !self.corners.is_empty() {
-            let (found, fields) = self.corner_mixture(t, x);
+            let (found, fields, _) = self.corner_mixture(t, x);
             for i in 0..n {
                 out[i] = sum(found.weights.iter().zip(&fields).map(|(w, f)| w * f[i]));
             }
@@ -226,8 +226,12 @@ impl Follower<'_> {
     }
 
     /// The mixture that the rule makes of the fields on all sides, not-a-number where there is
-    /// none, and those fields.
-    pub(super) fn corner_mixture(&mut self, t: f64, x: &[f64]) -> (Mixture, Vec<Vec<f64>>) {
+    /// none, those fields, and the rates of the functions slid upon.
+    pub(super) fn corner_mixture(
+        &mut self,
+        t: f64,
+        x: &[f64],
+    ) -> (Mixture, Vec<Vec<f64>>, Vec<Vec<f64>>) {
         let n = self.n;
         let (mut fields, mut rates) = (Vec::new(), Vec::new());
         for (compiled, variables) in &mut self.corners {
@@ -245,7 +249,21 @@ impl Follower<'_> {
             weights: vec![f64::NAN; fields.len()],
             margins: vec![[f64::NAN; 2]; self.sliding.len()],
         };
-        (mixture(&self.options.intersection, &order, &fields, &rates).unwrap_or_else(none), fields)
+        let found = mixture(&self.rule(), &order, &fields, &rates).unwrap_or_else(none);
+        (found, fields, rates)
+    }
+
+    /// Positive where the motion on the surfaces slid upon, with these fields around them, is the
+    /// only one and has one velocity, or where a rule says so. What leads away to first order ends
+    /// the sliding by its weights.
+    pub(super) fn corners_hold(&self, fields: &[Vec<f64>], rates: &[Vec<f64>]) -> f64 {
+        match rates {
+            _ if self.options.intersection != Intersection::Undecided => 1.0,
+            [a, b, c, d] if !velocities_differ(fields, rates) => {
+                hold(&[a, b, c, d].map(|rates| [rates[0], rates[1]]))
+            }
+            _ => -1.0,
+        }
     }
 
     /// The field on the positive side of a surface slid upon.
@@ -433,10 +451,11 @@ impl Follower<'_> {
 }
 
 /// A sum, zero where only rounding is left: a speed of a state that stays at zero would be resolved
-/// as a motion.
+/// as a motion. The weights of several terms are solutions of as many equations.
 fn sum(terms: impl Iterator<Item = f64>) -> f64 {
-    let (sum, size) = terms.fold((0.0, 0.0), |(sum, size), v| (sum + v, size + v.abs()));
-    if sum.abs() <= 4.0 * f64::EPSILON * size { 0.0 } else { sum }
+    let add = |(sum, size, count), v: f64| (sum + v, size + v.abs(), count + 1.0);
+    let (sum, size, count) = terms.fold((0.0, 0.0, -1.0), add);
+    if sum.abs() <= 4.0 * count * count * f64::EPSILON * size { 0.0 } else { sum }
 }
 
 /// The determinant of -a, of k rows, by elimination with pivots.
