@@ -30,7 +30,9 @@ use crate::definition::{Direction, When};
 use crate::equation::{Compiled, Configuration, Equation, EquationError};
 use crate::model::Model;
 use crate::range::Range;
-use crate::roots::{PLACES, at_fraction, first, first_of_polynomial, first_of_series, stays};
+use crate::roots::{
+    PLACES, at_fraction, first, first_of_polynomial, first_of_series, slope_at_beginning, stays,
+};
 use crate::selection::{
     Intersection, MOST_TOGETHER, Mixture, Way, attraction, groups, hold, leads_away, mixture,
     nearest_of_hull, possibilities, turn, turn_of_position, velocities_differ,

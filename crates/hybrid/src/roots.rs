@@ -25,6 +25,12 @@ fn bernstein(v: &[f64; 5]) -> [f64; 5] {
     ]
 }
 
+/// The slope at the beginning of the polynomial through five values, for the whole interval.
+pub(crate) fn slope_at_beginning(v: &[f64; 5]) -> f64 {
+    let b = bernstein(v);
+    4.0 * (b[1] - b[0])
+}
+
 /// The value of a polynomial by its Bernstein coefficients.
 pub(crate) fn at_fraction(b: &[f64; 5], u: f64) -> f64 {
     let w = 1.0 - u;

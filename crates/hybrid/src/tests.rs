@@ -917,6 +917,32 @@ fn a_corner_that_is_turned_around_holds_or_is_left() {
     }
 }
 
+/// A ramp of force tears a block loose at t = f/r, when both its speed and its acceleration are
+/// zero.
+#[test]
+fn a_block_is_torn_loose_by_a_ramp() {
+    for (ramp, friction) in
+        [(0.5, 1.0), (0.3, 1.0), (0.25, 1.0), (1.0, 1.0), (0.37, 0.9), (0.7, 0.11), (0.013, 0.017)]
+    {
+        let loose = friction / ramp;
+        for method in [Method::Dopri5, Method::Radau5, Method::Taylor] {
+            for (states, f, start) in [
+                ("'x', 'v'", format!("'v', '{ramp}*t - {friction}*sign(v)'"), "0, 0"),
+                ("'s', 'x', 'v'", format!("'{ramp}', 'v', 's - {friction}*sign(v)'"), "0, 0, 0"),
+            ] {
+                let text = format!("states = [{states}]\nstart = [{start}]\nf = [{f}]");
+                let options = Options { t_end: loose + 1.0, method, ..Options::default() };
+                let outcome = follow(&model(&text), &options, &mut |_| true)
+                    .unwrap_or_else(|e| panic!("{method:?}: {e}\n{text}"));
+                let [.., x, v] = outcome.x.as_slice() else { panic!() };
+                near(*v, 0.5 * ramp, 1e-9);
+                near(*x, ramp / 6.0, 1e-9);
+                assert!(outcome.switches <= 3, "{method:?} {}\n{text}", outcome.switches);
+            }
+        }
+    }
+}
+
 /// Of three relays: whether they hold each other, or turn each other away.
 #[test]
 fn three_relays_that_act_on_each_other() {

@@ -41,7 +41,7 @@ impl Follower<'_> {
     /// Adds the first zeros if all conditions are sums of states, which are polynomials in a step
     /// and need no evaluation. Returns their values at the step's end, or `None` for each.
     fn find_in_polynomials(
-        &self,
+        &mut self,
         step: &Step,
         list: &[(Sought, f64)],
         found: &mut Vec<(f64, Sought)>,
@@ -57,13 +57,34 @@ impl Follower<'_> {
         let end = |((sought, side), b): (&(Sought, f64), [f64; 5])| {
             let mut v = PLACES.map(|theta| at_fraction(&b, theta));
             let end = v[4];
-            if self.is_fresh(*sought) || v[0] * side < 0.0 {
-                v[0] = 0.0;
-            }
+            self.begin_at_zero(*sought, *side, step.h, &mut v);
             found.extend(first_of_polynomial(v, *side).map(|theta| (theta, *sought)));
             Some(end)
         };
         list.iter().zip(all).map(end).collect()
+    }
+
+    /// Puts the values, at [`PLACES`] of a time `h`, of a function that has just left zero, or that
+    /// rounding has beyond it, to zero at the beginning. What leaves zero to second order does so
+    /// without the slope that rounding makes, which is returned as the change in that time.
+    fn begin_at_zero(&mut self, sought: Sought, side: f64, h: f64, v: &mut [f64; 5]) -> f64 {
+        if !(self.is_fresh(sought) || v[0] * side < 0.0) {
+            return 0.0;
+        }
+        v[0] = 0.0;
+        let change = slope_at_beginning(v);
+        if !(change * side < 0.0) {
+            return 0.0;
+        }
+        let Some(place) = self.place_of(sought) else { return 0.0 };
+        let terms = self.rates(&self.config.clone()).1.terms;
+        // A surface that sliding has just left is tangent to the motion.
+        let left = if let Sought::Guard { guard, .. } = sought { self.left[guard] } else { 0.0 };
+        if change.abs() > SMALLEST_SLOPE * h * terms[place].max(left) {
+            return 0.0;
+        }
+        v.iter_mut().zip(PLACES).for_each(|(v, theta)| *v -= theta * change);
+        change
     }
 
     /// Adds the first zero of each function's Taylor series; returns the values at the step's end
@@ -125,9 +146,11 @@ impl Follower<'_> {
             }
             for (j, (sought, side)) in list.iter().enumerate().filter(|(j, _)| open[*j]) {
                 let mut v: [f64; 5] = std::array::from_fn(|i| values[i][j]);
-                if from == 0.0 && (self.is_fresh(*sought) || v[0] * side < 0.0) {
-                    v[0] = 0.0;
-                }
+                let change = if from == 0.0 {
+                    self.begin_at_zero(*sought, *side, to * step.h, &mut v) / to
+                } else {
+                    0.0
+                };
                 if v.iter().any(|v| v.is_nan()) {
                     // Weights of sliding where there are none: shorter steps find the place.
                     if matches!(sought, Sought::Leave { .. } | Sought::Repelling) {
@@ -143,7 +166,7 @@ impl Follower<'_> {
                 let mut f = |theta: f64| {
                     step.at(theta, &mut at);
                     self.measure(&one, step.t + theta * step.h, &at, &mut value);
-                    value[0]
+                    value[0] - theta * change
                 };
                 found.extend(first(v, *side, from, to, &mut f, 0).map(|theta| (theta, *sought)));
             }
