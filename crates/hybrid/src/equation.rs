@@ -573,20 +573,15 @@ impl Equation {
                 let spoilt = self.definition.modes.iter().flat_map(|m| m.field.iter().enumerate());
                 let place =
                     spoilt.zip(fields.iter().cycle()).find(|(_, out)| !values[**out].is_finite());
+                if let Some(((i, e), _)) = place {
+                    return Some(format!("{what}, in the equation of {}, `{e}`", names[i]));
+                }
                 let guard =
-                    || compiled.deciding.iter().zip(guards).find(|(_, out)| values[**out].is_nan());
-                return Some(match place {
-                    Some(((i, e), _)) => format!("{what}, in the equation of {}, `{e}`", names[i]),
-                    None => match guard() {
-                        Some((guard, _)) => {
-                            format!(
-                                "{what}, in the switching function {}",
-                                self.guards[*guard].expression
-                            )
-                        }
-                        None => what.into(),
-                    },
-                });
+                    compiled.deciding.iter().zip(guards).find(|(_, out)| values[**out].is_nan());
+                // What spoils nothing is no end: 0^1.5 is exp(1.5 ln 0), which is zero.
+                let (guard, _) = guard?;
+                let function = &self.guards[*guard].expression;
+                return Some(format!("{what}, in the switching function {function}"));
             }
         }
         None

@@ -812,7 +812,11 @@ impl<'a> Follower<'a> {
                 return Err(self.left_domain(step.t, &step.x));
             }
             if self.options.method == Method::Radau5 {
-                step.jacobian = Some(self.jacobian(step.t, &step.x));
+                // Iterations without a slope that is infinite, as that of a root at zero, settle in
+                // short steps.
+                let mut jacobian = self.jacobian(step.t, &step.x);
+                jacobian.iter_mut().filter(|j| !j.is_finite()).for_each(|j| *j = 0.0);
+                step.jacobian = Some(jacobian);
             }
             if self.options.method == Method::Taylor {
                 if let Err(error) = self.expand(&mut step) {

@@ -943,6 +943,29 @@ fn a_block_is_torn_loose_by_a_ramp() {
     }
 }
 
+/// Powers and roots of zero, where a motion begins or which it passes.
+#[test]
+fn powers_and_roots_of_zero_belong_to_the_domain() {
+    for (start, f, t_end, want) in [
+        ("0, 1", "x^1.5", 1.0, 1.4),
+        ("0, 1", "sqrt(x)", 1.0, 1.0 + 2.0 / 3.0),
+        ("-1, 1", "sign(x)*abs(x)^(1/3)", 2.0, 1.0),
+        ("-1, 1", "sign(x)*sqrt(abs(x))", 2.0, 1.0),
+        ("-1, 1", "abs(x)^1.5", 2.0, 1.8),
+    ] {
+        let text = format!("states = ['x', 'y']\nstart = [{start}]\nf = ['1', '{f}']");
+        for method in [Method::Dopri5, Method::Radau5] {
+            let options = Options { t_end, method, ..Options::default() };
+            let outcome = follow(&model(&text), &options, &mut |_| true)
+                .unwrap_or_else(|e| panic!("{method:?}: {e}\n{text}"));
+            near(outcome.x[1], want, 1e-8);
+        }
+        let options = Options { t_end, method: Method::Taylor, ..Options::default() };
+        let error = follow(&model(&text), &options, &mut |_| true).unwrap_err().to_string();
+        assert!(error.contains("no Taylor series"), "{error}");
+    }
+}
+
 /// Of three relays: whether they hold each other, or turn each other away.
 #[test]
 fn three_relays_that_act_on_each_other() {
