@@ -20,7 +20,7 @@ use nalgebra::SVector;
 use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance};
 use twofold_num::elementary::ln;
 use twofold_num::series::HIGH_POWER;
-use twofold_num::tape::{Node, Operation};
+use twofold_num::tape::{Node, Operation, Replay};
 use twofold_num::{Elementary, Tape};
 use twofold_system::VectorField;
 use twofold_system::singular::Ends;
@@ -278,6 +278,13 @@ pub(super) struct Gates {
     along: Vec<Along>,
     values: Vec<f64>,
     ends: Option<Ends>,
+    /// Whether a step may lead to where the equation is not that of the motion and need not have a
+    /// value: over a switching surface.
+    leads_over: bool,
+    /// Fields among the tape's outputs, of which the motion follows one or a mixture.
+    fields: usize,
+    /// Levels between which the last output, a switching function, is told apart.
+    levels: Option<[f64; 2]>,
 }
 
 impl Gates {
@@ -319,7 +326,42 @@ impl Gates {
             _ => None,
         };
         let ends = Ends::new(tape.clone());
-        Some(Self { needed, values: fixed.clone(), fixed, along, gates, plain, tape, ends })
+        let (values, leads_over, fields, levels) = (fixed.clone(), false, 1, None);
+        let found = Self {
+            needed,
+            values,
+            fixed,
+            along,
+            gates,
+            plain,
+            tape,
+            ends,
+            leads_over,
+            fields,
+            levels,
+        };
+        Some(found)
+    }
+
+    /// The same of the field on one side of a surface, whose steps lead over it.
+    pub(super) fn of_side(tape: Arc<Tape>) -> Option<Self> {
+        Some(Self { ends: None, leads_over: true, ..Self::new(tape)? })
+    }
+
+    /// The same of a mixture of fields and of a switching function that is told apart at two levels.
+    pub(super) fn with_switch(fields: &[Arc<Tape>], h: &Tape, levels: [f64; 2]) -> Option<Self> {
+        let n = fields.first().map_or(h.variables(), |field| field.variables());
+        let tape = Tape::record(n, |x| {
+            let mut out = Vec::new();
+            for field in fields {
+                let mut field = Replay::new(field, x);
+                out.extend((0..n).map(|i| field.output(i)));
+            }
+            out.push(Replay::new(h, &x[..h.variables()]).output(0));
+            out
+        });
+        let (fields, levels) = (fields.len(), Some(levels));
+        Some(Self { fields, levels, ..Self::of_side(Arc::new(tape))? })
     }
 
     pub(super) fn plain(&self) -> Option<&Plain> {
@@ -417,10 +459,10 @@ impl Gates {
         self.gates.iter().map(|(_, node)| self.values[*node]).collect()
     }
 
-    /// The right-hand side at `x`.
-    fn field<const N: usize>(&mut self, x: &SVector<f64, N>) -> SVector<f64, N> {
-        self.evaluate(x.as_slice(), true);
-        SVector::from_fn(|i, _| self.values[self.tape.outputs()[i]])
+    /// The outputs at `x`.
+    fn outputs(&mut self, x: &[f64]) -> Vec<f64> {
+        self.evaluate(x, true);
+        self.tape.outputs().iter().map(|node| self.values[*node]).collect()
     }
 
     /// Whether all gates are quiet between five equidistant samples of their arguments, which are
@@ -547,7 +589,14 @@ impl Gates {
         leaves: &[(f64, f64)],
     ) -> Option<Missed> {
         let h = step.length();
-        let (f0, f1) = (self.field(&step.x0), self.field(&step.x1));
+        let (f0, f1) = (self.outputs(step.x0.as_slice()), self.outputs(step.x1.as_slice()));
+        let last = f0.len() - 1;
+        let hidden = |levels: [f64; 2], value: f64| {
+            levels.iter().any(|level| {
+                let beyond = |v: f64| v > *level;
+                beyond(f0[last]) == beyond(f1[last]) && beyond(value) != beyond(f0[last])
+            })
+        };
         // Neighbouring parts in which something was missed are one structure.
         let mut structures: Vec<(Missed, SVector<f64, N>)> = Vec::new();
         for &(from, to) in leaves {
@@ -555,15 +604,22 @@ impl Gates {
             // Boole's rule.
             for (k, weight) in [7.0, 32.0, 12.0, 32.0, 7.0].into_iter().enumerate() {
                 let theta = from + 0.25 * k as f64 * (to - from);
-                let f = self.field(&step.at(theta));
+                let f = self.outputs(step.at(theta).as_slice());
+                if self.levels.is_some_and(|levels| hidden(levels, f[last])) {
+                    return Some(Missed { from, to });
+                }
                 let (before, after) =
                     ((theta - DIFFERENCE).max(0.0), (theta + DIFFERENCE).min(1.0));
                 let at = |theta: f64| step.interpolant.at(theta);
                 let own = (at(after) - at(before)) / ((after - before) * h);
-                for i in 0..N {
-                    let (low, high) = (f0[i].min(f1[i]).min(own[i]), f0[i].max(f1[i]).max(own[i]));
-                    let beyond = (f[i] - high).max(low - f[i]);
-                    if f[i].is_nan() {
+                for o in 0..self.fields * N {
+                    let i = o % N;
+                    let (low, high) = (f0[o].min(f1[o]).min(own[i]), f0[o].max(f1[o]).max(own[i]));
+                    let beyond = (f[o] - high).max(low - f[o]);
+                    if f[o].is_nan() && self.leads_over {
+                        continue;
+                    }
+                    if f[o].is_nan() {
                         outside[i] = f64::INFINITY;
                     } else if beyond > OUTSIDE * (high - low) {
                         outside[i] += weight / 90.0 * beyond * (to - from) * h;
@@ -645,10 +701,7 @@ impl Stages {
         (t, x): (f64, &SVector<f64, N>),
         [from, to]: [f64; 2],
     ) -> Result<(), Failure> {
-        let width = to - from;
-        if width <= SHORTEST * t.abs().max(from.abs()) {
-            return Err(Failure::StepUnderflow { t: from, h: width, state: Failure::state(x) });
-        }
+        let width = width((t, x), [from, to])?;
         let Stage { end, max_step } = self.now();
         self.before.push(Stage { end: to.min(end), max_step: max_step.min(width / STEPS_THROUGH) });
         if from - t > 1e-3 * width && from - t > SHORTEST * t.abs() {
@@ -656,6 +709,34 @@ impl Stages {
         }
         Ok(())
     }
+}
+
+/// The time that a structure takes.
+///
+/// # Errors
+/// If it is too short for steps.
+fn width<const N: usize>(
+    (t, x): (f64, &SVector<f64, N>),
+    [from, to]: [f64; 2],
+) -> Result<f64, Failure> {
+    let width = to - from;
+    if width <= SHORTEST * t.abs().max(from.abs()) {
+        return Err(Failure::StepUnderflow { t: from, h: width, state: Failure::state(x) });
+    }
+    Ok(width)
+}
+
+/// The longest step from (t, x) that does not jump over a structure: to its beginning, or a part of
+/// it.
+///
+/// # Errors
+/// If it is too short for steps.
+pub(super) fn longest_towards<const N: usize>(
+    (t, x): (f64, &SVector<f64, N>),
+    [from, to]: [f64; 2],
+) -> Result<f64, Failure> {
+    let width = width((t, x), [from, to])?;
+    Ok(if from - t > 1e-3 * width { from - t } else { width / STEPS_THROUGH })
 }
 
 /// A method whose last step can be examined and taken back.
@@ -680,7 +761,28 @@ impl<M, const N: usize> Guarded<M, N> {
     /// The method, with its tolerance.
     pub fn new(method: M, tolerance: Tolerance) -> Self {
         let stages = Stages::new(0.0, f64::INFINITY);
-        Self { method, tolerance, gates: None, stages, reached: (0.0, SVector::zeros()) }
+        let reached = (0.0, SVector::zeros());
+        Self { method, tolerance, gates: None, stages, reached }
+    }
+
+    /// The method.
+    pub(super) fn method(&self) -> &M {
+        &self.method
+    }
+
+    /// Where the last step has ended, with the end and the longest step that were asked for.
+    pub(super) fn rest(&self) -> (f64, SVector<f64, N>, Stage) {
+        (self.reached.0, self.reached.1, self.stages.asked)
+    }
+
+    /// Looks at steps through these gates, from the next [`Guarded::restart_with`] on.
+    pub(super) fn look_through(&mut self, gates: Option<Gates>) {
+        self.gates = gates;
+    }
+
+    /// Gives the gates away.
+    pub(super) fn take_gates(&mut self) -> Option<Gates> {
+        self.gates.take()
     }
 }
 
@@ -689,6 +791,21 @@ impl<M: Redoable<N>, const N: usize> Guarded<M, N> {
     fn begin<F: VectorField<N>>(&mut self, field: &F) -> Result<(), Failure> {
         let (Stage { end, max_step }, (t, x)) = (self.stages.now(), self.reached);
         self.method.restart_again(field, t, x, end, max_step)
+    }
+}
+
+impl<M: Redoable<N>, const N: usize> Guarded<M, N> {
+    /// [`Stepper::restart`] with the gates that there are.
+    pub(super) fn restart_with<F: VectorField<N>>(
+        &mut self,
+        field: &F,
+        t: f64,
+        x: SVector<f64, N>,
+        Stage { end, max_step }: Stage,
+    ) -> Result<(), Failure> {
+        self.reached = (t, x);
+        self.stages = Stages::new(end, max_step);
+        self.method.restart(field, t, x, end, max_step)
     }
 }
 
@@ -702,9 +819,7 @@ impl<M: Redoable<N>, const N: usize> Stepper<N> for Guarded<M, N> {
         max_step: f64,
     ) -> Result<(), Failure> {
         self.gates = Gates::new(field.tape());
-        self.reached = (t, x);
-        self.stages = Stages::new(t_end, max_step);
-        self.method.restart(field, t, x, t_end, max_step)
+        self.restart_with(field, t, x, Stage { end: t_end, max_step })
     }
 
     fn restart_again<F: VectorField<N>>(

@@ -11,8 +11,9 @@ use super::{
     Backwards, DelayError, Delayed, History, LEAST_DELAY, LateSwitch, ONE_TIME, Sides, is_due,
     resolves,
 };
+use crate::guard::{Gates, longest_towards};
 use crate::roots::{Crossing, CrossingFinder};
-use crate::step::{Failure, Statistics, Step, Stepper};
+use crate::step::{Failure, Statistics, Step, Stepper, Tolerance};
 use crate::taylor::Cuttable;
 use crate::taylor::Precision;
 use twofold_num::elementary::sqrt;
@@ -61,6 +62,8 @@ pub(super) struct Sharp<'a, P, M: Cuttable<N>, const N: usize> {
     /// Steps, and steps made again.
     steps: u64,
     again: u64,
+    /// The structure of the switching function that a step may jump over.
+    gates: Option<Gates>,
 }
 
 /// A step that was cut to less than this part of itself is made again, shorter, by a method whose
@@ -100,6 +103,7 @@ impl<'a, P: PiecewiseSmooth<N> + Clone, M: Cuttable<N>, const N: usize> Sharp<'a
             statistics: Statistics::default(),
             steps: 0,
             again: 0,
+            gates: Gates::with_switch(&[], &sides.h, [-band, band]),
         };
         if history == History::Flow {
             sharp.look_back()?;
@@ -312,6 +316,19 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
         loop {
             let i = usize::from(self.plus);
             self.methods[i].advance(self.sides.field(self.plus))?;
+            if let Some(gates) = &mut self.gates {
+                let step = self.methods[i].last();
+                // No field is looked at: the tolerance does not matter.
+                let tolerance = Tolerance { rtol: 0.0, atol: 0.0 };
+                if let Some(times) = gates.missed(&step, tolerance)? {
+                    let longest = longest_towards((step.t0, &step.x0), times)?;
+                    self.again += 1;
+                    self.begin(longest)?;
+                    // The next step need not be short.
+                    self.end = None;
+                    continue;
+                }
+            }
             let mut found = self.passages();
             if self.band > 0.0 {
                 // Beyond a switch the step is not the orbit's.

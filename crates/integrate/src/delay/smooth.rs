@@ -6,7 +6,7 @@ use super::past::{Look, Past, shortened};
 use super::tangent::{Carry, TangentStepper, square, square_of_past};
 use super::{Backwards, DelayError, Delayed, History, ONE_TIME, Sides, is_due, resolves};
 use crate::driver::{DriveOptions, Observer, drive};
-use crate::guard::Redoable;
+use crate::guard::{Gates, Redoable, Stage, Stages};
 use crate::roots::CrossingFinder;
 use crate::step::{Driven, DrivenStepper, Failure, Flow, Statistics, Step, Stepper, Tolerance};
 use crate::{Dopri5, Guarded};
@@ -34,6 +34,13 @@ pub(super) struct Smooth<'a, P, M, const N: usize> {
     max_step: f64,
     /// Time at which the method under way ends.
     end: Option<f64>,
+    /// The structure that a step may jump over, and the way through what one has.
+    gates: Option<Gates>,
+    stages: Stages,
+    tolerance: Tolerance,
+    statistics: Statistics,
+    /// Steps that were taken back.
+    again: u64,
 }
 
 /// A jump of a derivative is seen by a method of order 5 until it is one of the sixth.
@@ -113,6 +120,15 @@ impl<'a, P: PiecewiseSmooth<N> + Clone, M, const N: usize> Smooth<'a, P, M, N> {
             t_end: 0.0,
             max_step: f64::INFINITY,
             end: None,
+            gates: Gates::with_switch(
+                &sides.fields.each_ref().map(|side| side.tape.clone()),
+                &sides.h,
+                [-LAYER * eps, LAYER * eps],
+            ),
+            stages: Stages::new(0.0, f64::INFINITY),
+            tolerance,
+            statistics: Statistics::default(),
+            again: 0,
         };
         if history == History::Flow {
             smooth.look_back(tolerance)?;
@@ -224,7 +240,7 @@ fn in_layer<P: PiecewiseSmooth<N>, const N: usize>(
     times
 }
 
-impl<P: PiecewiseSmooth<N>, M: DrivenStepper<N>, const N: usize> Smooth<'_, P, M, N> {
+impl<P: PiecewiseSmooth<N>, M: DrivenStepper<N> + Redoable<N>, const N: usize> Smooth<'_, P, M, N> {
     fn advance(&mut self) -> Result<(), Failure> {
         let t = self.reached.0;
         while self.ends.first().is_some_and(|end| is_due(*end, t)) {
@@ -234,7 +250,20 @@ impl<P: PiecewiseSmooth<N>, M: DrivenStepper<N>, const N: usize> Smooth<'_, P, M
         let next =
             self.ends.first().copied().filter(|end| self.t_end - end > ONE_TIME * self.t_end);
         let end = next.unwrap_or(self.t_end);
-        let Self { sides, carry, delay, transition, eps, past, method, .. } = self;
+        let Self {
+            sides,
+            carry,
+            delay,
+            transition,
+            eps,
+            past,
+            method,
+            gates,
+            stages,
+            tolerance,
+            again,
+            ..
+        } = self;
         let (system, carry) = (sides.system, *carry);
         let field = Weighted {
             system,
@@ -248,9 +277,24 @@ impl<P: PiecewiseSmooth<N>, M: DrivenStepper<N>, const N: usize> Smooth<'_, P, M
         if self.end != Some(end) {
             let longest = self.max_step.min(LONGEST * *delay);
             method.restart_driven(&field, t, self.reached.1, end, longest)?;
-            self.end = Some(end);
+            (self.end, *stages) = (Some(end), Stages::new(end, longest));
         }
-        let step = method.step_driven(&field)?;
+        if stages.end_at(t) {
+            let Stage { end, max_step } = stages.now();
+            method.restart_driven(&field, t, self.reached.1, end, max_step)?;
+        }
+        let step = loop {
+            let step = method.step_driven(&field)?;
+            let Step { t0, t1, x0, x1, .. } = step;
+            let Some(times) = gates.as_mut().map_or(Ok(None), |g| g.missed(&step, *tolerance))?
+            else {
+                break Step { t0, t1, x0, x1, interpolant: method.last() };
+            };
+            stages.go_through((t0, &x0), times)?;
+            *again += 1;
+            let Stage { end, max_step } = stages.now();
+            method.restart_driven(&field, t0, x0, end, max_step)?;
+        };
         sides.fields.iter().try_for_each(|side| step.stays_in_domain(side.ends.as_ref()))?;
         let times = in_layer(sides, *eps, &mut self.passages, &step);
         self.reached = (step.t1, step.x1);
@@ -288,11 +332,14 @@ impl<P: PiecewiseSmooth<N>, M: DrivenStepper<N> + Redoable<N>, const N: usize> S
         let (t0, x0) = self.reached;
         self.advance().map_err(|failure| self.sides.diagnosed(failure, [true; 2]))?;
         let (t1, x1) = self.reached;
+        self.statistics = self.method.statistics().clone();
+        self.statistics.steps -= self.again;
+        self.statistics.rejected += self.again;
         Ok(Step { t0, t1, x0, x1, interpolant: self.method.last() })
     }
 
     fn statistics(&self) -> &Statistics {
-        self.method.statistics()
+        &self.statistics
     }
 }
 

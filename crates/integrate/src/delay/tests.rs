@@ -789,3 +789,39 @@ fn disturbances_of_rapid_oscillations_grow_by_the_root_of_two() {
     // Eight zeros, three turns of the pair: 2^4, beside what stays.
     assert!((zeros[33] / zeros[25] - 16.0).abs() < 0.1, "{zeros:?}");
 }
+
+/// A pulse of width 1e-4 in the fields, or in the switching function, is not jumped over.
+#[test]
+fn thin_pulses_are_seen() {
+    let bell = "exp(-((s - 37.123)/1e-4)^2)";
+    let made = |h: &str, plus: &str, minus: &str| {
+        system(&format!(
+            "states = ['q', 's']\nh = '{h}'\nplus = ['{plus}', '1']\nminus = ['{minus}', '1']"
+        ))
+    };
+    let forced = made("q + 100", &format!("1e4*{bell}"), &format!("1e4*{bell}"));
+    let switched = made(&format!("{bell} - 0.5"), "1e4", "0");
+    let layer = Some((Transition::Tanh, 1e-3));
+    let area = std::f64::consts::PI.sqrt();
+    // Where the bell is above a half; by the relay from 0.6 on until it is 0.4.
+    let [width, relays] = [[0.5_f64, 0.5], [0.6, 0.4]].map(|[on, off]| {
+        twofold_num::elementary::sqrt(-twofold_num::elementary::ln(on))
+            + twofold_num::elementary::sqrt(-twofold_num::elementary::ln(off))
+    });
+    for method in [Method::Dopri5, Method::Taylor] {
+        let (late, relay) = (How::sharp(0.1, 80.0), How::relay(0.1, 80.0));
+        for (how, wanted) in [(late, width), (relay, relays)] {
+            for (data, q) in [(&forced, area), (&switched, wanted)] {
+                let (_, end) = How { method, ..how }.run(data, [0.0, 0.0]).unwrap();
+                assert!((end.x[0] - q).abs() < 1e-6, "{method:?}: {} {q}", end.x[0]);
+            }
+        }
+    }
+    for method in [Method::Dopri5, Method::Radau5] {
+        let how = How { method, smooth: layer, ..How::sharp(0.1, 80.0) };
+        for (data, q) in [(&forced, area), (&switched, width)] {
+            let (_, end) = how.run(data, [0.0, 0.0]).unwrap();
+            assert!((end.x[0] - q).abs() < 1e-4, "{method:?}: {} {q}", end.x[0]);
+        }
+    }
+}

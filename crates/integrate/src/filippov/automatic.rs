@@ -1,9 +1,10 @@
 //! The method of one piece of the motion: Dormand-Prince, and Radau IIA from where the piece is
-//! found to be stiff.
+//! found to be stiff. Steps that jump over structure are taken back.
 
 use nalgebra::SVector;
 
 use crate::dopri5::Dopri5;
+use crate::guard::{Gates, Guarded, Stage};
 use crate::radau5::Radau5;
 use crate::step::{Failure, Statistics, Step, Stepper, Tolerance};
 use twofold_system::VectorField;
@@ -13,13 +14,16 @@ use twofold_system::VectorField;
 #[derive(Clone, Debug)]
 pub(super) struct Automatic<const N: usize> {
     tolerance: Tolerance,
-    explicit: Dopri5<N>,
-    implicit: Option<Box<Radau5<N>>>,
+    explicit: Guarded<Dopri5<N>, N>,
+    implicit: Option<Box<Guarded<Radau5<N>, N>>>,
 }
 
 impl<const N: usize> Automatic<N> {
-    pub fn new(tolerance: Tolerance) -> Self {
-        Self { tolerance, explicit: Dopri5::new(tolerance), implicit: None }
+    /// `gates`: the field's.
+    pub fn new(tolerance: Tolerance, gates: Option<Gates>) -> Self {
+        let mut explicit = Guarded::new(Dopri5::new(tolerance), tolerance);
+        explicit.look_through(gates);
+        Self { tolerance, explicit, implicit: None }
     }
 
     /// See [`Stepper::restart`]. A piece that is stiff remains so.
@@ -28,21 +32,23 @@ impl<const N: usize> Automatic<N> {
         field: &F,
         t: f64,
         x: SVector<f64, N>,
-        t_end: f64,
+        end: f64,
         max_step: f64,
     ) -> Result<(), Failure> {
+        let stage = Stage { end, max_step };
         match &mut self.implicit {
-            None => self.explicit.restart(field, t, x, t_end, max_step),
-            Some(radau) => radau.restart(field, t, x, t_end, max_step),
+            None => self.explicit.restart_with(field, t, x, stage),
+            Some(radau) => radau.restart_with(field, t, x, stage),
         }
     }
 
     /// See [`Stepper::step`].
     pub fn step<F: VectorField<N>>(&mut self, field: &F) -> Result<Step<'_, N>, Failure> {
-        if self.implicit.is_none() && self.explicit.is_stiff() {
-            let Dopri5 { t, x, t_end, max_step, .. } = self.explicit;
-            let mut radau = Radau5::new(self.tolerance);
-            radau.restart(field, t, x, t_end, max_step)?;
+        if self.implicit.is_none() && self.explicit.method().is_stiff() {
+            let (t, x, stage) = self.explicit.rest();
+            let mut radau = Guarded::new(Radau5::new(self.tolerance), self.tolerance);
+            radau.look_through(self.explicit.take_gates());
+            radau.restart_with(field, t, x, stage)?;
             self.implicit = Some(Box::new(radau));
         }
         match &mut self.implicit {
@@ -59,5 +65,13 @@ impl<const N: usize> Automatic<N> {
             all.method_switches += 1;
         }
         all
+    }
+
+    /// Gives the field's gates back.
+    pub fn into_gates(mut self) -> Option<Gates> {
+        match &mut self.implicit {
+            None => self.explicit.take_gates(),
+            Some(radau) => radau.take_gates(),
+        }
     }
 }

@@ -15,6 +15,7 @@ use super::{
     FilippovSummary, Mode, ModeEvent, Side,
 };
 use crate::driver::Monitor;
+use crate::guard::Gates;
 use crate::roots::{Enclosed, Start, Zero, brent, first_zero, first_zero_along};
 use crate::step::{Failure, Flow, Interpolant, Statistics, Step, StopReason, Tolerance, finite};
 use twofold_num::{Arithmetic, Dual, Interval, Tape};
@@ -150,6 +151,7 @@ where
             let tape = Arc::new(Tape::clone(&flow.tape()).with_names(system.names()));
             (tape.clone(), Ends::new(tape))
         }),
+        gates: Default::default(),
     };
     let mut state = match departure {
         Departure::Anywhere if !near_surface(system, &x0) => {
@@ -570,6 +572,9 @@ struct Engine<'a, P, const N: usize> {
     depth: Option<f64>,
     /// f+ and f-, with the ends of their domains.
     fields: [(Arc<Tape>, Option<Ends>); 2],
+    /// The structure that steps of f+, f-, and of attracting and repelling sliding may jump over;
+    /// `None` until it is asked for.
+    gates: [Option<Option<Gates>>; 4],
 }
 
 impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
@@ -928,9 +933,24 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
 
     /// Free flight until the surface or the end.
     fn fly(&mut self, side: Side, start: FlightStart) -> Result<State<N>, FilippovError> {
+        let place = usize::from(side == Side::Minus);
+        let tape = &self.fields[place].0;
+        let gates = self.gates[place].take().unwrap_or_else(|| Gates::of_side(tape.clone()));
+        let tolerance = self.accumulation.tolerance(self.settings.tolerance);
+        let mut method = Automatic::new(tolerance, gates);
+        let next = self.fly_by(&mut method, side, start);
+        self.gates[place] = Some(method.into_gates());
+        next
+    }
+
+    fn fly_by(
+        &mut self,
+        method: &mut Automatic<N>,
+        side: Side,
+        start: FlightStart,
+    ) -> Result<State<N>, FilippovError> {
         let system = self.system;
         let mut flow = FreeFlow { system: Sided { system, depth: self.depth }, side };
-        let mut method = Automatic::<N>::new(self.accumulation.tolerance(self.settings.tolerance));
         let (t_start, mut start) = (self.t, start);
         if let Err(failure) =
             method.restart(&flow, self.t, self.x, self.t_end, self.settings.max_step)
@@ -1094,7 +1114,27 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
     }
 
     /// Sliding until a fold, a two-fold, the planned exit or the end.
-    fn slide<const M: usize>(&mut self, mut sliding: Sliding) -> Result<State<N>, FilippovError>
+    fn slide<const M: usize>(&mut self, sliding: Sliding) -> Result<State<N>, FilippovError>
+    where
+        for<'b> SlidingFlow<'b, P, N>: VectorField<M>,
+    {
+        let direction = sliding.direction();
+        let place = if direction > 0.0 { 2 } else { 3 };
+        let gates = self.gates[place].take().unwrap_or_else(|| {
+            let system = Sided { system: self.system, depth: None };
+            Gates::of_side(VectorField::<M>::tape(&SlidingFlow { system, direction }))
+        });
+        let mut method = Automatic::new(self.settings.tolerance, gates);
+        let next = self.slide_by(&mut method, sliding);
+        self.gates[place] = Some(method.into_gates());
+        next
+    }
+
+    fn slide_by<const M: usize>(
+        &mut self,
+        method: &mut Automatic<M>,
+        mut sliding: Sliding,
+    ) -> Result<State<N>, FilippovError>
     where
         for<'b> SlidingFlow<'b, P, N>: VectorField<M>,
     {
@@ -1102,7 +1142,6 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         let mode = sliding.mode();
         let sided = Sided { system, depth: self.depth };
         let flow = SlidingFlow { system: Sided { ..sided }, direction: sliding.direction() };
-        let mut method = Automatic::<M>::new(self.settings.tolerance);
         let lift =
             |x: &SVector<f64, N>| SVector::<f64, M>::from_fn(|i, _| if i < N { x[i] } else { 0.0 });
         // The clock of the flow starts at zero with each restart, so that short times keep their

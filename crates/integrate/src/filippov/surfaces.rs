@@ -26,6 +26,7 @@ use super::{
 };
 use crate::dopri5::Dopri5;
 use crate::driver::Monitor;
+use crate::guard::Guarded;
 use crate::roots::{Enclosed, Start, first_zero, first_zero_along};
 use crate::step::{Failure, Flow, Statistics, Step, Stepper, StopReason, finite};
 use twofold_num::{Arithmetic, Dual};
@@ -384,7 +385,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> SurfacesRun<'_, P, N> {
         let mode = Mode::SlidingAttracting;
         'stretch: loop {
             let flow = AlongIntersection { faces, mixture: &mixture };
-            let mut method = Dopri5::<N>::new(self.settings.tolerance);
+            let tolerance = self.settings.tolerance;
+            let mut method = Guarded::<_, N>::new(Dopri5::new(tolerance), tolerance);
             method.restart(&flow, self.t, self.x, self.t_end, self.settings.max_step)?;
             loop {
                 let before = method.statistics().clone();

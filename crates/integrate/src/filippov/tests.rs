@@ -596,3 +596,33 @@ fn exit_rules_have_numbers_that_make_sense_and_words() {
         "after-time:0.3:plus"
     );
 }
+
+/// A pulse of width 1e-4 in the fields is not jumped over, in flight and in sliding.
+#[test]
+fn thin_pulses_are_seen() {
+    let bell = "1e4*exp(-((s - 7.123)/1e-4)^2)";
+    let area = std::f64::consts::PI.sqrt();
+    for (h, plus, minus) in [
+        ("q + 100", format!("{bell}"), format!("{bell}")),
+        ("y", format!("{bell}"), format!("{bell}")),
+        ("y", format!("2*{bell}"), "0".into()),
+    ] {
+        let text = format!(
+            "states = ['q', 'y', 's']\nstart = [0, 0, 0]\nh = '{h}'\nplus = ['{plus}', '-1', '1']\n\
+             minus = ['{minus}', '1', '1']"
+        );
+        let text = twofold_system::Definition::from_toml(&text, "").unwrap();
+        let bound: Bound<3> = System::new(text).bind().unwrap();
+        let settings = FilippovOptions::default();
+        let end = run(
+            &bound,
+            SVector::zeros(),
+            20.0,
+            &settings,
+            ExitRule::Undecided,
+            &mut Trajectory::new(1),
+        );
+        let q = end.unwrap().x[0];
+        assert!((q - area).abs() < 1e-6, "{h}: {q}");
+    }
+}
