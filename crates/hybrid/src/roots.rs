@@ -166,10 +166,19 @@ pub(crate) fn first_of_polynomial(v: [f64; 5], side: f64) -> Option<f64> {
     first(v, side, 0.0, 1.0, &mut |u| at_fraction(&b, u), 0)
 }
 
+/// The last terms of a Taylor series are a smaller part of all.
+const LAST_TERMS: f64 = 1e-8;
+
 /// The first place in (0, 1] where the polynomial with these coefficients, by powers, which begins
 /// on `side` of zero, is at zero or beyond it; where it begins at zero, the first place behind
-/// that: `at_zero` is the slope that rounding makes.
-pub(crate) fn first_of_series(c: &[f64], side: f64, at_zero: Option<f64>) -> Option<f64> {
+/// that: `at_zero` is the slope that rounding makes. Whether zero is passed or only touched is said
+/// by the function itself, `f`, where the series leaves out as much as it comes near to zero.
+pub(crate) fn first_of_series(
+    c: &[f64],
+    side: f64,
+    at_zero: Option<f64>,
+    f: &mut dyn FnMut(f64) -> f64,
+) -> Option<f64> {
     let mut q: Vec<f64> = c.iter().map(|c| c * side).collect();
     let size = |q: &[f64]| q.iter().map(|c| c.abs()).sum::<f64>();
     if at_zero.is_some() || q[0] <= 0.0 {
@@ -185,8 +194,12 @@ pub(crate) fn first_of_series(c: &[f64], side: f64, at_zero: Option<f64>) -> Opt
             return Some(1.0 / (1_u64 << DEEPEST) as f64);
         }
     }
-    let rounding = 8.0 * f64::EPSILON * size(&q);
     let p = q.len() - 1;
+    // Of the coefficients, and what the series leaves out: about its last terms, unless they are
+    // those of a polynomial.
+    let last = size(&q[p.saturating_sub(1)..]);
+    let left_out = if last < LAST_TERMS * size(&q) { last } else { 0.0 };
+    let rounding = 8.0 * f64::EPSILON * size(&q) + left_out;
     let coefficient = |i: usize| {
         let (mut sum, mut share) = (0.0, 1.0);
         for k in 0..=i {
@@ -196,34 +209,53 @@ pub(crate) fn first_of_series(c: &[f64], side: f64, at_zero: Option<f64>) -> Opt
         sum
     };
     let mut open = vec![((0..=p).map(coefficient).collect::<Vec<f64>>(), 0.0, 1.0)];
+    // Zero to rounding: passed, if what follows is beyond it. If it is not, the function says.
+    let mut touched: Option<(f64, f64)> = None;
+    let mut passes = |(from, _): (f64, f64), to: f64| {
+        let (a, b) = ((2.0 * from - to).max(0.0), (2.0 * to - from).min(1.0));
+        first(PLACES.map(|u| f(a + u * (b - a))), side, a, b, f, 0)
+    };
     while let Some((b, from, to)) = open.pop() {
         if b.iter().all(|b| *b > 0.0) {
+            if b.iter().any(|b| *b > rounding)
+                && let Some(touch) = touched.take()
+                && let Some(passed) = passes(touch, from)
+            {
+                return Some(passed);
+            }
             continue;
         }
         let beyond = b[p] <= 0.0;
         let turns = b.windows(2).filter(|w| (w[0] > 0.0) != (w[1] > 0.0)).count();
-        if beyond && b[0] > 0.0 && turns == 1 {
-            return Some(root_between(&q, from, to));
-        }
-        let middle = 0.5 * (from + to);
-        if b.iter().all(|b| b.abs() <= rounding) || !(middle > from && middle < to) {
+        let found = if beyond && b[0] > 0.0 && turns == 1 {
+            Some(root_between(&q, from, to))
+        } else {
+            let middle = 0.5 * (from + to);
+            let is_last = !(middle > from && middle < to);
+            (is_last || b.iter().all(|b| b.abs() <= rounding)).then_some(to)
+        };
+        if let Some(root) = found {
+            if b.iter().any(|b| *b < -rounding) {
+                return Some(touched.filter(|_| b[0] <= rounding).map_or(root, |(_, root)| root));
+            }
             if beyond {
-                return Some(to);
+                touched.get_or_insert((from, root));
             }
             continue;
         }
+        let middle = 0.5 * (from + to);
         // Both halves (de Casteljau), the first on top.
-        let (mut first, mut level) = (Vec::with_capacity(p + 1), b);
+        let (mut left, mut level) = (Vec::with_capacity(p + 1), b);
         for n in (0..=p).rev() {
-            first.push(level[0]);
+            left.push(level[0]);
             for i in 0..n {
                 level[i] = 0.5 * (level[i] + level[i + 1]);
             }
         }
         open.push((level, middle, to));
-        open.push((first, from, middle));
+        open.push((left, from, middle));
     }
-    None
+    touched.and_then(|touch| passes(touch, 1.0))
 }
 
 /// The zero of a polynomial that is positive at `low` and not at `high`: Newton's method within
@@ -349,6 +381,11 @@ mod tests {
         first(PLACES.map(&f), side, 0.0, 1.0, &mut |x| f(x), 0)
     }
 
+    fn series(c: &[f64], side: f64, at_zero: Option<f64>) -> Option<f64> {
+        let mut f = |x: f64| c.iter().rev().fold(0.0, |sum, c| sum * x + c);
+        first_of_series(c, side, at_zero, &mut f)
+    }
+
     #[test]
     fn the_first_zero_of_a_series_is_found() {
         let times = |a: &[f64], b: &[f64]| {
@@ -372,25 +409,23 @@ mod tests {
                 |zeros: &[f64]| if (zeros.len() + degree).is_multiple_of(2) { 1.0 } else { -1.0 };
             for zeros in [&[0.3][..], &[0.3, 0.9], &[0.61, 0.62], &[1e-9, 0.5], &[0.5, 0.5001, 0.9]]
             {
-                near(first_of_series(&at(zeros), side(zeros), None), zeros[0]);
+                near(series(&at(zeros), side(zeros), None), zeros[0]);
                 // From zero on.
                 let behind = [&[0.0], zeros].concat();
-                near(first_of_series(&at(&behind), -side(&behind), Some(0.0)), zeros[0]);
+                near(series(&at(&behind), -side(&behind), Some(0.0)), zeros[0]);
             }
-            assert_eq!(first_of_series(&at(&[1.1]), side(&[1.1]), None), None);
-            assert_eq!(first_of_series(&at(&[0.0]), -side(&[0.0]), Some(0.0)), None);
+            assert_eq!(series(&at(&[1.1]), side(&[1.1]), None), None);
+            assert_eq!(series(&at(&[0.0]), -side(&[0.0]), Some(0.0)), None);
         }
         // It leaves zero like a square, to one side and to the other.
-        assert!(
-            (first_of_series(&[0.0, 0.0, 1.0, -2.0], 1.0, Some(0.0)).unwrap() - 0.5).abs() < 1e-15
-        );
-        assert!(first_of_series(&[0.0, 0.0, -1.0, 2.0], 1.0, Some(0.0)).unwrap() < 1e-12);
+        assert!((series(&[0.0, 0.0, 1.0, -2.0], 1.0, Some(0.0)).unwrap() - 0.5).abs() < 1e-15);
+        assert!(series(&[0.0, 0.0, -1.0, 2.0], 1.0, Some(0.0)).unwrap() < 1e-12);
         // A dip that does not reach zero, by much and by little; one that does.
-        assert_eq!(first_of_series(&[0.09 + 1e-6, -0.6, 1.0], 1.0, None), None);
-        assert_eq!(first_of_series(&[0.09 + 1e-13, -0.6, 1.0], 1.0, None), None);
-        let found = first_of_series(&[0.09 - 1e-12, -0.6, 1.0], 1.0, None).unwrap();
+        assert_eq!(series(&[0.09 + 1e-6, -0.6, 1.0], 1.0, None), None);
+        assert_eq!(series(&[0.09 + 1e-13, -0.6, 1.0], 1.0, None), None);
+        let found = series(&[0.09 - 1e-12, -0.6, 1.0], 1.0, None).unwrap();
         assert!((found - 0.3 + 1e-6).abs() < 1e-9, "{found}");
-        assert_eq!(first_of_series(&[0.0, 0.0, 0.0], 1.0, Some(0.0)), None);
+        assert_eq!(series(&[0.0, 0.0, 0.0], 1.0, Some(0.0)), None);
     }
 
     #[test]

@@ -966,6 +966,30 @@ fn powers_and_roots_of_zero_belong_to_the_domain() {
     }
 }
 
+/// A switching function that comes to zero and turns back is not passed.
+#[test]
+fn what_is_touched_is_not_passed() {
+    for (f, start, t_end, want) in [
+        ("1.5 - floor(2*sin(y))", 1.0, 2.0, 2.0),
+        ("1.5 - floor(2*sin(y))", 0.9, 2.0, 1.9),
+        ("1.37 - floor(2*sin(y))", 1.1, 2.0, 1.84),
+        ("-sign(sin(y) - 1)", 1.0, 2.0, 3.0),
+        ("if(sin(y) < 1, 1, -1)", 1.0, 2.0, 3.0),
+        ("0.5 - floor(sin(y))", 1.0, 2.0, 2.0),
+        ("sign(y^2)", -1.0, 2.0, 1.0),
+        ("if(y^2 > 0, 1, -1)", -1.0, 2.0, 1.0),
+        ("sign((y - 0.1)^2*(2 - y))", -1.0, 2.0, 1.0),
+    ] {
+        for method in [Method::Dopri5, Method::Radau5, Method::Taylor] {
+            let text = format!("states = ['y']\nstart = [{start}]\nf = ['{f}']");
+            let options = Options { t_end, method, ..Options::default() };
+            let outcome = follow(&model(&text), &options, &mut |_| true)
+                .unwrap_or_else(|e| panic!("{method:?}: {e}\n{text}"));
+            assert!((outcome.x[0] - want).abs() < 1e-7, "{method:?} {} {text}", outcome.x[0]);
+        }
+    }
+}
+
 /// Of three relays: whether they hold each other, or turn each other away.
 #[test]
 fn three_relays_that_act_on_each_other() {

@@ -114,7 +114,15 @@ impl Follower<'_> {
                     if let Sought::Guard { guard, .. } = sought { self.left[*guard] } else { 0.0 };
                 SMALLEST_SLOPE * step.h * terms.max(left)
             });
-            found.extend(first_of_series(&c, *side, begins).map(|theta| (theta, *sought)));
+            let (one, mut value) = ([(*sought, *side)], Vec::new());
+            let mut at = vec![0.0; self.n];
+            let mut f = |theta: f64| {
+                step.at(theta, &mut at);
+                self.measure(&one, step.t + theta * step.h, &at, &mut value);
+                value[0]
+            };
+            let first = first_of_series(&c, *side, begins, &mut f);
+            found.extend(first.map(|theta| (theta, *sought)));
         }
         ends
     }
