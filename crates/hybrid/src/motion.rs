@@ -31,7 +31,8 @@ use crate::equation::{Compiled, Configuration, Equation, EquationError};
 use crate::model::Model;
 use crate::range::Range;
 use crate::roots::{
-    PLACES, at_fraction, first, first_of_polynomial, first_of_series, slope_at_beginning, stays,
+    PLACES, at_fraction, first, first_behind_tangent, first_of_polynomial, first_of_series,
+    slope_at_beginning, stays,
 };
 use crate::selection::{
     Intersection, MOST_TOGETHER, Mixture, Way, attraction, groups, hold, leads_away, mixture,

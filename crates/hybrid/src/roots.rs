@@ -31,6 +31,25 @@ pub(crate) fn slope_at_beginning(v: &[f64; 5]) -> f64 {
     4.0 * (b[1] - b[0])
 }
 
+/// [`first`] of a function that leaves zero at `from` to its side as a square does, but for rounding.
+pub(crate) fn first_behind_tangent(
+    side: f64,
+    from: f64,
+    to: f64,
+    f: &mut dyn FnMut(f64) -> f64,
+) -> Option<f64> {
+    let mut end = to;
+    for _ in 0..DEEPEST {
+        let b = bernstein(&PLACES.map(|u| f(from + u * (end - from))));
+        if b[2..].iter().all(|c| c * side > 0.0) {
+            let rest = PLACES.map(|u| f(end + u * (to - end)));
+            return if end < to { first(rest, side, end, to, f, 0) } else { None };
+        }
+        end = from + 0.5 * (end - from);
+    }
+    Some(from)
+}
+
 /// The value of a polynomial by its Bernstein coefficients.
 pub(crate) fn at_fraction(b: &[f64; 5], u: f64) -> f64 {
     let w = 1.0 - u;

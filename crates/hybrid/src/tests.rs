@@ -966,6 +966,25 @@ fn powers_and_roots_of_zero_belong_to_the_domain() {
     }
 }
 
+#[test]
+fn two_blocks_are_torn_loose_one_after_the_other() {
+    for f in [
+        "'-sign(x) + 0.41*s', '-sign(y) + 0.23*s', '1'",
+        "'-sign(x) + 0.41*t', '-sign(y) + 0.23*t', '1'",
+    ] {
+        let text = format!("states = ['x', 'y', 's']\nstart = [0.1, 0.2, 0]\nf = [{f}]");
+        for method in [Method::Dopri5, Method::Radau5, Method::Taylor] {
+            let options = Options { t_end: 5.0, method, ..Options::default() };
+            let outcome = follow(&model(&text), &options, &mut |_| true)
+                .unwrap_or_else(|e| panic!("{method:?}: {e}\n{text}"));
+            for (i, rate) in [0.41, 0.23].into_iter().enumerate() {
+                let since = 5.0 - 1.0 / rate;
+                near(outcome.x[i], 0.5 * rate * since * since, 1e-9);
+            }
+        }
+    }
+}
+
 /// A switching function that comes to zero and turns back is not passed.
 #[test]
 fn what_is_touched_is_not_passed() {

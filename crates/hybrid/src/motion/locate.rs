@@ -57,16 +57,22 @@ impl Follower<'_> {
         let end = |((sought, side), b): (&(Sought, f64), [f64; 5])| {
             let mut v = PLACES.map(|theta| at_fraction(&b, theta));
             let end = v[4];
-            self.begin_at_zero(*sought, *side, step.h, &mut v);
-            found.extend(first_of_polynomial(v, *side).map(|theta| (theta, *sought)));
+            let change = self.begin_at_zero(*sought, *side, step.h, &mut v);
+            let first = if change == 0.0 {
+                first_of_polynomial(v, *side)
+            } else {
+                let (begin, f) = (b[0], |theta| at_fraction(&b, theta) - theta * change);
+                first_behind_tangent(*side, 0.0, 1.0, &mut |theta| f(theta) - begin)
+            };
+            found.extend(first.map(|theta| (theta, *sought)));
             Some(end)
         };
         list.iter().zip(all).map(end).collect()
     }
 
     /// Puts the values, at [`PLACES`] of a time `h`, of a function that has just left zero, or that
-    /// rounding has beyond it, to zero at the beginning. What leaves zero to second order does so
-    /// without the slope that rounding makes, which is returned as the change in that time.
+    /// rounding has beyond it, to zero at the beginning. Returns the change in that time by the slope
+    /// there, if only rounding makes this slope: the function leaves zero to second order.
     fn begin_at_zero(&mut self, sought: Sought, side: f64, h: f64, v: &mut [f64; 5]) -> f64 {
         if !(self.is_fresh(sought) || v[0] * side < 0.0) {
             return 0.0;
@@ -83,7 +89,6 @@ impl Follower<'_> {
         if change.abs() > SMALLEST_SLOPE * h * terms[place].max(left) {
             return 0.0;
         }
-        v.iter_mut().zip(PLACES).for_each(|(v, theta)| *v -= theta * change);
         change
     }
 
@@ -176,7 +181,13 @@ impl Follower<'_> {
                     self.measure(&one, step.t + theta * step.h, &at, &mut value);
                     value[0] - theta * change
                 };
-                found.extend(first(v, *side, from, to, &mut f, 0).map(|theta| (theta, *sought)));
+                let first = if change == 0.0 {
+                    first(v, *side, from, to, &mut f, 0)
+                } else {
+                    let begin = f(from);
+                    first_behind_tangent(*side, from, to, &mut |theta| f(theta) - begin)
+                };
+                found.extend(first.map(|theta| (theta, *sought)));
             }
             if found.iter().any(|(theta, _)| *theta <= to) || known <= to {
                 break;
