@@ -74,6 +74,8 @@ impl Rest {
 
 /// Real parts of eigenvalues below this share of the largest modulus are rounding.
 const ROUNDING: f64 = 1e-9;
+/// Multiples of eps beyond which a state is outside the layer.
+const SATURATED: f64 = 20.0;
 /// Newton iterations: enough for the linear convergence at a multiple zero.
 const ITERATIONS: usize = 100;
 
@@ -175,15 +177,28 @@ pub fn near(system: &System, switch: SwitchSpec, from: &[f64]) -> Option<Rest> {
     if let Some(field) = field(system, switch) {
         return regular(&field);
     }
-    if !matches!(switch, SwitchSpec::Filippov { .. }) || system.definition().second().is_some() {
+    if system.definition().second().is_some() {
         return None;
     }
+    // A smooth switch that acts late rests where one that does not rests. Outside the layer it does
+    // not matter when it acts.
+    if let SwitchSpec::Delayed { eps: Some(eps), transition: Some(transition), .. } = switch {
+        return regular(&Field::smoothed(system, transition, eps))
+            .filter(|r| switching(system, &r.state).abs() > SATURATED * eps);
+    }
+    let beyond = match switch {
+        SwitchSpec::Filippov { .. } | SwitchSpec::Delayed { .. } => 0.0,
+        SwitchSpec::Relay { band, .. } => band,
+        SwitchSpec::Smoothed { .. } | SwitchSpec::Hysteretic { .. } => return None,
+    };
     let [plus, minus] = [Field::plus(system), Field::minus(system)];
     // A side's rest counts where that side is.
     let on = |field: &Field, sign: f64| {
-        regular(field).filter(|r| sign * switching(system, &r.state) > 0.0)
+        regular(field).filter(|r| sign * switching(system, &r.state) > beyond)
     };
-    let candidates = [pseudo(system, &plus, &minus, from), on(&plus, 1.0), on(&minus, -1.0)];
+    let slides = matches!(switch, SwitchSpec::Filippov { .. });
+    let between = slides.then(|| pseudo(system, &plus, &minus, from)).flatten();
+    let candidates = [between, on(&plus, 1.0), on(&minus, -1.0)];
     let there = |r: &Rest| distance(&r.state, from);
     candidates.into_iter().flatten().min_by(|a, b| there(a).total_cmp(&there(b)))
 }
@@ -300,6 +315,12 @@ pub fn at_end(
     }
     if rest.stability == Stability::Repels || after > 0.5 * before {
         return Ok(None);
+    }
+    // One of many beside each other, such as a block that sticks: where sliding has come to one, to
+    // rounding, it has no speed.
+    let slides = rest.kind == RestKind::PseudoEquilibrium;
+    if slides && rest.stability == Stability::Neutral && after <= noise(&end) {
+        return Ok(Some(rest));
     }
     let Tolerance { rtol, atol } = run.method.tolerance;
     if rest.stability == Stability::Attracts && after <= 100.0 * (rtol * size(&end) + atol) {

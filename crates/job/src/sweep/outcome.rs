@@ -282,6 +282,10 @@ mod tests {
     use crate::cases;
     use crate::spec::Observation;
     use twofold_analyse::attractor::{Cycle, Rate};
+    use twofold_integrate::Tolerance;
+    use twofold_integrate::delay::{History, Inside};
+    use twofold_integrate::filippov::ExitRule;
+    use twofold_system::{System, Transition};
 
     /// Each verdict's word, and where its numbers go.
     #[test]
@@ -340,6 +344,39 @@ mod tests {
                 (approach.map(|a| a.per_time), approach.map(|_| 1e-4))
             );
             assert_eq!((found.exponent, found.exponent_error), (Some(0.25), Some(0.01)));
+        }
+    }
+
+    /// A focus and a block that sticks, by every switch: they are rests.
+    #[test]
+    fn motion_ends_in_rests_by_every_switch() {
+        let section = |coordinate| Observation::Section { coordinate, value: 0.0 };
+        let outcome = |system: System, start: [f64; 2], switch, t_end, section| {
+            let mut run = cases::run(system, switch, t_end, section);
+            run.start = start.to_vec();
+            run.method.tolerance = Tolerance { rtol: 1e-8, atol: 1e-8 };
+            let question = OutcomeQuestion(Classification::of(run));
+            question.ending(&Executor::quiet(), &()).unwrap().outcome.word
+        };
+        let focus = || cases::smooth(&["x", "y"], "x + 100", &["-0.05*x - y", "x - 0.05*y"]);
+        let delayed = |eps: Option<f64>| SwitchSpec::Delayed {
+            delay: 0.1,
+            eps,
+            transition: eps.map(|_| Transition::Tanh),
+            history: History::Constant,
+        };
+        let relay = SwitchSpec::Relay { band: 0.1, inside: Inside::Sign };
+        for switch in [relay, delayed(None), delayed(Some(0.1)), SwitchSpec::tanh(0.1)] {
+            assert_eq!(outcome(focus(), [1.0, 0.0], switch, 2000.0, section(1)), "rest");
+        }
+        let friction = || {
+            let text =
+                "states = ['x', 'v']\nh = 'v'\nplus = ['v', '-x - 1']\nminus = ['v', '1 - x']";
+            cases::of(text)
+        };
+        let filippov = SwitchSpec::Filippov { exit: ExitRule::Undecided, funnel: None };
+        for x in [0.2, 4.5, 10.3, -2.7] {
+            assert_eq!(outcome(friction(), [x, 0.0], filippov, 600.0, section(1)), "rest", "{x}");
         }
     }
 }
