@@ -985,6 +985,25 @@ fn two_blocks_are_torn_loose_one_after_the_other() {
     }
 }
 
+/// A switching function whose value changes with the side of another one.
+#[test]
+fn sides_follow_the_sides_that_they_depend_on() {
+    for (f, start, t_end, want) in [
+        ("-abs(sign(x - 1))", 2.0, 2.0, 0.0),
+        ("-sign(x)*abs(sign(x))", 0.5, 5.0, 0.0),
+        ("-0.5 - heaviside(if(x > 0, -0.5*x, 1))", 1.0, 4.0, -3.0),
+        ("-1 - 0.5*floor(0.5 + 0.3*sign(x))", 1.0, 3.0, -2.0),
+    ] {
+        for method in [Method::Dopri5, Method::Radau5, Method::Taylor] {
+            let text = format!("states = ['x']\nstart = [{start}]\nf = ['{f}']");
+            let options = Options { t_end, method, ..Options::default() };
+            let outcome = follow(&model(&text), &options, &mut |_| true)
+                .unwrap_or_else(|e| panic!("{method:?}: {e}\n{text}"));
+            assert!((outcome.x[0] - want).abs() < 1e-9, "{method:?} {} {text}", outcome.x[0]);
+        }
+    }
+}
+
 /// A switching function that comes to zero and turns back is not passed.
 #[test]
 fn what_is_touched_is_not_passed() {

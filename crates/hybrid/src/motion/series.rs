@@ -508,7 +508,16 @@ impl Follower<'_> {
             let mut fields = Vec::new();
             for column in 0..k {
                 let compiled = &self.base[column].0;
-                let above = answers(&self.sliding[column..=column]);
+                // What changes with the side that is slid upon changes, too.
+                let (mut above, there) = (below.clone(), &self.base[column].1);
+                for (i, guard) in self.equation.guards.iter().enumerate() {
+                    let (place, present) = (n + 1 + i, self.config.sides[i]);
+                    if guard.whole && there[place] != present {
+                        above[place] += Recorded::from_f64(there[place] - present);
+                    } else if !guard.whole {
+                        above[place] = Recorded::from_f64(there[place]);
+                    }
+                }
                 let high = field(compiled, &above);
                 for row in 0..k {
                     matrix[row * k + column] =

@@ -114,6 +114,50 @@ impl Follower<'_> {
         }
     }
 
+    /// Gives functions that change with the sides of those in `zero`, such as the argument of
+    /// abs(sign(x)) on x = 0, the sides of their own values.
+    pub(super) fn follow_sides(&mut self, config: &mut Configuration, zero: &[usize]) {
+        let n = self.n;
+        let mut moved = zero.to_vec();
+        for _ in 0..8 {
+            let compiled = self.equation.compiled(config);
+            let variables = self.load(config);
+            let mut values = Vec::new();
+            let mut changed = false;
+            for (place, guard) in compiled.active.iter().enumerate() {
+                let acts = |other: &usize| {
+                    self.equation.chooses(*other) || compiled.depends(n + place, n + 1 + *other)
+                };
+                if zero.contains(guard) || self.slides[*guard] || !moved.iter().any(acts) {
+                    continue;
+                }
+                if values.is_empty() {
+                    values = vec![0.0; compiled.outputs];
+                    compiled.watched.evaluate(&variables, &mut values);
+                }
+                let (value, present) = (values[place], config.sides[*guard]);
+                let side = if self.equation.guards[*guard].whole {
+                    value.floor()
+                } else if value.abs()
+                    > 1e-9 * self.magnitude(&self.equation.guards[*guard].expression)
+                {
+                    value.signum()
+                } else {
+                    present
+                };
+                if side != present && side.is_finite() {
+                    config.sides[*guard] = side;
+                    moved.push(*guard);
+                    changed = true;
+                }
+            }
+            if !changed {
+                return;
+            }
+            self.ask_new(config);
+        }
+    }
+
     pub(super) fn names(&self, guards: &[usize]) -> String {
         let names: Vec<String> = guards
             .iter()
@@ -166,6 +210,7 @@ impl Follower<'_> {
                 config.sides[*guard] = if plus(i) { highs[i] } else { lows[i] };
             }
             follower.ask_new(&mut config);
+            follower.follow_sides(&mut config, &zero);
             let own = follower.equation.compiled(&config);
             let asked: Vec<bool> = zero.iter().map(|g| own.place(*g).is_some()).collect();
             let (compiled, rates) = follower.rates_with(&config, &others(&zero, &asked));
@@ -290,6 +335,15 @@ impl Follower<'_> {
                 let slides: Vec<usize> =
                     (0..set.len()).filter(|i| assignment[*i] == Way::Stay).collect();
                 let plus: Vec<bool> = assignment.iter().map(|w| *w == Way::Plus).collect();
+                let on = |i: usize| set.iter().position(|s| *s == i).is_some_and(|p| plus[p]);
+                let jumped = self.jumped(&zero, &|i| if on(i) { highs[i] } else { lows[i] });
+                let misses = |p: usize| {
+                    let stays = assignment[p] == Way::Stay;
+                    jumped[set[p]].is_some_and(|up| stays || up != plus[p])
+                };
+                if (0..set.len()).any(misses) {
+                    return false;
+                }
                 let (_, base, direction, mut asked, _) = at(self, plus.clone());
                 let mut columns = Vec::new();
                 for s in &slides {
@@ -301,6 +355,7 @@ impl Follower<'_> {
                     asked.iter_mut().zip(&column.3).for_each(|(asked, there)| *asked |= there);
                 }
                 let goes = |i: usize, d: f64| match assignment[i] {
+                    _ if jumped[set[i]].is_some() => true,
                     Way::Plus => d > 0.0,
                     // A function that is not asked there and stays zero changes nothing.
                     Way::Minus => d < 0.0 || d == 0.0 && !asked[i],
@@ -503,6 +558,7 @@ impl Follower<'_> {
             self.fresh_guard[*guard] = true;
         }
         self.ask_new(&mut config);
+        self.follow_sides(&mut config, &zero);
         sliding.sort_unstable();
         self.adopt(config, sliding);
         let left = self.leave_by_jump(&zero, &before);
@@ -554,6 +610,37 @@ impl Follower<'_> {
             "sliding on all of them ceases to be the only motion: it may go on with another \
                 velocity, or turn away at any time",
         )
+    }
+
+    /// Of the functions in `zero`, those that with these sides of all of them are not zero, and
+    /// whether they are above: so is if(x > 0, x, 2) on the lower side of x = 0.
+    fn jumped(&mut self, zero: &[usize], side: &dyn Fn(usize) -> f64) -> Vec<Option<bool>> {
+        let mut config = self.config.clone();
+        zero.iter().enumerate().for_each(|(i, guard)| config.sides[*guard] = side(i));
+        self.ask_new(&mut config);
+        let compiled = self.equation.compiled(&config);
+        let acts = |guard: &usize| {
+            compiled.place(*guard).filter(|place| {
+                let mut others = zero.iter().filter(|other| *other != guard);
+                !self.equation.guards[*guard].whole
+                    && others.any(|other| {
+                        self.equation.chooses(*other)
+                            || compiled.depends(self.n + place, self.n + 1 + other)
+                    })
+            })
+        };
+        let places: Vec<Option<usize>> = zero.iter().map(acts).collect();
+        if places.iter().all(Option::is_none) {
+            return vec![None; zero.len()];
+        }
+        let mut values = vec![0.0; compiled.outputs];
+        compiled.watched.evaluate(&self.load(&config), &mut values);
+        let value = |(guard, place): (&usize, &Option<usize>)| {
+            let value = values[(*place)?];
+            let size = self.magnitude(&self.equation.guards[*guard].expression);
+            (value.abs() > 1e-6 * size).then_some(value > 0.0)
+        };
+        zero.iter().zip(&places).map(value).collect()
     }
 
     /// The rule that chooses among mixtures. If all have one velocity it does not matter which.

@@ -26,6 +26,7 @@ impl Follower<'_> {
         for guard in &sliding {
             config.sides[*guard] = self.low(*guard);
         }
+        self.follow_sides(&mut config, &sliding);
         let also = self.asked_beyond(&mut config, &sliding);
         self.slides.fill(false);
         sliding.iter().for_each(|guard| self.slides[*guard] = true);
@@ -40,6 +41,8 @@ impl Follower<'_> {
             for guard in self.sliding.clone() {
                 let mut flipped = self.config.clone();
                 flipped.sides[guard] = self.high(guard);
+                let sliding = self.sliding.clone();
+                self.follow_sides(&mut flipped, &sliding);
                 let variables = self.load(&flipped);
                 self.base.push((self.equation.compiled(&flipped), variables));
             }
@@ -220,6 +223,8 @@ impl Follower<'_> {
                 config.sides[*guard] =
                     if vertex >> i & 1 == 1 { self.high(*guard) } else { self.low(*guard) };
             }
+            let sliding = self.sliding.clone();
+            self.follow_sides(&mut config, &sliding);
             corners.push((self.equation.compiled(&config), self.load(&config)));
         }
         self.corners = corners;
