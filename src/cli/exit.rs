@@ -8,6 +8,7 @@ use crate::job::JobError;
 use crate::job::spec::SpecError;
 use crate::paper::pipeline::PipelineError;
 use crate::record::FileError;
+use crate::record::files::is_made_here;
 use crate::record::manifest::ManifestError;
 
 /// The exit code of every program of this project.
@@ -160,16 +161,33 @@ fn advice(error: &FileError) -> &'static str {
     }
 }
 
-/// The path of an unfinished output: beside the finished one, with the suffix `.part`.
+/// The path of an unfinished output: beside the finished one, with the suffix `.part`, or `.part2`
+/// and so on if a file of that name is somebody else's.
 pub fn part_of(file: &std::path::Path) -> PathBuf {
-    let mut name = file.as_os_str().to_owned();
-    name.push(".part");
-    name.into()
+    let named = |k: usize| {
+        let mut name = file.as_os_str().to_owned();
+        name.push(if k == 1 { ".part".to_owned() } else { format!(".part{k}") });
+        PathBuf::from(name)
+    };
+    let free = |path: &PathBuf| path.symlink_metadata().is_err() || is_made_here(path);
+    (1..100).map(named).find(free).unwrap_or_else(|| named(100))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_somebody_else_wrote_is_no_part() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("b.csv");
+        let [one, two] = ["b.csv.part", "b.csv.part2"].map(|name| folder.path().join(name));
+        assert_eq!(part_of(&file), one);
+        std::fs::write(&one, "mine").unwrap();
+        assert_eq!(part_of(&file), two);
+        std::fs::write(&one, "t,x\n0,1\n# {\"made_by\":\"twofold 0.2.0\"}\n").unwrap();
+        assert_eq!(part_of(&file), one);
+    }
 
     #[test]
     fn advice_fits_the_failure() {

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::tangent::Tangent;
 use twofold_integrate::roots::{self, CrossingFinder};
-use twofold_integrate::{Dopri5, Failure, Stepper, Tolerance};
+use twofold_integrate::{Dopri5, Failure, Guarded, Stepper, Tolerance};
 use twofold_num::elementary::{ln, sqrt};
 use twofold_num::linear::{eigenvalues, solve};
 use twofold_system::VectorField;
@@ -308,7 +308,8 @@ fn returned<const N: usize, const M: usize, T: VectorField<M>>(
     u: SVector<f64, N>,
     settings: &FloquetOptions,
 ) -> Result<Return<N>, Error> {
-    let mut stepper = Dopri5::<M>::new(settings.tolerance);
+    let guarded = || Guarded::<_, M>::new(Dopri5::new(settings.tolerance), settings.tolerance);
+    let mut stepper = guarded();
     // x, then the columns of the identity.
     let mut state = SVector::<f64, M>::from_fn(|i, _| {
         if i < N { u[i] } else { f64::from(u8::from((i - N) / N == (i - N) % N)) }
@@ -346,7 +347,7 @@ fn returned<const N: usize, const M: usize, T: VectorField<M>>(
             // Land there by a step of its own: the dense output is less accurate than the method.
             let mut landing = state0;
             if tc > t0 {
-                let mut to = Dopri5::<M>::new(settings.tolerance);
+                let mut to = guarded();
                 to.restart(tangent, t0, state0, tc, settings.max_step)?;
                 let mut now = t0;
                 while now < tc {

@@ -22,8 +22,8 @@ use twofold_integrate::ensemble::{
     Carried, Common, EnsembleRun, InstructionSet, Tolerances, ensemble_watched,
 };
 use twofold_integrate::{
-    Dopri5, DriveOptions, Failure, Flow, Kick, Kicker, Monitor, Observer, Step, StepCap, Stepper,
-    Tolerance,
+    Dopri5, DriveOptions, Failure, Flow, Guarded, Kick, Kicker, Monitor, Observer, Step, StepCap,
+    Stepper, Tolerance,
 };
 use twofold_num::elementary::{ln, sqrt};
 use twofold_num::fit::{line, mean};
@@ -192,9 +192,9 @@ pub fn estimate_along<const N: usize, const M: usize, T: VectorField<M>>(
     monitor: &dyn Monitor,
 ) -> Result<Estimate, Failure> {
     const { assert!(M == 2 * N) };
-    let stepper = Dopri5::<M>::new(settings.tolerance);
+    let stepper = Guarded::new(Dopri5::new(settings.tolerance), settings.tolerance);
     averaged(
-        &mut Alone { tangent, stepper, t: 0.0, state: begin(&x0) },
+        &mut Alone { tangent, stepper, met: false, t: 0.0, state: begin(&x0) },
         kicked_states,
         settings,
         monitor,
@@ -222,14 +222,20 @@ pub(super) trait Disturbed<const M: usize> {
 /// An equation with its variational equation.
 struct Alone<'a, T, const M: usize> {
     tangent: &'a T,
-    stepper: Dopri5<M>,
+    stepper: Guarded<Dopri5<M>, M>,
+    /// Whether the stepper has met the equation.
+    met: bool,
     t: f64,
     state: SVector<f64, M>,
 }
 
 impl<T: VectorField<M>, const M: usize> Disturbed<M> for Alone<'_, T, M> {
     fn begin(&mut self, stop: f64, max_step: f64) -> Result<(), Failure> {
-        self.stepper.restart(self.tangent, self.t, self.state, stop, max_step)
+        let Self { tangent, stepper, met, t, state } = self;
+        match std::mem::replace(met, true) {
+            false => stepper.restart(*tangent, *t, *state, stop, max_step),
+            true => stepper.restart_again(*tangent, *t, *state, stop, max_step),
+        }
     }
     fn step(&mut self) -> Result<(), Failure> {
         let step = self.stepper.step(self.tangent)?;

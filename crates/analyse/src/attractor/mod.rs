@@ -201,20 +201,20 @@ fn deterministic(
     }
     evidence.zero_one = tail(0, 1);
     evidence.divergence = divergence(points, evidence.return_time);
-    if evidence.divergence.is_some_and(|d| d.skill < th.skill) {
-        return Verdict::Noisy { contrast: None, around: None };
-    }
+    // Neighbours say nothing where they have no common future: the plane of two coordinates shows
+    // an attractor of more dimensions on top of itself.
+    let blind = evidence.divergence.is_some_and(|d| d.skill < th.skill);
     let exponent = question.lyapunov.map(|l| l.value > th.exponent_significance * l.standard_error);
     let votes = [
         evidence.zero_one.map(|k| k > th.zero_one),
-        evidence.divergence.map(|d| d.per_return > th.divergence),
+        evidence.divergence.filter(|_| !blind).map(|d| d.per_return > th.divergence),
         exponent,
     ];
     let yes = votes.iter().filter(|v| **v == Some(true)).count();
     let no = votes.iter().filter(|v| **v == Some(false)).count();
     if yes + no == 0 {
         Verdict::TooFew { points: points.len() }
-    } else if yes > no && exponent != Some(false) {
+    } else if yes > no && exponent != Some(false) && !blind {
         Verdict::Chaotic {
             lyapunov: question.lyapunov,
             bands: occupancy::bands(&points[points.len() / 2..], th),

@@ -601,12 +601,9 @@ fn exit_rules_have_numbers_that_make_sense_and_words() {
 #[test]
 fn thin_pulses_are_seen() {
     let bell = "1e4*exp(-((s - 7.123)/1e-4)^2)";
+    let twice = format!("2*{bell}");
     let area = std::f64::consts::PI.sqrt();
-    for (h, plus, minus) in [
-        ("q + 100", format!("{bell}"), format!("{bell}")),
-        ("y", format!("{bell}"), format!("{bell}")),
-        ("y", format!("2*{bell}"), "0".into()),
-    ] {
+    for (h, plus, minus) in [("q + 100", bell, bell), ("y", bell, bell), ("y", &twice, "0")] {
         let text = format!(
             "states = ['q', 'y', 's']\nstart = [0, 0, 0]\nh = '{h}'\nplus = ['{plus}', '-1', '1']\n\
              minus = ['{minus}', '1', '1']"

@@ -9,7 +9,7 @@
 
 use std::collections::BTreeSet;
 use std::fs::{self, File, Metadata, OpenOptions, TryLockError};
-use std::io::{self, Read, Write};
+use std::io::{self, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread;
@@ -428,6 +428,22 @@ pub const LARGEST: u64 = 512 << 20;
 
 /// The largest text that [`read_text`] reads: a spec has 1 kB, a manifest 10.
 pub const LARGEST_TEXT: u64 = 16 << 20;
+
+/// Whether a file says at its beginning or end that this program made it.
+pub fn is_made_here(path: &Path) -> bool {
+    const LOOKED_AT: u64 = 1 << 16;
+    let says = || -> io::Result<bool> {
+        let mut file = open_plain(path)?;
+        let mut bytes = Vec::new();
+        (&mut file).take(LOOKED_AT).read_to_end(&mut bytes)?;
+        let length = file.metadata()?.len();
+        file.seek(io::SeekFrom::Start(length.saturating_sub(LOOKED_AT)))?;
+        file.take(LOOKED_AT).read_to_end(&mut bytes)?;
+        let text = String::from_utf8_lossy(&bytes);
+        Ok(text.contains("\"made_by\":\"twofold ") || text.contains("\"made_by\": \"twofold "))
+    };
+    says().unwrap_or(false)
+}
 
 /// Opens a file of unknown origin: only a plain file, because reading a pipe, a socket or a device
 /// may block or never end. Links are followed.
