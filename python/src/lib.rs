@@ -33,8 +33,15 @@ mod _native {
     use pyo3::prelude::*;
     use pyo3::types::PyDict;
     use twofold::integrate::PRECISIONS;
+    use twofold::integrate::Tolerance;
     use twofold::job::question::NUMERICS;
-    use twofold::job::spec::{DEFAULT_MAX_STEPS, Method, MethodSpec, finest_extended};
+    use twofold::job::spec::{DEFAULT_MAX_STEPS, Method, MethodSpec, finest_extended, in_units_of};
+
+    /// The default absolute tolerance of a run from `start`.
+    #[pyfunction]
+    fn default_atol(tolerance: f64, start: Vec<f64>) -> f64 {
+        in_units_of(Tolerance { rtol: tolerance, atol: tolerance }, &start).atol
+    }
 
     #[pymodule_init]
     fn constants(module: &Bound<'_, PyModule>) -> PyResult<()> {

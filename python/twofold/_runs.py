@@ -272,16 +272,19 @@ def _spec(
         )
     else:
         _refuse(of_extended, 'it belongs to method="taylor-extended"')
+    start = [_finite("start", x) for x in state]
     return system, {
         "system": json.loads(system.to_json()),
         "switch": model,
-        "start": [_finite("start", x) for x in state],
+        "start": start,
         "t_end": _finite("t_end", t_end),
         "method": {
             "name": method,
             "tolerance": {
                 "rtol": tolerance if rtol is None else _finite("rtol", rtol),
-                "atol": tolerance if atol is None else _finite("atol", atol),
+                "atol": _native.default_atol(tolerance, start)
+                if atol is None
+                else _finite("atol", atol),
             },
             "step_cap": {"fraction-of-segment": 0.1}
             if max_step is None

@@ -104,8 +104,8 @@ pub struct RunFlags {
     /// --precision allows; of exponents 1e-9, of closed orbits 1e-11, of general systems 1e-10].
     #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
     pub rtol: Option<f64>,
-    /// Absolute tolerance [default: that of --rtol's default; of general systems by the states'
-    /// sizes].
+    /// Absolute tolerance [default: that of --rtol's default, and from a start of states below
+    /// 1e-3 as many powers of ten smaller; of general systems by the states' sizes].
     #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
     pub atol: Option<f64>,
     /// Longest step, inf for any [default: a tenth of the time between restarts or kicks,
@@ -805,6 +805,7 @@ impl RunFlags {
             }
             Use::Any | Use::Picture | Use::Crossings => {}
         }
+        defaults.tolerance = in_units_of(defaults.tolerance, &start);
         let method = MethodSpec {
             name: defaults.name,
             tolerance: Tolerance {

@@ -209,6 +209,17 @@ impl MethodSpec {
     }
 }
 
+/// A default absolute tolerance for a run from `start`. Those above are meant for states of order
+/// one: where the largest state is below a thousandth, they are as many powers of ten smaller.
+pub fn in_units_of(tolerance: Tolerance, start: &[f64]) -> Tolerance {
+    let largest = start.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    let mut unit = 1.0;
+    while largest > 0.0 && largest < 1e-3 && unit > largest && unit > 1e-120 {
+        unit *= 0.1;
+    }
+    Tolerance { atol: tolerance.atol * unit, ..tolerance }
+}
+
 /// The finest tolerance that double-double arithmetic can hold.
 const FINEST_EXTENDED: f64 = 1e-32;
 
@@ -1041,6 +1052,18 @@ mod tests {
     }
 
     /// 106 bits hold 32 digits; more bits, their last one beside a leading 1.
+    #[test]
+    fn default_tolerances_follow_small_states() {
+        let of = |start: &[f64]| in_units_of(Tolerance { rtol: 1e-8, atol: 1e-8 }, start);
+        for start in [&[0.2, 0.0, -1.0][..], &[0.0, 0.0], &[1e9], &[2e-3]] {
+            assert_eq!(of(start), Tolerance { rtol: 1e-8, atol: 1e-8 });
+        }
+        for (size, unit) in [(3e-4, 1e-4), (1.5e-9, 1e-9), (-7e-30, 1e-30)] {
+            assert!((of(&[size, 0.0]).atol / unit - 1e-8).abs() < 1e-20, "{size}");
+            assert_eq!(of(&[size, 0.0]).rtol, 1e-8);
+        }
+    }
+
     #[test]
     fn the_finest_tolerance_is_the_last_bit() {
         let power = |k: i32| 2.0_f64.powi(k);

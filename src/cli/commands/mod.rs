@@ -75,6 +75,14 @@ pub fn main() -> ExitCode {
         Ok(arguments) => arguments,
         Err(error) => return usage(&error).into(),
     };
+    let words: Vec<String> =
+        std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect();
+    if let Some(file) = input_to_be_replaced(&words) {
+        complain(&format!(
+            "error: --out {file} would replace a file that this command reads; choose another place"
+        ));
+        return Exit::Usage.into();
+    }
     let result = match arguments.command {
         Command::Run(arguments) => run::run(&arguments),
         Command::Plot(arguments) => plot::run(&arguments),
@@ -104,6 +112,24 @@ pub fn main() -> ExitCode {
             error.exit().into()
         }
     }
+}
+
+/// The file of --out, if another word of the command line names the same file.
+fn input_to_be_replaced(words: &[String]) -> Option<String> {
+    let mut others = Vec::new();
+    let mut out = None;
+    let mut words = words.iter().skip(1);
+    while let Some(word) = words.next() {
+        match word.strip_prefix("--out").map(|rest| (rest, rest.strip_prefix('='))) {
+            Some(("", _)) => out = words.next().cloned(),
+            Some((_, Some(file))) => out = Some(file.to_owned()),
+            _ => others.push(word.split_once('=').map_or(word.as_str(), |(_, value)| value)),
+        }
+    }
+    let out = out?;
+    let place = std::path::Path::new(&out).canonicalize().ok().filter(|place| place.is_file())?;
+    let same = |word: &&str| std::path::Path::new(*word).canonicalize().is_ok_and(|p| p == place);
+    others.iter().any(same).then_some(out)
 }
 
 /// Prints what clap has to say: help and version on standard output, errors on standard error.
@@ -137,6 +163,28 @@ fn chosen(names: &[String]) -> Result<Vec<Figure>, CliError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn no_command_replaces_what_it_reads() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+        std::fs::write(at("a.toml"), "").unwrap();
+        let asked = |words: &[String]| {
+            let all: Vec<String> =
+                std::iter::once("twofold".to_owned()).chain(words.iter().cloned()).collect();
+            input_to_be_replaced(&all).is_some()
+        };
+        let [system, out] = ["--system", "--out"].map(str::to_owned);
+        let behind = folder.path().join(".").join("a.toml").to_string_lossy().into_owned();
+        for (words, wanted) in [
+            (vec![system.clone(), at("a.toml"), out.clone(), at("a.toml")], true),
+            (vec![format!("--out={behind}"), format!("--system={}", at("a.toml"))], true),
+            (vec![system.clone(), at("a.toml"), out.clone(), at("b.csv")], false),
+            (vec![out, at("a.toml"), system, "wheel".to_owned()], false),
+        ] {
+            assert_eq!(asked(&words), wanted, "{words:?}");
+        }
+    }
 
     #[test]
     fn the_definition_of_the_flags_is_sound() {
