@@ -760,7 +760,8 @@ def solve(
         relay by dopri5, taylor or taylor-extended, a smooth delayed switch by dopri5 or radau5.
     rtol, atol : float
         Tolerances of a step's local error [default 10^-7.97727, NDSolve's; 1e-32 for
-        taylor-extended, or what ``precision`` allows].
+        taylor-extended, or what ``precision`` allows]. From a start of states below 1e-3 the
+        default ``atol`` is as many powers of ten smaller.
     max_step : float
         Longest step, in units of time [default a tenth of the time between restarts or kicks].
     max_steps : int
