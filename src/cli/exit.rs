@@ -162,7 +162,7 @@ fn advice(error: &FileError) -> &'static str {
 }
 
 /// The path of an unfinished output: beside the finished one, with the suffix `.part`, or `.part2`
-/// and so on if a file of that name is somebody else's.
+/// and so on if another program wrote a file of that name.
 pub fn part_of(file: &std::path::Path) -> PathBuf {
     let named = |k: usize| {
         let mut name = file.as_os_str().to_owned();
@@ -178,7 +178,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_somebody_else_wrote_is_no_part() {
+    fn files_of_other_programs_are_no_parts() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("b.csv");
         let [one, two] = ["b.csv.part", "b.csv.part2"].map(|name| folder.path().join(name));

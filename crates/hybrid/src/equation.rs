@@ -578,7 +578,7 @@ impl Equation {
                 }
                 let guard =
                     compiled.deciding.iter().zip(guards).find(|(_, out)| values[**out].is_nan());
-                // What spoils nothing is no end: 0^1.5 is exp(1.5 ln 0), which is zero.
+                // No output is spoilt, and no domain left: 0^1.5 is exp(1.5 ln 0), which is zero.
                 let (guard, _) = guard?;
                 let function = &self.guards[*guard].expression;
                 return Some(format!("{what}, in the switching function {function}"));

@@ -31,7 +31,8 @@ pub(crate) fn slope_at_beginning(v: &[f64; 5]) -> f64 {
     4.0 * (b[1] - b[0])
 }
 
-/// [`first`] of a function that leaves zero at `from` to its side as a square does, but for rounding.
+/// [`first`] of a function that leaves zero at `from` to its side as a square does, but for
+/// rounding.
 pub(crate) fn first_behind_tangent(
     side: f64,
     from: f64,

@@ -348,7 +348,8 @@ impl Gates {
         Some(Self { ends: None, leads_over: true, ..Self::new(tape)? })
     }
 
-    /// The same of a mixture of fields and of a switching function that is told apart at two levels.
+    /// The same of a mixture of fields and of a switching function that is told apart at two
+    /// levels.
     pub(super) fn with_switch(fields: &[Arc<Tape>], h: &Tape, levels: [f64; 2]) -> Option<Self> {
         let n = fields.first().map_or(h.variables(), |field| field.variables());
         let tape = Tape::record(n, |x| {

@@ -71,8 +71,8 @@ impl Follower<'_> {
     }
 
     /// Puts the values, at [`PLACES`] of a time `h`, of a function that has just left zero, or that
-    /// rounding has beyond it, to zero at the beginning. Returns the change in that time by the slope
-    /// there, if only rounding makes this slope: the function leaves zero to second order.
+    /// rounding has beyond it, to zero at the beginning. Returns the change in that time by the
+    /// slope there, if only rounding makes this slope: the function leaves zero to second order.
     fn begin_at_zero(&mut self, sought: Sought, side: f64, h: f64, v: &mut [f64; 5]) -> f64 {
         if !(self.is_fresh(sought) || v[0] * side < 0.0) {
             return 0.0;

@@ -508,7 +508,7 @@ impl Follower<'_> {
             let mut fields = Vec::new();
             for column in 0..k {
                 let compiled = &self.base[column].0;
-                // What changes with the side that is slid upon changes, too.
+                // Other functions change with the side that is slid upon.
                 let (mut above, there) = (below.clone(), &self.base[column].1);
                 for (i, guard) in self.equation.guards.iter().enumerate() {
                     let (place, present) = (n + 1 + i, self.config.sides[i]);
