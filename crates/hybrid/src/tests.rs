@@ -922,7 +922,7 @@ fn a_corner_that_is_turned_around_holds_or_is_left() {
 #[test]
 fn a_block_is_torn_loose_by_a_ramp() {
     for (ramp, friction) in
-        [(0.5, 1.0), (0.3, 1.0), (0.25, 1.0), (1.0, 1.0), (0.37, 0.9), (0.7, 0.11), (0.013, 0.017)]
+        [(0.5, 1.0), (0.3, 1.0), (0.25, 1.0), (1.0, 1.0), (0.37, 0.9), (0.7, 1.2), (0.013, 0.017)]
     {
         let loose = friction / ramp;
         for method in [Method::Dopri5, Method::Radau5, Method::Taylor] {
@@ -939,6 +939,15 @@ fn a_block_is_torn_loose_by_a_ramp() {
                 near(*x, ramp / 6.0, 1e-9);
                 assert!(outcome.switches <= 3, "{method:?} {}\n{text}", outcome.switches);
             }
+            // Pulled by a spring.
+            let text = format!(
+                "states = ['x', 'v', 'u']\nstart = [0, 0, 0]\nf = ['v', '{ramp}*(u - x) - \
+                 {friction}*sign(v)', '1']"
+            );
+            let options = Options { t_end: loose + 1.0, method, ..Options::default() };
+            let outcome = follow(&model(&text), &options, &mut |_| true)
+                .unwrap_or_else(|e| panic!("{method:?}: {e}\n{text}"));
+            near(outcome.x[1], 1.0 - f64::cos(f64::sqrt(ramp)), 1e-8);
         }
     }
 }
@@ -991,6 +1000,11 @@ fn sides_follow_the_sides_that_they_depend_on() {
     for (f, start, t_end, want) in [
         ("-abs(sign(x - 1))", 2.0, 2.0, 0.0),
         ("-sign(x)*abs(sign(x))", 0.5, 5.0, 0.0),
+        ("-sign(sign(x))", 1.0, 3.0, 0.0),
+        ("-sign(heaviside(x) - 0.5)", 1.0, 3.0, 0.0),
+        ("if(if(x > 0, 1, -1) > 0, -1, 1)", 1.0, 3.0, 0.0),
+        ("-clip(10*sign(x), -1, 1)", 1.0, 3.0, 0.0),
+        ("-sign(floor(x) + 0.5)", 0.7, 3.0, 0.0),
         ("-0.5 - heaviside(if(x > 0, -0.5*x, 1))", 1.0, 4.0, -3.0),
         ("-1 - 0.5*floor(0.5 + 0.3*sign(x))", 1.0, 3.0, -2.0),
     ] {

@@ -285,6 +285,8 @@ pub(super) struct Gates {
     fields: usize,
     /// Levels between which the last output, a switching function, is told apart.
     levels: Option<[f64; 2]>,
+    /// Whether the last output is a switching function at whose zero the motion leaves the field.
+    ends_at_zero: bool,
 }
 
 impl Gates {
@@ -327,6 +329,7 @@ impl Gates {
         };
         let ends = Ends::new(tape.clone());
         let (values, leads_over, fields, levels) = (fixed.clone(), false, 1, None);
+        let ends_at_zero = false;
         let found = Self {
             needed,
             values,
@@ -339,13 +342,19 @@ impl Gates {
             leads_over,
             fields,
             levels,
+            ends_at_zero,
         };
         Some(found)
     }
 
-    /// The same of the field on one side of a surface, whose steps lead over it.
-    pub(super) fn of_side(tape: Arc<Tape>) -> Option<Self> {
+    /// The same of a field that need not have a value where steps lead.
+    pub(super) fn of_part(tape: Arc<Tape>) -> Option<Self> {
         Some(Self { ends: None, leads_over: true, ..Self::new(tape)? })
+    }
+
+    /// The same of the field on one side of h = 0, up to there.
+    pub(super) fn of_side(field: Arc<Tape>, h: &Tape) -> Option<Self> {
+        Some(Self { levels: None, ends_at_zero: true, ..Self::with_switch(&[field], h, [0.0; 2])? })
     }
 
     /// The same of a mixture of fields and of a switching function that is told apart at two
@@ -362,7 +371,7 @@ impl Gates {
             out
         });
         let (fields, levels) = (fields.len(), Some(levels));
-        Some(Self { fields, levels, ..Self::of_side(Arc::new(tape))? })
+        Some(Self { fields, levels, ..Self::of_part(Arc::new(tape))? })
     }
 
     pub(super) fn plain(&self) -> Option<&Plain> {
@@ -600,7 +609,8 @@ impl Gates {
         };
         // Neighbouring parts in which something was missed are one structure.
         let mut structures: Vec<(Missed, SVector<f64, N>)> = Vec::new();
-        for &(from, to) in leaves {
+        let mut began = f0[last];
+        'leaves: for &(from, to) in leaves {
             let mut outside = SVector::<f64, N>::zeros();
             // Boole's rule.
             for (k, weight) in [7.0, 32.0, 12.0, 32.0, 7.0].into_iter().enumerate() {
@@ -608,6 +618,12 @@ impl Gates {
                 let f = self.outputs(step.at(theta).as_slice());
                 if self.levels.is_some_and(|levels| hidden(levels, f[last])) {
                     return Some(Missed { from, to });
+                }
+                if self.ends_at_zero {
+                    began = if began == 0.0 { f[last] } else { began };
+                    if began * f[last] < 0.0 {
+                        break 'leaves;
+                    }
                 }
                 let (before, after) =
                     ((theta - DIFFERENCE).max(0.0), (theta + DIFFERENCE).min(1.0));

@@ -101,6 +101,21 @@ impl Follower<'_> {
                 matrix[i * n + j] = slope;
             }
         }
+        if !self.sliding.is_empty() {
+            // A mixture that holds a state has no slope there but rounding's.
+            let mut low = vec![D::constant(0.0); n];
+            for j in 0..n {
+                let mut v: Vec<D> = self.variables.iter().map(|v| D::constant(*v)).collect();
+                v[j].partials = [1.0];
+                self.compiled.field.evaluate(&v, &mut low);
+                for (i, of_side) in low.iter().enumerate() {
+                    let slope = &mut matrix[i * n + j];
+                    if slope.abs() <= 1e-13 * of_side.partials[0].abs() {
+                        *slope = 0.0;
+                    }
+                }
+            }
+        }
         matrix
     }
 

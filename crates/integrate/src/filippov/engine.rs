@@ -935,7 +935,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
     fn fly(&mut self, side: Side, start: FlightStart) -> Result<State<N>, FilippovError> {
         let place = usize::from(side == Side::Minus);
         let tape = &self.fields[place].0;
-        let gates = self.gates[place].take().unwrap_or_else(|| Gates::of_side(tape.clone()));
+        let h = || Tape::record(N, |x| vec![self.system.switching(&SVector::from_column_slice(x))]);
+        let gates = self.gates[place].take().unwrap_or_else(|| Gates::of_side(tape.clone(), &h()));
         let tolerance = self.accumulation.tolerance(self.settings.tolerance);
         let mut method = Automatic::new(tolerance, gates);
         let next = self.fly_by(&mut method, side, start);
@@ -1122,7 +1123,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         let place = if direction > 0.0 { 2 } else { 3 };
         let gates = self.gates[place].take().unwrap_or_else(|| {
             let system = Sided { system: self.system, depth: None };
-            Gates::of_side(VectorField::<M>::tape(&SlidingFlow { system, direction }))
+            Gates::of_part(VectorField::<M>::tape(&SlidingFlow { system, direction }))
         });
         let mut method = Automatic::new(self.settings.tolerance, gates);
         let next = self.slide_by(&mut method, sliding);
