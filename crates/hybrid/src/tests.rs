@@ -994,6 +994,30 @@ fn two_blocks_are_torn_loose_one_after_the_other() {
     }
 }
 
+/// The derivative of a reset where the state is zero, small, or small beside what is added.
+#[test]
+fn resets_have_their_derivatives_near_zero() {
+    for (start, set, want) in [
+        (0.0, "x + 1", 1.0),
+        (1e-300, "x + 1", 1.0),
+        (1e-12, "x + 1", 1.0),
+        (1e-6, "x + 1e6", 1.0),
+        (0.0, "2*x + 1", 2.0),
+        (0.0, "exp(3*x)", 3.0),
+        (0.5, "x^2 + t", 1.0),
+        (0.0, "if(t > 0, x + 1, x)", 1.0),
+    ] {
+        let text = format!(
+            "states = ['x']\nstart = [{start:?}]\nf = ['0']\n[[event]]\nat = 1\nset = {{ x = \
+             '{set}' }}"
+        );
+        let options = Options { t_end: 1.5, ..Options::default() };
+        let found = crate::motion::sensitivity::sensitivities(&model(&text), &options, &[])
+            .unwrap_or_else(|e| panic!("{e}\n{text}"));
+        assert!((found.by_start[0][0] - want).abs() < 1e-8, "{want} {found:?}\n{text}");
+    }
+}
+
 /// A switching function whose value changes with the side of another one.
 #[test]
 fn sides_follow_the_sides_that_they_depend_on() {

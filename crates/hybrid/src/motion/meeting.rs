@@ -199,7 +199,7 @@ impl Follower<'_> {
             }
             let seen = self.x.clone();
             if !event.set.is_empty() {
-                self.note_reset(&event.set, &seen);
+                self.note_reset(*i, &event.set, &seen);
             }
             match &self.equation.resets[*i] {
                 Some(program) => {

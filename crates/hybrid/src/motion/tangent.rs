@@ -363,7 +363,7 @@ impl Follower<'_> {
 
     /// Notes the derivative of a reset, for tangent vectors, after those of this moment that were
     /// noted before.
-    pub(super) fn note_reset(&mut self, set: &[(usize, Expression)], old: &[f64]) {
+    pub(super) fn note_reset(&mut self, event: usize, set: &[(usize, Expression)], old: &[f64]) {
         if self.tangents.is_none() {
             return;
         }
@@ -371,8 +371,28 @@ impl Follower<'_> {
         let mut by_state = vec![0.0; n * n];
         (0..n).for_each(|i| by_state[i * n + i] = 1.0);
         let mut by_time = vec![0.0; n];
-        for (state, e) in set {
+        let program = self.equation.resets[event].as_ref();
+        if let Some(program) = program {
+            let mut v: Vec<D> = self.variables.iter().map(|v| D::constant(*v)).collect();
+            v[..n].iter_mut().zip(old).for_each(|(v, x)| *v = D::constant(*x));
+            v[n] = D::constant(self.t);
+            let mut values = vec![D::constant(0.0); set.len()];
+            for j in 0..=n {
+                v[j].partials = [1.0];
+                program.evaluate(&v, &mut values);
+                v[j].partials = [0.0];
+                for ((state, _), value) in set.iter().zip(&values) {
+                    let place =
+                        if j < n { &mut by_state[state * n + j] } else { &mut by_time[*state] };
+                    *place = value.partials[0];
+                }
+            }
+        }
+        let largest = self.size.iter().fold(0.0_f64, |most, s| most.max(*s));
+        for (state, e) in if program.is_some() { &[] } else { set } {
             let value = |t: f64, x: &[f64]| self.equation.value(e, t, x);
+            // Not below the rounding of the value.
+            let least = (1e-3 * largest).max(1e-3 * value(self.t, old).abs());
             // Central differences with a step for each state's own size, by Richardson's
             // extrapolation of two.
             let slope = |f: &dyn Fn(f64) -> f64, h: f64| {
@@ -380,7 +400,8 @@ impl Follower<'_> {
                 (4.0 * d(0.5 * h) - d(h)) / 3.0
             };
             for j in 0..n {
-                let h = 1e-4 * self.size[j].max(old[j].abs()).max(f64::MIN_POSITIVE.sqrt());
+                let size = self.size[j].max(old[j].abs()).max(least);
+                let h = 1e-4 * if size > 0.0 { size } else { 1.0 };
                 let at = |shift: f64| {
                     let mut x = old.to_vec();
                     x[j] += shift;
