@@ -308,7 +308,10 @@ fn returned<const N: usize, const M: usize, T: VectorField<M>>(
     u: SVector<f64, N>,
     settings: &FloquetOptions,
 ) -> Result<Return<N>, Error> {
-    let guarded = || Guarded::<_, M>::new(Dopri5::new(settings.tolerance), settings.tolerance);
+    let guarded = || {
+        let dopri5 = Dopri5::<M>::new(settings.tolerance);
+        Guarded::new(dopri5, settings.tolerance).of_states(N)
+    };
     let mut stepper = guarded();
     // x, then the columns of the identity.
     let mut state = SVector::<f64, M>::from_fn(|i, _| {

@@ -192,7 +192,7 @@ pub fn estimate_along<const N: usize, const M: usize, T: VectorField<M>>(
     monitor: &dyn Monitor,
 ) -> Result<Estimate, Failure> {
     const { assert!(M == 2 * N) };
-    let stepper = Guarded::new(Dopri5::new(settings.tolerance), settings.tolerance);
+    let stepper = Guarded::new(Dopri5::new(settings.tolerance), settings.tolerance).of_states(N);
     averaged(
         &mut Alone { tangent, stepper, met: false, t: 0.0, state: begin(&x0) },
         kicked_states,

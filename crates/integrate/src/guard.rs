@@ -281,8 +281,6 @@ pub(super) struct Gates {
     /// Whether a step may lead to where the equation is not that of the motion and need not have a
     /// value: over a switching surface.
     leads_over: bool,
-    /// Fields among the tape's outputs, of which the motion follows one or a mixture.
-    fields: usize,
     /// Levels between which the last output, a switching function, is told apart.
     levels: Option<[f64; 2]>,
     /// Whether the last output is a switching function at whose zero the motion leaves the field.
@@ -328,7 +326,7 @@ impl Gates {
             _ => None,
         };
         let ends = Ends::new(tape.clone());
-        let (values, leads_over, fields, levels) = (fixed.clone(), false, 1, None);
+        let (values, leads_over, levels) = (fixed.clone(), false, None);
         let ends_at_zero = false;
         let found = Self {
             needed,
@@ -340,7 +338,6 @@ impl Gates {
             tape,
             ends,
             leads_over,
-            fields,
             levels,
             ends_at_zero,
         };
@@ -370,8 +367,7 @@ impl Gates {
             out.push(Replay::new(h, &x[..h.variables()]).output(0));
             out
         });
-        let (fields, levels) = (fields.len(), Some(levels));
-        Some(Self { fields, levels, ..Self::of_part(Arc::new(tape))? })
+        Some(Self { levels: Some(levels), ..Self::of_part(Arc::new(tape))? })
     }
 
     pub(super) fn plain(&self) -> Option<&Plain> {
@@ -601,6 +597,8 @@ impl Gates {
         let h = step.length();
         let (f0, f1) = (self.outputs(step.x0.as_slice()), self.outputs(step.x1.as_slice()));
         let last = f0.len() - 1;
+        let has_switch = self.levels.is_some() || self.ends_at_zero;
+        let components = f0.len() - usize::from(has_switch);
         let hidden = |levels: [f64; 2], value: f64| {
             levels.iter().any(|level| {
                 let beyond = |v: f64| v > *level;
@@ -629,7 +627,7 @@ impl Gates {
                     ((theta - DIFFERENCE).max(0.0), (theta + DIFFERENCE).min(1.0));
                 let at = |theta: f64| step.interpolant.at(theta);
                 let own = (at(after) - at(before)) / ((after - before) * h);
-                for o in 0..self.fields * N {
+                for o in 0..components {
                     let i = o % N;
                     let (low, high) = (f0[o].min(f1[o]).min(own[i]), f0[o].max(f1[o]).max(own[i]));
                     let beyond = (f[o] - high).max(low - f[o]);
@@ -772,6 +770,8 @@ pub struct Guarded<M, const N: usize> {
     stages: Stages,
     /// The last step's end.
     reached: (f64, SVector<f64, N>),
+    /// The components of the equation that are looked at, the first ones; all if absent.
+    looked_at: Option<usize>,
 }
 
 impl<M, const N: usize> Guarded<M, N> {
@@ -779,7 +779,13 @@ impl<M, const N: usize> Guarded<M, N> {
     pub fn new(method: M, tolerance: Tolerance) -> Self {
         let stages = Stages::new(0.0, f64::INFINITY);
         let reached = (0.0, SVector::zeros());
-        Self { method, tolerance, gates: None, stages, reached }
+        Self { method, tolerance, gates: None, stages, reached, looked_at: None }
+    }
+
+    /// Which looks at the first `states` components alone: the others are tangent vectors, which
+    /// have structure of their own where the states' is passed.
+    pub fn of_states(self, states: usize) -> Self {
+        Self { looked_at: Some(states), ..self }
     }
 
     /// The method.
@@ -835,7 +841,11 @@ impl<M: Redoable<N>, const N: usize> Stepper<N> for Guarded<M, N> {
         t_end: f64,
         max_step: f64,
     ) -> Result<(), Failure> {
-        self.gates = Gates::new(field.tape());
+        let tape = field.tape();
+        self.gates = Gates::new(match self.looked_at {
+            None => tape,
+            Some(states) => Arc::new(tape.select(0..states)),
+        });
         self.restart_with(field, t, x, Stage { end: t_end, max_step })
     }
 
