@@ -290,6 +290,11 @@ pub(super) struct Gates {
 impl Gates {
     /// None, if the equation has no gates.
     pub(super) fn new(tape: Arc<Tape>) -> Option<Self> {
+        Self::of(tape, |_| true)
+    }
+
+    /// Those of the operations in `wanted`.
+    fn of(tape: Arc<Tape>, wanted: fn(Operation) -> bool) -> Option<Self> {
         let operations = tape.operations();
         let mut moves = vec![false; operations.len()];
         for (node, operation) in operations.iter().enumerate() {
@@ -298,7 +303,7 @@ impl Gates {
         }
         let (live, powers) = (tape.needed(), tape.powers());
         let mut gates: Vec<(Gate, Node)> = Vec::new();
-        for node in (0..operations.len()).filter(|node| live[*node]) {
+        for node in (0..operations.len()).filter(|node| live[*node] && wanted(operations[*node])) {
             if let Some(gate) = Gate::of(operations[node], powers[node]).filter(|(_, a)| moves[*a])
                 && !gates.contains(&gate)
             {
@@ -344,9 +349,11 @@ impl Gates {
         Some(found)
     }
 
-    /// The same of a field that need not have a value where steps lead.
+    /// The same of a field that need not have a value where steps lead. Roots and logarithms are
+    /// steep where their domain ends, which a motion on a surface may touch.
     pub(super) fn of_part(tape: Arc<Tape>) -> Option<Self> {
-        Some(Self { ends: None, leads_over: true, ..Self::new(tape)? })
+        let wanted = |operation| !matches!(operation, Operation::Sqrt(_) | Operation::Ln(_));
+        Some(Self { ends: None, leads_over: true, ..Self::of(tape, wanted)? })
     }
 
     /// The same of the field on one side of h = 0, up to there.

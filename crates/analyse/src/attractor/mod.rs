@@ -201,9 +201,12 @@ fn deterministic(
     }
     evidence.zero_one = tail(0, 1);
     evidence.divergence = divergence(points, evidence.return_time);
-    // Neighbours say nothing where they have no common future: the plane of two coordinates shows
-    // an attractor of more dimensions on top of itself.
+    // Neighbours without a common future: noise, or an attractor of more dimensions which the plane
+    // of two coordinates shows on top of itself, if it moves regularly.
     let blind = evidence.divergence.is_some_and(|d| d.skill < th.skill);
+    if blind && evidence.zero_one.is_none_or(|k| k > th.zero_one) {
+        return Verdict::Noisy { contrast: None, around: None };
+    }
     let exponent = question.lyapunov.map(|l| l.value > th.exponent_significance * l.standard_error);
     let votes = [
         evidence.zero_one.map(|k| k > th.zero_one),
@@ -214,7 +217,7 @@ fn deterministic(
     let no = votes.iter().filter(|v| **v == Some(false)).count();
     if yes + no == 0 {
         Verdict::TooFew { points: points.len() }
-    } else if yes > no && exponent != Some(false) && !blind {
+    } else if yes > no && exponent != Some(false) {
         Verdict::Chaotic {
             lyapunov: question.lyapunov,
             bands: occupancy::bands(&points[points.len() / 2..], th),

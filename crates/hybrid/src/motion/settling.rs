@@ -615,6 +615,9 @@ impl Follower<'_> {
     /// Of the functions in `zero`, those that with these sides of all of them are not zero, and
     /// whether they are above: so is if(x > 0, x, 2) on the lower side of x = 0.
     fn jumped(&mut self, zero: &[usize], side: &dyn Fn(usize) -> f64) -> Vec<Option<bool>> {
+        if zero.len() == 1 {
+            return vec![None];
+        }
         let mut config = self.config.clone();
         zero.iter().enumerate().for_each(|(i, guard)| config.sides[*guard] = side(i));
         self.ask_new(&mut config);
