@@ -201,16 +201,13 @@ fn deterministic(
     }
     evidence.zero_one = tail(0, 1);
     evidence.divergence = divergence(points, evidence.return_time);
-    // Neighbours without a common future: noise, or an attractor of more dimensions which the plane
-    // of two coordinates shows on top of itself, if it moves regularly.
-    let blind = evidence.divergence.is_some_and(|d| d.skill < th.skill);
-    if blind && evidence.zero_one.is_none_or(|k| k > th.zero_one) {
+    if evidence.divergence.is_some_and(|d| d.skill < th.skill) {
         return Verdict::Noisy { contrast: None, around: None };
     }
     let exponent = question.lyapunov.map(|l| l.value > th.exponent_significance * l.standard_error);
     let votes = [
         evidence.zero_one.map(|k| k > th.zero_one),
-        evidence.divergence.filter(|_| !blind).map(|d| d.per_return > th.divergence),
+        evidence.divergence.map(|d| d.per_return > th.divergence),
         exponent,
     ];
     let yes = votes.iter().filter(|v| **v == Some(true)).count();
