@@ -32,8 +32,7 @@ mod _native {
 
     use pyo3::prelude::*;
     use pyo3::types::PyDict;
-    use twofold::integrate::PRECISIONS;
-    use twofold::integrate::Tolerance;
+    use twofold::integrate::{PRECISIONS, Tolerance};
     use twofold::job::question::NUMERICS;
     use twofold::job::spec::{DEFAULT_MAX_STEPS, Method, MethodSpec, finest_extended, in_units_of};
 

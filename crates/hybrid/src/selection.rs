@@ -276,9 +276,9 @@ pub(crate) fn leads_away(growth: f64) -> bool {
 
 /// Positive where s' = a + M w, with w of each function 0 on its negative and 1 on its positive
 /// side, does not turn away from s = 0: the least of the groups of functions that depend on each
-/// other. `a` and M are such that s' = 0 for weights between. Two functions are
-/// decided by their [`turn`]; more attract if C M + M^T C is negative definite for a diagonal C > 0
-/// (then the sum of c (|s| - s u), with u the signs that the weights stand for, falls always).
+/// other. `a` and M are such that s' = 0 for weights between. Two functions are decided by their
+/// [`turn`]; more attract if C M + M^T C is negative definite for a diagonal C > 0 (then the sum of
+/// c (|s| - s u), with u the signs that the weights stand for, falls always).
 pub(crate) fn attraction(a: &[f64], matrix: &[f64]) -> f64 {
     let k = a.len();
     let of_group = |group: &Vec<usize>| match group.as_slice() {

@@ -12,6 +12,9 @@
 //! then ends a step where the structure begins and goes through it with short steps.
 //!
 //! A step that stands is exactly the method's own.
+//!
+//! Of a discontinuous system the fields at work are looked at, up to the surface, and a switching
+//! function as far as a step would miss that it passes the level at which it acts.
 
 use std::sync::Arc;
 
@@ -331,22 +334,19 @@ impl Gates {
             _ => None,
         };
         let ends = Ends::new(tape.clone());
-        let (values, leads_over, levels) = (fixed.clone(), false, None);
-        let ends_at_zero = false;
-        let found = Self {
+        Some(Self {
             needed,
-            values,
+            values: fixed.clone(),
             fixed,
             along,
             gates,
             plain,
             tape,
             ends,
-            leads_over,
-            levels,
-            ends_at_zero,
-        };
-        Some(found)
+            leads_over: false,
+            levels: None,
+            ends_at_zero: false,
+        })
     }
 
     /// The same of a field that need not have a value where steps lead. Roots and logarithms are
@@ -822,9 +822,7 @@ impl<M: Redoable<N>, const N: usize> Guarded<M, N> {
         let (Stage { end, max_step }, (t, x)) = (self.stages.now(), self.reached);
         self.method.restart_again(field, t, x, end, max_step)
     }
-}
 
-impl<M: Redoable<N>, const N: usize> Guarded<M, N> {
     /// [`Stepper::restart`] with the gates that there are.
     pub(super) fn restart_with<F: VectorField<N>>(
         &mut self,

@@ -209,8 +209,9 @@ impl MethodSpec {
     }
 }
 
-/// A default absolute tolerance for a run from `start`. Those above are meant for states of order
-/// one: where the largest state is below a thousandth, they are as many powers of ten smaller.
+/// A default tolerance for a run from `start`. [`MethodSpec::defaults`] are meant for states of
+/// order one: where the largest state is below a thousandth, the absolute tolerance is as many
+/// powers of ten smaller as the state is. Without units.
 pub fn in_units_of(tolerance: Tolerance, start: &[f64]) -> Tolerance {
     let largest = start.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
     let mut unit = 1.0;
@@ -1051,7 +1052,6 @@ mod tests {
         }
     }
 
-    /// 106 bits hold 32 digits; more bits, their last one beside a leading 1.
     #[test]
     fn default_tolerances_follow_small_states() {
         let of = |start: &[f64]| in_units_of(Tolerance { rtol: 1e-8, atol: 1e-8 }, start);
@@ -1064,6 +1064,7 @@ mod tests {
         }
     }
 
+    /// 106 bits hold 32 digits; more bits, their last one beside a leading 1.
     #[test]
     fn the_finest_tolerance_is_the_last_bit() {
         let power = |k: i32| 2.0_f64.powi(k);

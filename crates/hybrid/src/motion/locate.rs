@@ -103,7 +103,7 @@ impl Follower<'_> {
     ) -> Vec<Option<f64>> {
         let fresh = list.iter().any(|(sought, _)| self.is_fresh(*sought));
         let terms = if fresh { self.rates(&self.config.clone()).1.terms } else { Vec::new() };
-        let mut ends = Vec::new();
+        let (mut ends, mut at, mut value) = (Vec::new(), vec![0.0; self.n], Vec::new());
         for (sought, side) in list {
             let series = self.series_of(step, *sought, is_whole);
             ends.push(series.as_ref().map(|c| c.iter().rev().sum()));
@@ -119,8 +119,7 @@ impl Follower<'_> {
                     if let Sought::Guard { guard, .. } = sought { self.left[*guard] } else { 0.0 };
                 SMALLEST_SLOPE * step.h * terms.max(left)
             });
-            let (one, mut value) = ([(*sought, *side)], Vec::new());
-            let mut at = vec![0.0; self.n];
+            let one = [(*sought, *side)];
             let mut f = |theta: f64| {
                 step.at(theta, &mut at);
                 self.measure(&one, step.t + theta * step.h, &at, &mut value);

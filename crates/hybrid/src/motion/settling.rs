@@ -301,11 +301,11 @@ impl Follower<'_> {
                 let direction: Vec<f64> =
                     set.iter().map(|i| place[*i].map_or(0.0, |p| rates.direction(p))).collect();
                 let asked: Vec<bool> = set.iter().map(|i| asked[*i]).collect();
-                let known: Vec<f64> = set
+                let first_or_zero: Vec<f64> = set
                     .iter()
                     .map(|i| place[*i].map_or(f64::NAN, |p| rates.first_or_zero(p)))
                     .collect();
-                (rates.field.clone(), first, direction, asked, known)
+                (rates.field.clone(), first, direction, asked, first_or_zero)
             };
             // Fields that are the same on both sides decide nothing and need nothing decided.
             if set.len() == 1 {
@@ -384,16 +384,16 @@ impl Follower<'_> {
                 } else {
                     let rule = self.rule();
                     let chosen = self.options.intersection != Intersection::Undecided;
-                    let (mut fields, mut speeds, mut known) = (Vec::new(), Vec::new(), Vec::new());
+                    let (mut fields, mut speeds, mut clear) = (Vec::new(), Vec::new(), Vec::new());
                     for vertex in 0..1_usize << m {
                         let mut on = plus.clone();
                         slides.iter().enumerate().for_each(|(i, s)| on[*s] = vertex >> i & 1 == 1);
-                        let (field, rates, .., first) = at(self, on);
+                        let (field, rates, .., first_or_zero) = at(self, on);
                         fields.push(field);
                         speeds.push(rates);
-                        known.push(slides.iter().map(|s| first[*s]).collect::<Vec<f64>>());
+                        clear.push(slides.iter().map(|s| first_or_zero[*s]).collect::<Vec<_>>());
                     }
-                    let holds = || match known.as_slice() {
+                    let holds = || match clear.as_slice() {
                         [a, b, c, d] => hold(&[a, b, c, d].map(|rates| [rates[0], rates[1]])),
                         _ => attraction(
                             &slides.iter().map(|s| base[*s]).collect::<Vec<_>>(),
@@ -401,7 +401,9 @@ impl Follower<'_> {
                         ),
                     };
                     if !chosen && !(holds() > 0.0) {
-                        may_turn_away = true;
+                        // Where fields turn around two surfaces a mixture stays on both.
+                        let stays = |w: &Vec<f64>| w.iter().all(|w| *w > 0.0 && *w < 1.0);
+                        may_turn_away |= m == 2 || weights.as_ref().is_some_and(stays);
                         return false;
                     }
                     // If all mixtures have one velocity, there is nothing to choose.
@@ -440,6 +442,11 @@ impl Follower<'_> {
                     goes(i, if rate.abs() <= 1e-13 * size { 0.0 } else { rate })
                 })
             });
+            if may_turn_away {
+                let names: Vec<usize> = set.iter().map(|i| zero[*i]).collect();
+                let ways = "it may stay, or turn away by infinitely many switches at any time";
+                return Err(self.undecided(&names, ways));
+            }
             let chosen = match found.as_slice() {
                 [] if self.options.intersection == Intersection::Undecided
                     && self.comes_to_rest(self.t) =>
@@ -450,10 +457,6 @@ impl Follower<'_> {
                     let names: Vec<usize> = set.iter().map(|i| zero[*i]).collect();
                     return Err(match self.options.intersection {
                         Intersection::Order(_) if names.len() > 1 => self.no_mixture(&names),
-                        _ if may_turn_away => self.undecided(
-                            &names,
-                            "it may stay, or turn away by infinitely many switches at any time",
-                        ),
                         _ => {
                             self.undecided(&names, "no way is consistent to first and second order")
                         }

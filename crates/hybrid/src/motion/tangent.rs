@@ -391,8 +391,7 @@ impl Follower<'_> {
         let largest = self.size.iter().fold(0.0_f64, |most, s| most.max(*s));
         for (state, e) in if program.is_some() { &[] } else { set } {
             let value = |t: f64, x: &[f64]| self.equation.value(e, t, x);
-            // Not below the rounding of the value.
-            let least = (1e-3 * largest).max(1e-3 * value(self.t, old).abs());
+            let value_now = value(self.t, old).abs();
             // Central differences with a step for each state's own size, by Richardson's
             // extrapolation of two.
             let slope = |f: &dyn Fn(f64) -> f64, h: f64| {
@@ -400,7 +399,10 @@ impl Follower<'_> {
                 (4.0 * d(0.5 * h) - d(h)) / 3.0
             };
             for j in 0..n {
-                let size = self.size[j].max(old[j].abs()).max(least);
+                let own = self.size[j].max(old[j].abs());
+                // Smaller steps would be rounding of the value.
+                let seen = own > 1e7 * f64::EPSILON * value_now;
+                let size = if seen { own } else { own.max(1e-3 * largest.max(value_now)) };
                 let h = 1e-4 * if size > 0.0 { size } else { 1.0 };
                 let at = |shift: f64| {
                     let mut x = old.to_vec();
