@@ -232,13 +232,14 @@ struct Alone<'a, T, const M: usize> {
 impl<T: VectorField<M>, const M: usize> Disturbed<M> for Alone<'_, T, M> {
     fn begin(&mut self, stop: f64, max_step: f64) -> Result<(), Failure> {
         let Self { tangent, stepper, met, t, state } = self;
-        match std::mem::replace(met, true) {
+        let begun = match std::mem::replace(met, true) {
             false => stepper.restart(*tangent, *t, *state, stop, max_step),
             true => stepper.restart_again(*tangent, *t, *state, stop, max_step),
-        }
+        };
+        begun.map_err(|failure| failure.of_states(M / 2))
     }
     fn step(&mut self) -> Result<(), Failure> {
-        let step = self.stepper.step(self.tangent)?;
+        let step = self.stepper.step(self.tangent).map_err(|failure| failure.of_states(M / 2))?;
         (self.t, self.state) = (step.t1, step.x1);
         Ok(())
     }

@@ -380,11 +380,10 @@ impl<O, const N: usize> Lane<O, N> {
     #[inline(never)]
     fn missed(&mut self, step: &Step<'_, N>, tolerance: Tolerance) -> Result<bool, Failure> {
         let Some(gates) = &mut self.gates else { return Ok(false) };
-        let missed = gates.missed(step, tolerance)?;
-        missed
-            .map(|times| self.stages.go_through((step.t0, &step.x0), times))
-            .transpose()
-            .map(|done| done.is_some())
+        match gates.missed(step, tolerance)? {
+            Some(undone) => self.stages.take_back((step.t0, &step.x0), undone),
+            None => Ok(false),
+        }
     }
 }
 

@@ -13,6 +13,10 @@
 //!
 //! A step that stands is exactly the method's own.
 //!
+//! Where the argument of a sign (a kink of `abs`, a jump) changes its own inside a step, the step is
+//! taken back, too, and ends just behind that zero: no step leads over one (Hairer, Norsett & Wanner
+//! 1993, sec. II.6). A jump that attracts from both sides cannot be followed and is refused.
+//!
 //! Of a discontinuous system the fields at work are looked at, up to the surface, and a switching
 //! function as far as a step would miss that it passes the level at which it acts.
 
@@ -20,13 +24,14 @@ use std::sync::Arc;
 
 use nalgebra::SVector;
 
+use super::roots::brent;
 use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance};
 use twofold_num::elementary::ln;
 use twofold_num::series::HIGH_POWER;
 use twofold_num::tape::{Node, Operation, Replay};
 use twofold_num::{Elementary, Tape};
 use twofold_system::VectorField;
-use twofold_system::singular::Ends;
+use twofold_system::singular::{Ends, written_sign};
 
 /// The numbers between two bounds, up to a few roundings.
 #[derive(Clone, Copy, Debug)]
@@ -105,6 +110,10 @@ impl Along {
     fn plus(self, other: Self, sign: f64) -> Self {
         let ends = [0, 1].map(|i| self.ends[i] + sign * other.ends[i]);
         Self::new(ends, self.bend + other.bend)
+    }
+
+    fn changes_sign(self) -> bool {
+        self.ends[0] < 0.0 && self.ends[1] > 0.0 || self.ends[0] > 0.0 && self.ends[1] < 0.0
     }
 
     /// A product of chords leaves its own by theta (1 - theta) times both changes.
@@ -273,6 +282,8 @@ impl Plain {
 pub(super) struct Gates {
     tape: Arc<Tape>,
     gates: Vec<(Gate, Node)>,
+    /// Signs, each with its argument.
+    signs: Vec<[Node; 2]>,
     plain: Option<Plain>,
     /// The operations that gates' arguments need, and those that the whole equation does.
     needed: [Vec<Node>; 2],
@@ -305,8 +316,13 @@ impl Gates {
                 || operation.arguments().any(|a| moves[a]);
         }
         let (live, powers) = (tape.needed(), tape.powers());
-        let mut gates: Vec<(Gate, Node)> = Vec::new();
+        let (mut gates, mut signs) = (Vec::<(Gate, Node)>::new(), Vec::new());
         for node in (0..operations.len()).filter(|node| live[*node] && wanted(operations[*node])) {
+            if let Operation::Sign(argument) = operations[node]
+                && moves[argument]
+            {
+                signs.push([node, argument]);
+            }
             if let Some(gate) = Gate::of(operations[node], powers[node]).filter(|(_, a)| moves[*a])
                 && !gates.contains(&gate)
             {
@@ -340,6 +356,7 @@ impl Gates {
             fixed,
             along,
             gates,
+            signs,
             plain,
             tape,
             ends,
@@ -364,7 +381,8 @@ impl Gates {
     /// The same of a mixture of fields and of a switching function that is told apart at two
     /// levels.
     pub(super) fn with_switch(fields: &[Arc<Tape>], h: &Tape, levels: [f64; 2]) -> Option<Self> {
-        let n = fields.first().map_or(h.variables(), |field| field.variables());
+        let named: &Tape = fields.first().map_or(h, |field| field);
+        let n = named.variables();
         let tape = Tape::record(n, |x| {
             let mut out = Vec::new();
             for field in fields {
@@ -374,7 +392,13 @@ impl Gates {
             out.push(Replay::new(h, &x[..h.variables()]).output(0));
             out
         });
-        Some(Self { levels: Some(levels), ..Self::of_part(Arc::new(tape))? })
+        let tape = tape.with_names((0..n).map(|i| named.name(i)));
+        let kept = tape.outputs().len() - 1;
+        let of_fields = tape.select(0..kept).needed();
+        let mut gates = Self { levels: Some(levels), ..Self::of_part(Arc::new(tape))? };
+        // A kink of h is none of the motion.
+        gates.signs.retain(|[sign, _]| of_fields[*sign]);
+        Some(gates)
     }
 
     pub(super) fn plain(&self) -> Option<&Plain> {
@@ -492,6 +516,20 @@ impl Gates {
     }
 }
 
+/// Why a step is taken back.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Undone {
+    /// It has missed structure between these times.
+    Structure([f64; 2]),
+    /// The argument of a sign passes zero inside it, and has just done so at this time.
+    SignChange(f64),
+}
+
+/// A step that ends so many resolutions of time behind a sign's change has ended at it.
+const LANDED: f64 = 1e3;
+/// Steps towards one change of a sign that are taken back because it is found earlier in them.
+const MOST_LANDINGS: u32 = 8;
+
 /// A missed part of a step, as fractions of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Missed {
@@ -517,25 +555,98 @@ struct Piece {
 }
 
 impl Gates {
-    /// From when to when the step has missed something, if it has. A step that the domain of the
-    /// equation does not hold is an error.
+    /// Why the step is to be taken back, if it is. A step that the domain of the equation does not
+    /// hold is an error.
     pub(super) fn missed<const N: usize>(
         &mut self,
         step: &Step<'_, N>,
         tolerance: Tolerance,
-    ) -> Result<Option<[f64; 2]>, Failure> {
+    ) -> Result<Option<Undone>, Failure> {
         if self.plain.as_ref().is_some_and(|plain| plain.hides_nothing(step)) {
             return Ok(None);
         }
         let state = |i: usize| Along::new([step.x0[i], step.x1[i]], step.interpolant.bend(i));
-        if self.hide_nothing(state) {
-            return Ok(None);
-        }
-        let missed = self.searched(step, tolerance);
-        if missed.is_none() {
+        if !self.hide_nothing(state) {
+            if let Some(Missed { from, to }) = self.searched(step, tolerance) {
+                return Ok(Some(Undone::Structure([from, to].map(|theta| step.time(theta)))));
+            }
             step.stays_in_domain(self.ends.as_ref())?;
         }
-        Ok(missed.map(|missed| [missed.from, missed.to].map(|theta| step.time(theta))))
+        let along = &self.along;
+        if self.signs.iter().any(|[_, argument]| along[*argument].changes_sign()) {
+            return self.first_sign_change(step);
+        }
+        Ok(None)
+    }
+
+    /// Argument of a sign at `x`.
+    fn argument(&mut self, argument: Node, x: &[f64]) -> f64 {
+        self.evaluate(x, false);
+        self.values[argument]
+    }
+
+    /// The first change of a sign in the step, but at its ends.
+    ///
+    /// # Errors
+    /// If the motion stays there.
+    #[cold]
+    #[inline(never)]
+    fn first_sign_change<const N: usize>(
+        &mut self,
+        step: &Step<'_, N>,
+    ) -> Result<Option<Undone>, Failure> {
+        let h = step.length();
+        let resolution = 4.0 * f64::EPSILON * (step.t0.abs() + h);
+        let mut first: Option<(f64, [Node; 2])> = None;
+        for sign in self.signs.clone() {
+            let along = self.along[sign[1]];
+            if !along.changes_sign() {
+                continue;
+            }
+            let argument = |theta: f64| self.argument(sign[1], step.at(theta).as_slice());
+            let theta = brent(argument, 0.0, 1.0, along.ends[0], along.ends[1]);
+            let inside = theta * h > resolution && (1.0 - theta) * h > LANDED * resolution;
+            if inside && first.is_none_or(|(earliest, _)| theta < earliest) {
+                first = Some((theta, sign));
+            }
+        }
+        let Some((theta, [sign, argument])) = first else { return Ok(None) };
+        if self.attracts(step, theta, argument) {
+            return Err(Failure::StaysOnJump {
+                t: step.time(theta),
+                state: Failure::state(&step.at(theta)),
+                what: written_sign(&self.tape, sign),
+            });
+        }
+        Ok(Some(Undone::SignChange(step.time(theta) + resolution)))
+    }
+
+    /// Whether the velocities on both sides of an argument's zero lead to it (Filippov 1988,
+    /// sec. 4): alike near it and very near, as they are beside a jump and not beside a tangency.
+    fn attracts<const N: usize>(&mut self, step: &Step<'_, N>, theta: f64, argument: Node) -> bool {
+        let has_switch = self.levels.is_some() || self.ends_at_zero;
+        if self.tape.outputs().len() - usize::from(has_switch) > N {
+            return false;
+        }
+        let rise = (self.along[argument].ends[1] - self.along[argument].ends[0]).signum();
+        let delta = 1e-6 * step.length();
+        // Towards the side that is come to, from `apart` behind or before the zero.
+        let mut rate = |apart: f64| {
+            let x = step.at((theta + apart).clamp(0.0, 1.0));
+            let velocity = self.outputs(x.as_slice());
+            let mut ahead = x;
+            ahead.iter_mut().zip(&velocity).for_each(|(x, v)| *x += delta * v);
+            let before = self.argument(argument, x.as_slice());
+            rise * (self.argument(argument, ahead.as_slice()) - before)
+        };
+        let near = [rate(-1e-6), rate(1e-6)];
+        let farther = [rate(-1e-3), rate(1e-3)];
+        near[0] > 0.0
+            && near[1] < 0.0
+            && near[0] > 0.1 * farther[0]
+            && near[1] < 0.1 * farther[1]
+            && farther[0] > 0.0
+            && farther[1] < 0.0
     }
 
     #[cold]
@@ -691,8 +802,9 @@ pub(super) struct Stage {
 #[derive(Clone, Debug)]
 pub(super) struct Stages {
     asked: Stage,
-    /// Before that; the last one comes first.
-    before: Vec<Stage>,
+    /// Before that; the last one comes first. With how often it was moved, if it leads to the
+    /// change of a sign.
+    before: Vec<(Stage, u32)>,
 }
 
 impl Stages {
@@ -702,34 +814,44 @@ impl Stages {
 
     /// The stage under way.
     pub(super) fn now(&self) -> Stage {
-        self.before.last().copied().unwrap_or(self.asked)
+        self.before.last().map_or(self.asked, |(stage, _)| *stage)
     }
 
     /// Whether stages end at or before the time `t`, after which they are over.
     pub(super) fn end_at(&mut self, t: f64) -> bool {
         let stages = self.before.len();
-        while self.before.last().is_some_and(|stage| t >= stage.end) {
+        while self.before.last().is_some_and(|(stage, _)| t >= stage.end) {
             self.before.pop();
         }
         self.before.len() < stages
     }
 
-    /// Plans the steps to a structure between the times `from` and `to` that a step from (t, x)
-    /// missed, and short steps through it.
+    /// Plans what comes instead of a step from (t, x): the steps to a structure and short ones
+    /// through it, or steps to the change of a sign. Whether the step is taken back.
     #[cold]
     #[inline(never)]
-    pub(super) fn go_through<const N: usize>(
+    pub(super) fn take_back<const N: usize>(
         &mut self,
         (t, x): (f64, &SVector<f64, N>),
-        [from, to]: [f64; 2],
-    ) -> Result<(), Failure> {
-        let width = width((t, x), [from, to])?;
+        undone: Undone,
+    ) -> Result<bool, Failure> {
         let Stage { end, max_step } = self.now();
-        self.before.push(Stage { end: to.min(end), max_step: max_step.min(width / STEPS_THROUGH) });
-        if from - t > 1e-3 * width && from - t > SHORTEST * t.abs() {
-            self.before.push(Stage { end: from, max_step });
+        match undone {
+            Undone::Structure([from, to]) => {
+                let width = width((t, x), [from, to])?;
+                let short = max_step.min(width / STEPS_THROUGH);
+                self.before.push((Stage { end: to.min(end), max_step: short }, 0));
+                if from - t > 1e-3 * width && from - t > SHORTEST * t.abs() {
+                    self.before.push((Stage { end: from, max_step }, 0));
+                }
+            }
+            Undone::SignChange(at) => match self.before.last_mut() {
+                Some((_, moved)) if *moved >= MOST_LANDINGS => return Ok(false),
+                Some((stage, moved)) if *moved > 0 => (stage.end, *moved) = (at, *moved + 1),
+                _ => self.before.push((Stage { end: at, max_step }, 1)),
+            },
         }
-        Ok(())
+        Ok(true)
     }
 }
 
@@ -882,12 +1004,11 @@ impl<M: Redoable<N>, const N: usize> Stepper<N> for Guarded<M, N> {
                 .as_mut()
                 .map_or(Ok(None), |gates| gates.missed(&step, self.tolerance))?
             {
-                Some(times) => {
+                Some(undone) if self.stages.take_back((t0, &x0), undone)? => {
                     self.reached = (t0, x0);
-                    self.stages.go_through((t0, &x0), times)?;
                     self.begin(field)?;
                 }
-                None => {
+                _ => {
                     self.reached = (t1, x1);
                     return Ok(Step { t0, t1, x0, x1, interpolant: self.method.last() });
                 }

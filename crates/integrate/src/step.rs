@@ -343,6 +343,21 @@ pub enum Failure {
         /// The part of the equation that is not smooth.
         what: String,
     },
+    /// A jump of the equation attracts the motion from both sides.
+    #[error(
+        "the motion stays on the jump of {what} from t = {t} on, state {state:?}, where the \
+            equation has no value to go on with: make the argument the switching function h \
+            (--switch filippov), or write the system as f = [...] alone, which is followed there",
+        t = Short(*t)
+    )]
+    StaysOnJump {
+        /// From when on.
+        t: f64,
+        /// The state there.
+        state: Vec<f64>,
+        /// The function that jumps.
+        what: String,
+    },
     /// The step became too small to advance time.
     #[error(
         "step size underflow ({h:e}) at t = {t}, state {state:?}: the tolerances ask for more than \
@@ -459,6 +474,22 @@ impl Failure {
             }
             None => self,
         }
+    }
+
+    /// The failure of an orbit of `n` states alone, without what is integrated beside them.
+    pub fn of_states(mut self, n: usize) -> Self {
+        match &mut self {
+            Self::NotFinite { state, .. }
+            | Self::Undefined { state, .. }
+            | Self::Unbounded { state, .. }
+            | Self::NotSmooth { state, .. }
+            | Self::StaysOnJump { state, .. }
+            | Self::StepUnderflow { state, .. }
+            | Self::TooManySteps { state, .. }
+            | Self::NotConverged { state, .. } => state.truncate(n),
+            Self::NotApplicable { .. } => {}
+        }
+        self
     }
 
     /// The state as the errors carry it.

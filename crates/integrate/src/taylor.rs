@@ -798,11 +798,8 @@ impl<const N: usize, S: Precision> Taylor<N, S> {
             let beyond = S::EPSILON * (t0.abs() + h) * (1_u64 << (2 * self.landings + 2)) as f64;
             self.landings = if zero.to_f64() > 1e3 * beyond { 0 } else { self.landings + 1 };
             if self.landings > MOST_LANDINGS {
-                let what = format!(
-                    "the motion does not leave the jump of {}",
-                    written_sign(&self.tape, node)
-                );
-                return Err(Failure::NotSmooth { t: t0, state: Failure::state(&x0), what });
+                let what = written_sign(&self.tape, node);
+                return Err(Failure::StaysOnJump { t: t0, state: Failure::state(&x0), what });
             }
             self.h = zero + S::from_f64(beyond);
             if self.h >= remaining {

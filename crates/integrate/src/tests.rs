@@ -1266,3 +1266,75 @@ const FILIPPOV_IN_THE_PLANE: &str = "
     two-blocks: 363 steps, 0 passages, cb98bb4d8ad9f9e4
     two-blocks: 363 steps, 0 passages, cb98bb4d8ad9f9e4
 ";
+
+/// Kinks and jumps of a field, beside a clock.
+enum Signs {
+    /// u' = 1 + |u|.
+    Kink,
+    /// q' = ||u| - 1/2|, u' = 1.
+    Kinks,
+    /// u' = 2 + sign(u).
+    Jump,
+    /// u' = -sign(u).
+    Attracting,
+}
+
+impl VectorField<2> for Signs {
+    fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+        let [q, u] = [x[0], x[1]];
+        let one = S::one();
+        SVector::from(match self {
+            Self::Kink => [one, one + u.abs()],
+            Self::Kinks => [(u.abs() - one.scale(0.5)).abs(), one],
+            Self::Jump => [q, one.scale(2.0) + u.sign()],
+            Self::Attracting => [-q, -u.sign()],
+        })
+    }
+}
+
+/// By every method that looks at its steps.
+fn through_signs(field: &Signs, x0: [f64; 2], t_end: f64) -> [Result<[f64; 2], Failure>; 3] {
+    fn end(
+        field: &Signs,
+        x0: [f64; 2],
+        t_end: f64,
+        mut method: impl Stepper<2>,
+    ) -> Result<[f64; 2], Failure> {
+        let options = DriveOptions::to(t_end);
+        drive(field, x0.into(), &options, &mut method, &mut Ignore, &()).map(|end| end.x.into())
+    }
+    let size = tolerance(1e-8);
+    [
+        end(field, x0, t_end, Guarded::new(Dopri5::new(size), size)),
+        end(field, x0, t_end, Guarded::new(Radau5::new(size), size)),
+        end(field, x0, t_end, Guarded::new(Lsoda::new(size), size)),
+    ]
+}
+
+#[test]
+fn steps_end_where_a_sign_changes() {
+    let grown = 0.5 * 1.5_f64.exp() - 1.0;
+    for (field, x0, t_end, right) in [
+        (Signs::Kink, [0.0, -1.0], 1.5, [1.5, grown]),
+        (Signs::Kinks, [0.0, -1.0], 2.0, [0.5, 1.0]),
+        (Signs::Jump, [0.0, -1.0], 2.0, [0.0, 3.0]),
+    ] {
+        for end in through_signs(&field, x0, t_end) {
+            let end = end.unwrap();
+            let near = |i: usize| (end[i] - right[i]).abs() < 1e-7;
+            assert!(near(0) && near(1), "{end:?}, right: {right:?}");
+        }
+    }
+}
+
+#[test]
+fn a_jump_that_attracts_is_refused() {
+    for end in through_signs(&Signs::Attracting, [1.0, 0.3], 3.0) {
+        match end.unwrap_err() {
+            Failure::StaysOnJump { t, state, .. } => {
+                assert!((t - 0.3).abs() < 1e-4 && state[1].abs() < 1e-6, "t = {t}, {state:?}");
+            }
+            other => panic!("{other}"),
+        }
+    }
+}

@@ -509,7 +509,7 @@ impl Map<'_> {
         found.map_err(|error| {
             let (obstacle, said) = match error {
                 floquet::Error::Integration(failure) => {
-                    (Obstacle::Other, without_tangents(failure, N).to_string())
+                    (Obstacle::Other, failure.of_states(N).to_string())
                 }
                 // From a rest, or beside one: whether it is, is looked at elsewhere.
                 floquet::Error::NoReturn { .. } => (Obstacle::Point(u.to_vec()), error.to_string()),
@@ -595,21 +595,6 @@ impl Map<'_> {
             n => Err(JobError::Other(format!("no closed orbits with {n} states")).into()),
         }
     }
-}
-
-/// A failure that speaks of the orbit alone, not of the tangent vectors beside it.
-fn without_tangents(mut failure: Failure, states: usize) -> Failure {
-    match &mut failure {
-        Failure::NotFinite { state, .. }
-        | Failure::StepUnderflow { state, .. }
-        | Failure::Undefined { state, .. }
-        | Failure::Unbounded { state, .. }
-        | Failure::NotSmooth { state, .. }
-        | Failure::TooManySteps { state, .. }
-        | Failure::NotConverged { state, .. } => state.truncate(states),
-        Failure::NotApplicable { .. } => {}
-    }
-    failure
 }
 
 impl Map<'_> {
@@ -1043,9 +1028,6 @@ mod tests {
             .to_string();
         assert!(!said.is_empty());
         let failure = Failure::NotFinite { t: 1.0, state: vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0] };
-        assert_eq!(
-            without_tangents(failure, 2),
-            Failure::NotFinite { t: 1.0, state: vec![1.0, 2.0] }
-        );
+        assert_eq!(failure.of_states(2), Failure::NotFinite { t: 1.0, state: vec![1.0, 2.0] });
     }
 }

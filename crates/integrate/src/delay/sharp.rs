@@ -11,7 +11,7 @@ use super::{
     Backwards, DelayError, Delayed, History, LEAST_DELAY, LateSwitch, ONE_TIME, Sides, is_due,
     resolves,
 };
-use crate::guard::{Gates, longest_towards};
+use crate::guard::{Gates, Undone, longest_towards};
 use crate::roots::{Crossing, CrossingFinder};
 use crate::step::{Failure, Statistics, Step, Stepper, Tolerance};
 use crate::taylor::Cuttable;
@@ -320,7 +320,7 @@ impl<P: PiecewiseSmooth<N>, M: Cuttable<N>, const N: usize> Sharp<'_, P, M, N> {
                 let step = self.methods[i].last();
                 // No field is looked at: the tolerance does not matter.
                 let tolerance = Tolerance { rtol: 0.0, atol: 0.0 };
-                if let Some(times) = gates.missed(&step, tolerance)? {
+                if let Some(Undone::Structure(times)) = gates.missed(&step, tolerance)? {
                     let longest = longest_towards((step.t0, &step.x0), times)?;
                     self.again += 1;
                     self.begin(longest)?;

@@ -286,11 +286,10 @@ impl<P: PiecewiseSmooth<N>, M: DrivenStepper<N> + Redoable<N>, const N: usize> S
         let step = loop {
             let step = method.step_driven(&field)?;
             let Step { t0, t1, x0, x1, .. } = step;
-            let Some(times) = gates.as_mut().map_or(Ok(None), |g| g.missed(&step, *tolerance))?
-            else {
+            let undone = gates.as_mut().map_or(Ok(None), |g| g.missed(&step, *tolerance))?;
+            if !undone.map_or(Ok(false), |undone| stages.take_back((t0, &x0), undone))? {
                 break Step { t0, t1, x0, x1, interpolant: method.last() };
-            };
-            stages.go_through((t0, &x0), times)?;
+            }
             *again += 1;
             let Stage { end, max_step } = stages.now();
             method.restart_driven(&field, t0, x0, end, max_step)?;
