@@ -26,7 +26,7 @@ pub enum Exit {
     Failed = 3,
     /// Ended by Ctrl-C (SIGINT): 128 + 2, as shells count.
     Interrupted = 130,
-    /// Ended by SIGTERM, as batch systems send it: 128 + 15.
+    /// Ended by SIGTERM, as batch systems send it, or by a closed terminal (SIGHUP): 128 + 15.
     Terminated = 143,
 }
 

@@ -9,15 +9,15 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 
 use super::CliError;
-use super::models::{known, named, names_a_file};
+use super::models::{each_once, known, named, names_a_file};
 use super::words::{History, Inside, KickLaw, Method, Reading, Relaxation, Transition};
 use crate::integrate;
 use crate::integrate::filippov::{ExitRule, Side, SlidingLaw};
 use crate::integrate::{Kick, Schedule, StepCap, Tolerance};
 use crate::job::spec::*;
 use crate::job::sweep::{Axis, Coordinate};
-use crate::num::Decimal;
 use crate::num::decimal::DecimalError;
+use crate::num::{Decimal, Short};
 use crate::paper;
 use crate::record::files::{read_text, read_text_from};
 use crate::system::{self, Definition, ParameterError, System};
@@ -685,7 +685,12 @@ impl RunFlags {
                 {
                     return Err(CliError::no_effect(idle.flag, idle.why));
                 }
-                self.unchecked(command)?
+                each_once("--set", &self.set)?;
+                let spec = self.unchecked(command)?;
+                if command != Use::Crossings {
+                    self.acts_before(spec.t_end)?;
+                }
+                spec
             }
         };
         if command == Use::Crossings
@@ -698,6 +703,21 @@ impl RunFlags {
         }
         spec.validate()?;
         Ok(spec)
+    }
+
+    /// Refuses restarts and kicks that come after the run's end.
+    fn acts_before(&self, t_end: f64) -> Result<(), CliError> {
+        for (flag, every) in [("--restart", self.restart), ("--kick-every", self.kick_every)] {
+            if every.is_some_and(|every| every >= t_end) {
+                let why = format!(
+                    "the run ends at t = {}, before the first one; give a later --t-end, or leave \
+                        it out",
+                    Short(t_end)
+                );
+                return Err(CliError::NoEffect { flag: flag.to_owned(), why });
+            }
+        }
+        Ok(())
     }
 
     /// Every flag that is given, --spec among them.

@@ -1,4 +1,4 @@
-//! Ctrl-C and SIGTERM: the program ends within a second, prints one line, and leaves no temporary
+//! Ctrl-C, SIGTERM and a closed terminal (SIGHUP): the program ends within a second, prints one line, and leaves no temporary
 //! files.
 //!
 //! Most programs here write every picture as soon as it is finished: for them a signal removes the
@@ -69,7 +69,7 @@ mod unix {
     use std::thread;
     use std::time::Duration;
 
-    use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
     use signal_hook::iterator::Signals;
 
     use super::{CAME, CLEAR, Exit, GRACE_MS, GRACES};
@@ -84,7 +84,12 @@ mod unix {
         // The other signals are taken over by the thread itself: where it cannot be started, they
         // are not.
         let _ = thread::Builder::new().name("signals".into()).spawn(|| {
-            if let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) {
+            let mut listened = vec![SIGINT, SIGTERM];
+            // `nohup` has it ignored, and a handler would undo that.
+            if record::files::closed_terminal_ends() {
+                listened.push(SIGHUP);
+            }
+            if let Ok(mut signals) = Signals::new(listened) {
                 wait(&mut signals);
             }
         });
@@ -92,7 +97,7 @@ mod unix {
 
     fn wait(signals: &mut Signals) {
         let Some(signal) = signals.forever().next() else { return };
-        let exit = if signal == SIGTERM { Exit::Terminated } else { Exit::Interrupted };
+        let exit = if signal == SIGINT { Exit::Interrupted } else { Exit::Terminated };
         CAME.store(exit as u8, Ordering::SeqCst);
         if GRACES.load(Ordering::SeqCst) > 0 {
             // The main thread ends the process when it has kept what it has. A second signal ends

@@ -41,6 +41,22 @@ pub fn known(name: &str) -> (String, String) {
     (near, known.join(", "))
 }
 
+/// Refuses a name that `texts`, each NAME=VALUE, give twice.
+///
+/// # Errors
+/// If there is one.
+pub fn each_once(flag: &str, texts: &[String]) -> Result<(), CliError> {
+    let name = |text: &String| text.split('=').next().unwrap_or_default().trim().to_owned();
+    let names: Vec<String> = texts.iter().map(name).collect();
+    match (1..names.len()).find(|i| names[..*i].contains(&names[*i])) {
+        Some(i) => Err(CliError::Usage(format!(
+            "{flag} \"{}\": {} is given twice; leave one of the two out",
+            texts[i], names[i]
+        ))),
+        None => Ok(()),
+    }
+}
+
 /// The general system of this name with parameters `set`, or with `any` also one with h, plus and
 /// minus, if there is one.
 ///
@@ -77,6 +93,7 @@ pub fn named(name: &str, set: &[String], any: bool) -> Result<Option<Model>, Cli
         };
         model = model.with_table(&table, &text).map_err(|e| wrong(e.to_string()))?;
     }
+    each_once("--set", set)?;
     for text in set {
         let refused = |problem: String| CliError::Usage(format!("--set \"{text}\": {problem}"));
         let Some((parameter, value)) = text.split_once('=') else {

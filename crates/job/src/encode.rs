@@ -15,7 +15,8 @@ use super::answer::{Answer, Stop};
 use super::question::Question;
 use super::shortest::shortest;
 use super::table::{Cells, Column, ColumnKind, Table, Words};
-use crate::record::hash::canonical_json;
+use crate::record::Hash;
+use crate::record::hash::{RunningHash, canonical_json};
 
 /// Bytes that cannot be decoded as an answer.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -196,7 +197,7 @@ pub fn csv_of_parts(tables: &[&Table], about: &Value) -> Vec<u8> {
 }
 
 /// The first line of [`csv()`]: column names.
-pub fn csv_head(table: &Table) -> Vec<u8> {
+fn csv_head(table: &Table) -> Vec<u8> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer
         .write_record(table.columns.iter().map(|c| &c.name))
@@ -205,16 +206,15 @@ pub fn csv_head(table: &Table) -> Vec<u8> {
 }
 
 /// The last line of [`csv()`]: metadata.
-pub fn csv_tail(table: &Table, about: &Value) -> Vec<u8> {
-    let mut bytes = COMMENT.as_bytes().to_vec();
-    bytes.extend(canonical_json(&heading(table, about)));
-    bytes.push(b'\n');
-    bytes
+fn csv_tail(table: &Table, about: &Value) -> Vec<u8> {
+    comment(&heading(table, about))
 }
 
-/// The lines between them, one for each row.
-pub fn csv_rows(table: &Table) -> Vec<u8> {
-    csv_rows_after(Vec::new(), table)
+fn comment(heading: &Heading) -> Vec<u8> {
+    let mut bytes = COMMENT.as_bytes().to_vec();
+    bytes.extend(canonical_json(heading));
+    bytes.push(b'\n');
+    bytes
 }
 
 fn csv_rows_after(mut bytes: Vec<u8>, table: &Table) -> Vec<u8> {
@@ -265,9 +265,77 @@ pub fn about_run(run: &dyn Question) -> Value {
     json!({ "kind": run.kind(), "question": run.json() })
 }
 
+/// The CSV file of a run, part by part. Its last line holds a digest of the rows and of what it says
+/// of the run.
+pub struct CsvOfRun {
+    about: Value,
+    digest: RunningHash,
+    /// Of the table that has begun.
+    heading: Option<Heading>,
+}
+
+impl CsvOfRun {
+    /// Nothing of the file that is to say this about itself.
+    pub fn new(about: Value) -> Self {
+        let mut digest = RunningHash::default();
+        digest.update(&canonical_json(&about));
+        Self { about, digest, heading: None }
+    }
+
+    /// The next lines: column names before the first rows, and one for each row.
+    pub fn rows(&mut self, table: &Table) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        if self.heading.is_none() {
+            bytes = csv_head(table);
+            self.heading = Some(heading(table, &Value::Null));
+        }
+        let bytes = csv_rows_after(bytes, table);
+        self.digest.update(&bytes);
+        bytes
+    }
+
+    /// The last line: metadata. Nothing if there were no rows and no column names.
+    pub fn tail(mut self) -> Vec<u8> {
+        let Some(heading) = self.heading else { return Vec::new() };
+        self.about[DIGEST] = json!(self.digest.finish());
+        comment(&Heading { about: self.about, ..heading })
+    }
+}
+
+const DIGEST: &str = "digest";
+
+/// The table and the description in the CSV file of a run, which nothing has changed.
+///
+/// # Errors
+/// If the file is anything else, or was changed.
+pub fn run_from_csv(bytes: &[u8]) -> Result<(Value, Table), Malformed> {
+    let (Heading { mut about, .. }, table) = from_csv(bytes)?;
+    let said = about.as_object_mut().and_then(|about| about.remove(DIGEST));
+    // The metadata's line, and one that says that the file was cut short, begin with a sign that no
+    // row begins with.
+    let rows: Vec<&[u8]> = bytes
+        .split_inclusive(|b| *b == b'\n')
+        .take_while(|line| !line.starts_with(COMMENT.as_bytes()))
+        .collect();
+    let question = canonical_json(&about);
+    unchanged(said, &Hash::of_parts([&question[..]].into_iter().chain(rows)))?;
+    Ok((about, table))
+}
+
+fn unchanged(said: Option<Value>, digest: &Hash) -> Result<(), Malformed> {
+    match said {
+        None => malformed("it has no digest of its rows, as files of version 0.2.0 have none"),
+        Some(said) if said == json!(digest) => Ok(()),
+        Some(_) => malformed("its digest is not that of its rows, which were changed"),
+    }
+}
+
 /// The CSV file of a run: its first table.
 pub fn csv_of_run(run: &dyn Question, answer: &Answer) -> Vec<u8> {
-    let mut bytes = csv(&answer.tables[0], &about_run(run));
+    let mut file = CsvOfRun::new(about_run(run));
+    let table = &answer.tables[0];
+    let mut bytes = file.rows(table);
+    bytes.extend(file.tail());
     if answer.stop == Stop::Interrupted {
         bytes.extend(cut_short(answer.stop));
     }
@@ -366,7 +434,7 @@ pub fn json(answer: &Answer, about: &Value) -> Vec<u8> {
         json!({ "name": t.name, "columns": headings(t),
             "rows": (0..t.len()).map(row).collect::<Vec<_>>() })
     };
-    let value = json!({
+    let mut value = json!({
         "made_by": concat!("twofold ", env!("CARGO_PKG_VERSION")),
         "about": about,
         "stop": answer.stop,
@@ -374,6 +442,7 @@ pub fn json(answer: &Answer, about: &Value) -> Vec<u8> {
         "statistics": answer.statistics,
         "tables": answer.tables.iter().map(table).collect::<Vec<_>>(),
     });
+    value[DIGEST] = json!(Hash::of_json(&value));
     let mut bytes = canonical_json(&value);
     bytes.push(b'\n');
     bytes
@@ -383,7 +452,7 @@ pub fn json(answer: &Answer, about: &Value) -> Vec<u8> {
 ///
 /// # Errors
 ///
-/// If the file is anything else.
+/// If the file is anything else, or was changed.
 pub fn from_json(bytes: &[u8]) -> Result<(Value, Answer), Malformed> {
     #[derive(Deserialize)]
     struct Written {
@@ -405,7 +474,11 @@ pub fn from_json(bytes: &[u8]) -> Result<(Value, Answer), Malformed> {
         Value::String(s) if s == "-inf" => Some(f64::NEG_INFINITY),
         value => value.as_f64(),
     };
-    let file: Written = serde_json::from_slice(bytes).map_err(|e| Malformed(e.to_string()))?;
+    let read = |e: serde_json::Error| Malformed(e.to_string());
+    let mut value: Value = serde_json::from_slice(bytes).map_err(read)?;
+    let said = value.as_object_mut().and_then(|file| file.remove(DIGEST));
+    unchanged(said, &Hash::of_json(&value))?;
+    let file: Written = serde_json::from_value(value).map_err(read)?;
     let mut tables = Vec::new();
     for t in file.tables {
         let mut table =
@@ -508,7 +581,7 @@ mod tests {
                 }
                 writer.write_record(None::<&[u8]>).unwrap();
             }
-            prop_assert_eq!(csv_rows(&t), writer.into_inner().unwrap());
+            prop_assert_eq!(csv_rows_after(Vec::new(), &t), writer.into_inner().unwrap());
         }
 
         #[test]
@@ -587,7 +660,13 @@ mod tests {
             ("\"inf\",-1]", "0,-1]"),
         ] {
             assert!(text.contains(from), "{from}: {text}");
-            let said = from_json(text.replace(from, to).as_bytes()).unwrap_err().to_string();
+            let changed = text.replace(from, to);
+            let said = from_json(changed.as_bytes()).unwrap_err().to_string();
+            assert!(said.contains("its digest is not that of its rows"), "{from} {to}: {said}");
+            let mut value: Value = serde_json::from_str(&changed).unwrap();
+            value.as_object_mut().unwrap().remove(DIGEST);
+            value[DIGEST] = json!(Hash::of_json(&value));
+            let said = from_json(&canonical_json(&value)).unwrap_err().to_string();
             assert!(said.contains("table a table, row"), "{from} {to}: {said}");
         }
     }
@@ -650,9 +729,18 @@ mod tests {
             .map(|numbers| table(numbers, vec!["up".into(), "down".into()]));
         for (stop, said) in [(Stop::Finished, None), (Stop::Interrupted, Some(Stop::Interrupted))] {
             let bytes = csv_of_run(&run, &Answer { stop, ..Answer::of_tables(tables.to_vec()) });
-            let (heading, back) = from_csv(&bytes).unwrap();
+            let (about, back) = run_from_csv(&bytes).unwrap();
             assert_eq!((&back, stop_of_csv(&bytes)), (&tables[0], said));
-            assert_eq!(heading.about, json!({ "kind": "run", "question": run.json() }));
+            assert_eq!(about, json!({ "kind": "run", "question": run.json() }));
+            let text = String::from_utf8(bytes).unwrap();
+            for (from, to) in [("0.1,", "0.15,"), ("up", "on"), ("\"t_end\":1.0", "\"t_end\":2.0")]
+            {
+                let changed = text.replacen(from, to, 1);
+                assert_ne!(changed, text);
+                assert!(from_csv(changed.as_bytes()).is_ok());
+                let error = run_from_csv(changed.as_bytes()).unwrap_err();
+                assert!(error.to_string().contains("which were changed"), "{error}");
+            }
         }
     }
 

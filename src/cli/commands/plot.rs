@@ -337,9 +337,9 @@ fn recorded(file: &Path) -> Result<(RunSpec, Answer), CliError> {
     let (about, answer) = if bytes.first() == Some(&b'{') {
         encode::from_json(&bytes).map_err(|e| wrong(e.to_string()))?
     } else {
-        let (heading, table) = encode::from_csv(&bytes).map_err(|e| wrong(e.to_string()))?;
+        let (about, table) = encode::run_from_csv(&bytes).map_err(|e| wrong(e.to_string()))?;
         let stop = encode::stop_of_csv(&bytes).unwrap_or(Stop::Finished);
-        (heading.about, Answer { stop, ..Answer::of_tables(vec![table]) })
+        (about, Answer { stop, ..Answer::of_tables(vec![table]) })
     };
     let question = about
         .get("question")

@@ -52,6 +52,7 @@ impl Arguments {
     pub fn question(&self) -> Result<GeneralRests, CliError> {
         let model = models::any_model(&self.system, &self.set)?;
         let names = model.coordinates();
+        models::each_once("--within", &self.within)?;
         let mut within = vec![(-10.0, 10.0); names.len()];
         for text in &self.within {
             let wrong = |why: &str| {

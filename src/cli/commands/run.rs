@@ -138,14 +138,13 @@ fn general_run(arguments: &Arguments, run: &GeneralRun) -> Result<Exit, CliError
         Some(file) => Rows::File(Growing::begin(file)?),
         None => Rows::Output,
     };
-    let (table, mut failed, mut count) = (run.table(), None, 0_u64);
+    let (mut failed, mut count) = (None, 0_u64);
+    let mut csv = encode::CsvOfRun::new(run.about());
     let found = run.stream(
         &mut |part| {
-            let mut bytes = if count == 0 { encode::csv_head(&table) } else { Vec::new() };
-            bytes.extend(encode::csv_rows(part));
             // A run that fails before its first row writes nothing.
             if !part.is_empty() {
-                failed = rows.append(&bytes).err();
+                failed = rows.append(&csv.rows(part)).err();
             }
             count += part.len() as u64;
             failed.is_none()
@@ -168,9 +167,9 @@ fn general_run(arguments: &Arguments, run: &GeneralRun) -> Result<Exit, CliError
         if let Some(error) = error {
             return Err(error);
         }
-        rows.append(&encode::csv_head(&table))?;
+        rows.append(&csv.rows(&run.table()))?;
     }
-    rows.append_last(&encode::csv_tail(&table, &run.about()))?;
+    rows.append_last(&csv.tail())?;
     let whole = matches!(stop, Stop::Finished | Stop::Found);
     if !whole {
         rows.append_last(&encode::cut_short(stop))?;
@@ -317,20 +316,14 @@ fn stream(run: &Run, out: Option<&Path>, progress: &Progress) -> Result<Exit, Cl
         Some(file) => Rows::File(Growing::begin(file)?),
         None => Rows::Output,
     };
-    let about = encode::about_run(run);
-    let (mut tail, mut failed, mut count) = (Vec::new(), None, 0);
+    let mut csv = encode::CsvOfRun::new(encode::about_run(run));
+    let (mut failed, mut count) = (None, 0);
     let monitor = job::Progress::begin(progress, &run.label(), run.extent());
     let found = simulate::stream(
         &run.0,
         &mut |table| {
-            let mut bytes = Vec::new();
-            if tail.is_empty() {
-                bytes = encode::csv_head(table);
-                tail = encode::csv_tail(table, &about);
-            }
-            bytes.extend(encode::csv_rows(table));
             count += table.len();
-            failed = rows.append(&bytes).err();
+            failed = rows.append(&csv.rows(table)).err();
             failed.is_none()
         },
         &*monitor,
@@ -351,7 +344,7 @@ fn stream(run: &Run, out: Option<&Path>, progress: &Progress) -> Result<Exit, Cl
         Ok(found) => found,
         Err(error) if count == 0 => return Err(error.into()),
         Err(error) => {
-            rows.append_last(&tail)?;
+            rows.append_last(&csv.tail())?;
             rows.append_last(&encode::cut_short(Stop::Failed))?;
             let part = file.map(part_of);
             if let Rows::File(file) = rows {
@@ -365,7 +358,7 @@ fn stream(run: &Run, out: Option<&Path>, progress: &Progress) -> Result<Exit, Cl
             });
         }
     };
-    rows.append_last(&tail)?;
+    rows.append_last(&csv.tail())?;
     let stopped = if found.stop == Stop::Interrupted { progress.asked_to_stop() } else { None };
     let Some(exit) = stopped else {
         if let Rows::File(rows) = rows {

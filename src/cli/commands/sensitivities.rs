@@ -73,6 +73,9 @@ impl Arguments {
     }
 }
 
+const ONE_SIDED: &str = "- the start lies on a switching surface: the derivatives from its two \
+    sides differ; start beside it\n";
+
 pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let question = arguments.question()?;
     let out = arguments.delivery.out.as_deref();
@@ -96,9 +99,15 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
             for (row, state) in table.words("state").enumerate() {
                 let _ = write!(text, "{state:<10}");
                 numbers.iter().for_each(|(_, column)| {
-                    let _ = write!(text, " {:>14.6e}", column[row]);
+                    let _ = match column[row] {
+                        number if number.is_nan() => write!(text, " {:>14}", "-"),
+                        number => write!(text, " {number:>14.6e}"),
+                    };
                 });
                 text.push('\n');
+            }
+            if numbers.iter().any(|(_, column)| column.iter().any(|v| v.is_nan())) {
+                text.push_str(ONE_SIDED);
             }
             text.into_bytes()
         }

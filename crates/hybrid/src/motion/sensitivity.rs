@@ -6,7 +6,7 @@
 //! parametric sensitivities: Galán, Feehery & Barton 1999, Applied Numerical Mathematics 31, 17).
 
 use super::tangent::explicit;
-use super::{Ending, Follower, HybridError, Options, Record};
+use super::{Ending, Follower, HybridError, Options, Record, same};
 use crate::Model;
 use crate::definition::{Constant, ParameterEntry, When};
 use twofold_num::Decimal;
@@ -20,10 +20,12 @@ pub struct Sensitivities {
     pub t: f64,
     /// The state then.
     pub x: Vec<f64>,
-    /// A row a state: its derivatives by the components of the start.
+    /// A row a state: its derivatives by the components of the start. NaN where those from the two
+    /// sides differ: for a component that moves the start off a switching surface on which it lies
+    /// and does not slide.
     pub by_start: Vec<Vec<f64>>,
     /// A row a state: its derivatives by the parameters, in the order in which they were asked for.
-    /// The start is held fixed.
+    /// The start is held fixed. NaN as above, for one that moves such a surface.
     pub by_parameter: Vec<Vec<f64>>,
 }
 
@@ -60,13 +62,15 @@ pub fn sensitivities(
         v
     };
     follower.begin_tangents((0..whole.len()).map(unit).collect())?;
+    let one_sided = follower.begins_between_sides();
     let (outcome, follower) = follower.run_whole(&mut |_| true)?;
     if outcome.ending != Ending::Finished {
         let why =
             format!("the run ends at t = {}, before --t-end: give a time before it", outcome.t);
         return Err(HybridError::Stuck { t: outcome.t, x: outcome.x, why });
     }
-    let vectors = follower.tangents.map_or_else(Vec::new, |t| t.vectors);
+    let mut vectors = follower.tangents.map_or_else(Vec::new, |t| t.vectors);
+    vectors.iter_mut().zip(one_sided).filter(|(_, one)| *one).for_each(|(v, _)| v.fill(f64::NAN));
     let rows =
         |columns: &[Vec<f64>]| (0..n).map(|i| columns.iter().map(|c| c[i]).collect()).collect();
     Ok(Sensitivities {
@@ -75,6 +79,46 @@ pub fn sensitivities(
         by_start: rows(&vectors[..n]),
         by_parameter: rows(&vectors[n..]),
     })
+}
+
+impl Follower<'_> {
+    /// Of each component of the start, whether it moves the start off a surface on which it lies
+    /// and does not slide, with other fields on its other side: neighbours there begin with those.
+    fn begins_between_sides(&mut self) -> Vec<bool> {
+        let n = self.n;
+        let mut between = vec![false; n];
+        self.variables[..n].copy_from_slice(&self.x);
+        self.variables[n] = self.t;
+        let (compiled, mut variables) = (self.compiled.clone(), self.variables.clone());
+        let mut watched = vec![0.0; compiled.outputs];
+        compiled.watched.evaluate(&variables, &mut watched);
+        let gradients = compiled.gradients(&variables);
+        let (mut own, mut other) = (vec![0.0; n], vec![0.0; n]);
+        compiled.field.evaluate(&variables, &mut own);
+        for guard in (0..self.slides.len()).filter(|guard| !self.slides[*guard]) {
+            let Some(place) = compiled.place(guard) else { continue };
+            let (value, side) = (watched[place], self.config.sides[guard]);
+            let across = match self.equation.guards[guard].whole {
+                true if value.fract() == 0.0 && side == value => value - 1.0,
+                true if value.fract() == 0.0 => value,
+                false if value == 0.0 => -side,
+                _ => continue,
+            };
+            let mut config = self.config.clone();
+            config.sides[guard] = across;
+            variables[n + 1 + guard] = across;
+            self.equation.compiled(&config).field.evaluate(&variables, &mut other);
+            variables[n + 1 + guard] = side;
+            if same(&own, &other) {
+                continue;
+            }
+            let moved = gradients[place].iter().zip(&compiled.touches[place]);
+            moved
+                .filter(|(slope, variable)| **variable < n && **slope != 0.0)
+                .for_each(|(_, variable)| between[*variable] = true);
+        }
+        between
+    }
 }
 
 /// The parameters that have derivatives: all but those that set times of events.
@@ -196,6 +240,27 @@ mod tests {
         direction = "down"
         set = { v = "-0.5*twice*v" }
     "#;
+
+    /// Coulomb friction from rest: a neighbour with v > 0 turns back at once.
+    #[test]
+    fn a_start_on_a_surface_has_two_derivatives() {
+        let text = "states = ['x', 'v']\nf = ['v', '-x - F*sign(v)']\n[parameters]\nF = 1";
+        let from = |v: f64| {
+            let options = Options { start: Some(vec![4.5, v]), ..at(2.0) };
+            sensitivities(&model(text), &options, &["F"]).unwrap()
+        };
+        let on = from(0.0);
+        let (cos, sin) = (2.0_f64.cos(), 2.0_f64.sin());
+        assert!(on.by_start.iter().all(|row| row[1].is_nan()), "{on:?}");
+        for (found, right) in [
+            (on.by_start[0][0], cos),
+            (on.by_start[1][0], -sin),
+            (on.by_parameter[0][0], 1.0 - cos),
+            (from(-1e-9).by_start[0][1], sin),
+        ] {
+            assert!((found - right).abs() < 1e-6, "{found}, right: {right}");
+        }
+    }
 
     #[test]
     fn a_ball_after_one_impact() {

@@ -520,6 +520,17 @@ fn at_most(stream: impl Read, limit: u64) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
+/// Whether a closed terminal ends this process: on Linux, unless the signal is ignored, as under
+/// `nohup`. False elsewhere, where that is not known.
+pub fn closed_terminal_ends() -> bool {
+    // Signals that are ignored, as a bit mask; that of SIGHUP is the lowest.
+    let ignored = |status: &str| {
+        let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"))?;
+        Some(u64::from_str_radix(mask.trim(), 16).ok()? & 1 != 0)
+    };
+    fs::read_to_string("/proc/self/status").is_ok_and(|status| ignored(&status) == Some(false))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -37,6 +37,22 @@ impl From<Hash> for String {
     }
 }
 
+/// The digest of bytes that come in parts.
+#[derive(Clone, Debug, Default)]
+pub struct RunningHash(Sha256);
+
+impl RunningHash {
+    /// The next bytes.
+    pub fn update(&mut self, bytes: &[u8]) {
+        self.0.update(bytes);
+    }
+
+    /// The digest of all of them.
+    pub fn finish(self) -> Hash {
+        Hash::finish(self.0)
+    }
+}
+
 impl Hash {
     /// The digest of some bytes.
     pub fn of(bytes: &[u8]) -> Self {
