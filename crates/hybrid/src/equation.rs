@@ -34,7 +34,7 @@ pub struct Guard {
 pub struct Configuration {
     /// The mode's number.
     pub mode: usize,
-    /// For each guard -1 or +1, or a whole number.
+    /// For each guard -1 or +1, 0 if it rests at zero; of whole parts a whole number.
     pub sides: Vec<f64>,
     /// For each table the piece.
     pub pieces: Vec<usize>,
@@ -427,7 +427,12 @@ impl Equation {
 
     fn positive(&self, e: &Expression, at: &Configuration) -> bool {
         let (i, flipped) = self.guard(e, false);
-        (at.sides[i] > 0.0) != flipped
+        !self.rests(i, at) && (at.sides[i] > 0.0) != flipped
+    }
+
+    /// Whether a guard rests at zero: comparisons see equality, and a sign is 0.
+    pub(crate) fn rests(&self, guard: usize, at: &Configuration) -> bool {
+        at.sides[guard] == 0.0 && !self.guards[guard].whole
     }
 
     /// The value of an expression at a state, following conditions by the numbers themselves.
@@ -462,9 +467,17 @@ impl Equation {
         key.extend(
             self.guards.iter().zip(&at.sides).filter(|(g, _)| g.chooses).map(|(_, s)| *s as i8),
         );
+        let numbers = |guards: &[usize]| -> Vec<i8> {
+            guards.iter().flat_map(|g| (*g as u32).to_le_bytes()).map(|b| b as i8).collect()
+        };
+        let rest: Vec<usize> = (0..self.guards.len()).filter(|g| self.rests(*g, at)).collect();
+        if !rest.is_empty() {
+            key.push(i8::MAX);
+            key.extend(numbers(&rest));
+        }
         if !also.is_empty() {
             key.push(i8::MIN);
-            key.extend(also.iter().flat_map(|g| (*g as u32).to_le_bytes()).map(|b| b as i8));
+            key.extend(numbers(also));
         }
         if let Some(found) = self.known.borrow().get(&key) {
             return found.clone();
@@ -844,10 +857,11 @@ impl Writer<'_> {
         }
     }
 
-    fn side(&mut self, e: &Expression) -> Recorded {
+    /// The sign of an expression; none if it rests at zero.
+    fn side(&mut self, e: &Expression) -> Option<Recorded> {
         let (i, flipped) = self.ask(e, false);
         let side = self.v[self.equation.dimension() + 1 + i];
-        if flipped { -side } else { side }
+        (!self.equation.rests(i, self.at)).then_some(if flipped { -side } else { side })
     }
 
     fn whole(&mut self, e: &Expression) -> Recorded {
@@ -856,8 +870,8 @@ impl Writer<'_> {
     }
 
     fn positive(&mut self, e: &Expression) -> bool {
-        let (i, flipped) = self.ask(e, false);
-        (self.at.sides[i] > 0.0) != flipped
+        self.ask(e, false);
+        self.equation.positive(e, self.at)
     }
 
     fn condition(&mut self, e: &Expression) -> bool {
@@ -913,8 +927,11 @@ impl Writer<'_> {
             Expression::Div(a, b) => self.number(a) / self.number(b),
             Expression::Power(a, n) => self.number(a).power(*n),
             Expression::RealPower(a, b) => power(self.number(a), self.number(b)),
-            Expression::Call(Function::Sign, a) => self.side(a),
-            Expression::Call(Function::Abs, a) => self.side(a) * self.number(a),
+            Expression::Call(Function::Sign, a) => self.side(a).unwrap_or(Recorded::zero()),
+            Expression::Call(Function::Abs, a) => match self.side(a) {
+                Some(side) => side * self.number(a),
+                None => Recorded::zero(),
+            },
             Expression::Call(f, a) => {
                 let value = self.number(a);
                 f.apply(value)
@@ -955,7 +972,10 @@ impl Writer<'_> {
                     self.number(&list[0])
                 }
             }
-            General::Heaviside => (self.side(&list[0]) + Recorded::one()).scale(0.5),
+            General::Heaviside => match self.side(&list[0]) {
+                Some(side) => (side + Recorded::one()).scale(0.5),
+                None => Recorded::one(),
+            },
             General::Floor => self.whole(&list[0]),
             General::Mod => {
                 let whole = self.whole(&quotient(list));

@@ -155,8 +155,8 @@ pub struct Point<'a> {
     pub x: &'a [f64],
     /// The mode's number.
     pub mode: usize,
-    /// For each switching function +, - or 0 (slid upon); . where the equations do not ask it here.
-    /// Whole parts stand as #.
+    /// For each switching function +, - or 0 (slid upon, or at rest at zero); . where the equations
+    /// do not ask it here. Whole parts stand as #.
     pub signs: &'a str,
     /// The event that happens here.
     pub event: Option<&'a str>,
@@ -845,6 +845,9 @@ impl<'a> Follower<'a> {
                 }
                 return Err(self.left_domain(self.t, &step.x.clone()));
             };
+            if self.leaves_rest(&step) {
+                continue;
+            }
             let stopped = to_stop && !rejected;
             let most = if rejected { 1.2 } else { 5.0 };
             let h_next = match self.options.method {
@@ -954,6 +957,38 @@ impl<'a> Follower<'a> {
                 return Ok(ending);
             }
         }
+    }
+
+    /// Whether a function that rests at zero is not zero at a step's end: the step is to be made
+    /// again, with the function on the side where it is then.
+    fn leaves_rest(&mut self, step: &Step) -> bool {
+        let active = self.compiled.active.iter().enumerate();
+        let resting: Vec<(usize, usize)> = active
+            .map(|(place, guard)| (place, *guard))
+            .filter(|(_, guard)| self.equation.rests(*guard, &self.config))
+            .collect();
+        if resting.is_empty() {
+            return false;
+        }
+        self.variables[..self.n].copy_from_slice(&step.y);
+        self.variables[self.n] = step.t + step.h;
+        let mut values = vec![0.0; self.compiled.outputs];
+        self.compiled.watched.evaluate(&self.variables, &mut values);
+        let mut config = self.config.clone();
+        for (place, guard) in resting {
+            let small = 1e-13 * self.magnitude(&self.equation.guards[guard].expression);
+            if values[place].abs() > small {
+                config.sides[guard] = values[place].signum();
+                self.fresh_guard[guard] = true;
+            }
+        }
+        let leaves = config != self.config;
+        if leaves {
+            self.ask_new(&mut config);
+            let sliding = self.sliding.clone();
+            self.adopt(config, sliding);
+        }
+        leaves
     }
 
     /// Makes a step of at most this length that the tolerance allows and that has seen what there

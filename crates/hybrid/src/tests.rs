@@ -1030,6 +1030,7 @@ fn sides_follow_the_sides_that_they_depend_on() {
         ("-clip(10*sign(x), -1, 1)", 1.0, 3.0, 0.0),
         ("-sign(floor(x) + 0.5)", 0.7, 3.0, 0.0),
         ("-0.5 - heaviside(if(x > 0, -0.5*x, 1))", 1.0, 4.0, -3.0),
+        ("-0.5 - heaviside(if(x > 0, -0.5*x, mod(x, 2)))", 1.0, 4.0, -3.0),
         ("-1 - 0.5*floor(0.5 + 0.3*sign(x))", 1.0, 3.0, -2.0),
     ] {
         for method in [Method::Dopri5, Method::Radau5, Method::Taylor] {
@@ -1040,6 +1041,50 @@ fn sides_follow_the_sides_that_they_depend_on() {
             assert!((outcome.x[0] - want).abs() < 1e-9, "{method:?} {} {text}", outcome.x[0]);
         }
     }
+}
+
+/// A switching function that is zero on a whole side of another rests there: its sign is 0, and it
+/// is not greater than zero.
+#[test]
+fn functions_may_be_zero_on_one_side() {
+    for (f, start, t_end, want) in [
+        ("'-1', 'abs(max(x, 0))'", 1.0, 3.0, 0.5),
+        ("'-1', 'if(max(x, 0) > 0, 1, 2)'", 1.0, 3.0, 5.0),
+        ("'1', 'if(max(x, 0) > 0, 1, 2)'", -1.0, 3.0, 4.0),
+        ("'-1', 'heaviside(max(x, 0))'", 1.0, 3.0, 3.0),
+        ("'1', 'heaviside(max(x, 0))'", -1.0, 3.0, 3.0),
+        ("'-1', 'sign(max(x, 0))'", 1.0, 3.0, 1.0),
+        ("'1', 'sign(max(x, 0))'", -1.0, 3.0, 2.0),
+        ("'-1', 'clip(max(1, x + 0.5), 0, 1)'", 1.0, 3.0, 3.0),
+        ("'-1', 'sign(abs(x) - x)'", 1.0, 3.0, 2.0),
+        ("'1', 'sign(abs(x) - x)'", -1.0, 3.0, 1.0),
+        ("'1', 'if(abs(x) - x >= 0, 2, 0)'", -1.0, 3.0, 6.0),
+        ("'1', '1 + 0.5*clip(abs(min(x, 0)), -1, 0)'", -1.0, 2.0, 2.0),
+        // Fields that a function at rest decides.
+        ("'0.5 - heaviside(max(x, 0))', '1'", 1.0, 3.0, 3.0),
+        ("'-sign(x)', '1 + abs(max(x, 0))'", 1.0, 3.0, 3.5),
+    ] {
+        for method in [Method::Dopri5, Method::Radau5, Method::Taylor] {
+            let text = format!("states = ['x', 'y']\nstart = [{start}, 0]\nf = [{f}]");
+            let options = Options { t_end, method, ..Options::default() };
+            let outcome = follow(&model(&text), &options, &mut |_| true)
+                .unwrap_or_else(|e| panic!("{method:?}: {e}\n{text}"));
+            assert!((outcome.x[1] - want).abs() < 1e-9, "{method:?} {:?} {text}", outcome.x);
+        }
+    }
+    let one = |f: &str, start: f64, t_end| {
+        last(&format!("states = ['x']\nstart = [{start}]\nf = ['{f}']"), t_end)
+    };
+    // x' = -0.5 - x to x = 0 at ln 3, then -0.5.
+    near(one("-0.5 - abs(max(x, 0))", 1.0, 3.0), -0.5 * (3.0 - 3.0_f64.ln()), 1e-9);
+    // 0.5 + abs(-1) = 1.5 from x = 0 on, and before, where clip ends at 1.
+    near(one("0.5 + clip(abs(min(x - 1, -1)), -1, 1)", -1.0, 1.0), 0.5, 1e-9);
+    // A counter that nothing counts.
+    let counter =
+        |f: &str| last(&format!("states = ['n', 'y']\nstart = [0, 0]\nf = ['0', '{f}']"), 2.0);
+    near(counter("1 + sign(n)"), 2.0, 1e-12);
+    near(counter("1 + heaviside(n)"), 4.0, 1e-12);
+    near(counter("if(n > 0, 1, 0) + if(n >= 0, 2, 0)"), 4.0, 1e-12);
 }
 
 /// A switching function that comes to zero and turns back is not passed.

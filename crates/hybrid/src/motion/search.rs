@@ -28,7 +28,7 @@ impl Follower<'_> {
         self.bound(step, &mut ranges);
         for (place, guard) in compiled.active.iter().enumerate() {
             let side = self.config.sides[*guard];
-            if self.slides[*guard] {
+            if self.slides[*guard] || self.equation.rests(*guard, &self.config) {
                 continue;
             }
             if self.equation.guards[*guard].whole {

@@ -2,6 +2,8 @@
 
 use std::collections::HashMap;
 
+use twofold_system::expression::{Function, General};
+
 use super::*;
 
 /// Most surfaces on which a rule chooses a mixture.
@@ -31,6 +33,14 @@ impl Follower<'_> {
                     Some(i) => self.size[i].max(self.x[i].abs()),
                     None => self.equation.value(e, self.t, &self.x).abs(),
                 }
+            }
+            // One of several numbers, at a place where it may change to another.
+            Expression::Call(Function::Abs, a) => self.magnitude(a),
+            Expression::Apply(General::Min | General::Max | General::Clip, list) => {
+                list.iter().map(|e| self.magnitude(e)).fold(0.0, f64::max)
+            }
+            Expression::Apply(General::If, list) => {
+                list[1..].iter().map(|e| self.magnitude(e)).fold(0.0, f64::max)
             }
             other => self.equation.value(other, self.t, &self.x).abs(),
         }
@@ -188,12 +198,111 @@ impl Follower<'_> {
         self.decide(zero, &kept)
     }
 
+    /// Adds to the functions that are met at zero those that rest there, and those that the
+    /// equations ask only beyond one of them and that are zero, too.
+    fn add_what_is_zero(&mut self, zero: &mut Vec<usize>) {
+        if zero.is_empty() {
+            return;
+        }
+        let active = self.compiled.active.iter().copied();
+        let rest = active.filter(|g| self.equation.rests(*g, &self.config) && !zero.contains(g));
+        let rest: Vec<usize> = rest.collect();
+        zero.extend(rest);
+        let mut known = 0;
+        while known < zero.len() {
+            let guard = zero[known];
+            known += 1;
+            if !self.equation.chooses(guard) {
+                continue;
+            }
+            for side in [self.low(guard), self.high(guard)] {
+                let mut config = self.config.clone();
+                config.sides[guard] = side;
+                self.ask_new(&mut config);
+                for other in &self.equation.compiled(&config).active {
+                    let is_new = self.compiled.place(*other).is_none() && !zero.contains(other);
+                    if is_new && self.side_of(*other).is_none() {
+                        zero.push(*other);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Gives the functions in `zero` that are zero all along on the lower sides that they are on,
+    /// and that nothing leads or presses there, the side of what rests at zero: max(x, 0) where x
+    /// is negative, a counter that nothing counts.
+    fn let_rest(&mut self, config: &mut Configuration, zero: &[usize], sliding: &[usize]) {
+        let stays = |follower: &mut Self, config: &Configuration, guard: usize| {
+            let (compiled, rates) = follower.rates_with(config, &[guard]);
+            compiled.place(guard).is_some_and(|p| {
+                rates.terms[p] == 0.0
+                    && rates.second[p] == 0.0
+                    && follower.is_zero_a_little_later(config, guard)
+            })
+        };
+        for _ in 0..zero.len() {
+            let mut changed = false;
+            for guard in zero.iter().copied().filter(|g| !sliding.contains(g)) {
+                if self.equation.guards[guard].whole
+                    || config.sides[guard] != self.low(guard)
+                    || !stays(self, config, guard)
+                {
+                    continue;
+                }
+                let [mut at_zero, mut beyond] = [config.clone(), config.clone()];
+                (at_zero.sides[guard], beyond.sides[guard]) = (0.0, self.high(guard));
+                self.ask_new(&mut at_zero);
+                self.ask_new(&mut beyond);
+                let (compiled, rates) = self.rates_with(&beyond, &[guard]);
+                let pressed = compiled.place(guard).is_some_and(|p| rates.direction(p) < 0.0);
+                if !pressed && stays(self, &at_zero, guard) {
+                    *config = at_zero;
+                    changed = true;
+                }
+            }
+            if !changed {
+                return;
+            }
+        }
+    }
+
+    /// Whether a function is zero, and a short time of motion in this configuration later still.
+    fn is_zero_a_little_later(&mut self, config: &Configuration, guard: usize) -> bool {
+        const BRIEF: f64 = 0.01;
+        let compiled = self.equation.compiled_with(config, &[guard]);
+        let Some(place) = compiled.place(guard) else { return false };
+        let mut variables = self.load(config);
+        let mut field = |t: f64, x: &[f64]| {
+            variables[..x.len()].copy_from_slice(x);
+            variables[x.len()] = t;
+            let mut out = vec![0.0; x.len()];
+            compiled.field.evaluate(&variables, &mut out);
+            out
+        };
+        let now = field(self.t, &self.x);
+        let moves = now.iter().zip(&self.size).filter(|(f, size)| **f != 0.0 && **size != 0.0);
+        let left = self.options.t_end - self.t;
+        let brief = BRIEF * moves.map(|(f, size)| size / f.abs()).fold(left, f64::min);
+        let later = a_little_later(&mut field, self.t, &self.x, brief);
+        let small = 1e-14 * self.magnitude(&self.equation.guards[guard].expression);
+        let mut is_zero = |t: f64, x: &[f64]| {
+            variables[..x.len()].copy_from_slice(x);
+            variables[x.len()] = t;
+            let mut values = vec![0.0; compiled.outputs];
+            compiled.watched.evaluate(&variables, &mut values);
+            values[place].abs() <= small
+        };
+        is_zero(self.t, &self.x) && is_zero(self.t + brief, &later)
+    }
+
     /// The same, where what is slid upon is decided, too, but for the guards in `kept`.
     pub(super) fn decide(&mut self, zero: &[usize], kept: &[bool]) -> Result<(), HybridError> {
         self.rests = false;
         // Only what the equations ask here; what they do not ask keeps its side until it is asked.
-        let zero: Vec<usize> =
+        let mut zero: Vec<usize> =
             zero.iter().copied().filter(|g| self.compiled.place(*g).is_some()).collect();
+        self.add_what_is_zero(&mut zero);
         if zero.is_empty() {
             let config = self.config.clone();
             self.adopt(config, Vec::new());
@@ -211,6 +320,7 @@ impl Follower<'_> {
             }
             follower.ask_new(&mut config);
             follower.follow_sides(&mut config, &zero);
+            follower.let_rest(&mut config, &zero, &[]);
             let own = follower.equation.compiled(&config);
             let asked: Vec<bool> = zero.iter().map(|g| own.place(*g).is_some()).collect();
             let (compiled, rates) = follower.rates_with(&config, &others(&zero, &asked));
@@ -295,7 +405,9 @@ impl Follower<'_> {
                     let made = vertex(follower, &all);
                     cache.insert(plus.clone(), made);
                 }
-                let (_, place, rates, asked) = &cache[&plus];
+                let (config, place, rates, asked) = &cache[&plus];
+                let rests: Vec<bool> =
+                    set.iter().map(|i| follower.equation.rests(zero[*i], config)).collect();
                 let first: Vec<f64> =
                     set.iter().map(|i| place[*i].map_or(f64::NAN, |p| rates.first[p])).collect();
                 let direction: Vec<f64> =
@@ -305,27 +417,20 @@ impl Follower<'_> {
                     .iter()
                     .map(|i| place[*i].map_or(f64::NAN, |p| rates.first_or_zero(p)))
                     .collect();
-                (rates.field.clone(), first, direction, asked, first_or_zero)
+                (rates.field.clone(), first, direction, asked, first_or_zero, rests)
             };
             // Fields that are the same on both sides decide nothing and need nothing decided.
             if set.len() == 1 {
                 let (low, _, d0, ..) = at(self, vec![false]);
                 let (high, _, d1, ..) = at(self, vec![true]);
+                if at(self, vec![false]).5[0] && d1[0] == 0.0 {
+                    ways[set[0]] = Way::Minus;
+                    continue;
+                }
                 if same(&low, &high) {
                     let side = if d1[0] != 0.0 { d1[0] } else { d0[0] };
                     let present = self.config.sides[zero[set[0]]];
                     let plus = if side != 0.0 { side > 0.0 } else { present == highs[set[0]] };
-                    ways[set[0]] = if plus { Way::Plus } else { Way::Minus };
-                    continue;
-                }
-                // A comparison of what rests, such as a counter: equality is what it says.
-                let guard = zero[set[0]];
-                let rests = |follower: &mut Self, plus: bool| {
-                    let (_, place, rates, _) = vertex(follower, &|i| i == set[0] && plus);
-                    place[set[0]].is_some_and(|p| rates.terms[p] == 0.0 && rates.second[p] == 0.0)
-                };
-                if self.equation.chooses(guard) && rests(self, false) && rests(self, true) {
-                    let plus = self.config.sides[guard] == highs[set[0]];
                     ways[set[0]] = if plus { Way::Plus } else { Way::Minus };
                     continue;
                 }
@@ -344,7 +449,11 @@ impl Follower<'_> {
                 if (0..set.len()).any(misses) {
                     return false;
                 }
-                let (_, base, direction, mut asked, _) = at(self, plus.clone());
+                let (_, base, direction, mut asked, _, rests) = at(self, plus.clone());
+                // What is zero all along on the side of another is no surface there.
+                if slides.iter().any(|s| rests[*s]) {
+                    return false;
+                }
                 let mut columns = Vec::new();
                 for s in &slides {
                     let mut flipped = plus.clone();
@@ -358,7 +467,7 @@ impl Follower<'_> {
                     _ if jumped[set[i]].is_some() => true,
                     Way::Plus => d > 0.0,
                     // A function that is not asked there and stays zero changes nothing.
-                    Way::Minus => d < 0.0 || d == 0.0 && !asked[i],
+                    Way::Minus => d < 0.0 || d == 0.0 && (!asked[i] || rests[i]),
                     Way::Stay => true,
                 };
                 if slides.is_empty() {
@@ -388,7 +497,7 @@ impl Follower<'_> {
                     for vertex in 0..1_usize << m {
                         let mut on = plus.clone();
                         slides.iter().enumerate().for_each(|(i, s)| on[*s] = vertex >> i & 1 == 1);
-                        let (field, rates, .., first_or_zero) = at(self, on);
+                        let (field, rates, .., first_or_zero, _) = at(self, on);
                         fields.push(field);
                         speeds.push(rates);
                         clear.push(slides.iter().map(|s| first_or_zero[*s]).collect::<Vec<_>>());
@@ -562,6 +671,7 @@ impl Follower<'_> {
         }
         self.ask_new(&mut config);
         self.follow_sides(&mut config, &zero);
+        self.let_rest(&mut config, &zero, &sliding);
         sliding.sort_unstable();
         self.adopt(config, sliding);
         let left = self.leave_by_jump(&zero, &before);
@@ -594,7 +704,10 @@ impl Follower<'_> {
                 return Err(self.no_mixture(&self.sliding));
             }
         }
-        self.no_side_is_left_open(&zero)?;
+        if let Err(open) = self.no_side_is_left_open(&zero) {
+            let undecided = self.options.intersection == Intersection::Undecided;
+            return if undecided && self.comes_to_rest(self.t) { Ok(()) } else { Err(open) };
+        }
         self.follow_jumps(&zero)
     }
 
@@ -705,7 +818,7 @@ impl Follower<'_> {
             self.variables[self.n] = t;
             let side = self.config.sides[guard];
             let mut other = self.config.clone();
-            other.sides[guard] = -side;
+            other.sides[guard] = if side == 0.0 { 1.0 } else { -side };
             self.ask_new(&mut other);
             let (here, there) =
                 (self.rates(&self.config.clone()).1.field, self.rates(&other).1.field);

@@ -54,7 +54,7 @@ impl Follower<'_> {
             .enumerate()
             .map(|(i, guard)| match () {
                 () if self.compiled.place(i).is_none() => '.',
-                () if self.slides[i] => '0',
+                () if self.slides[i] || self.equation.rests(i, &self.config) => '0',
                 () if guard.whole => '#',
                 () if self.config.sides[i] > 0.0 => '+',
                 () => '-',
