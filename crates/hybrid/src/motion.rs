@@ -423,12 +423,17 @@ struct Follower<'a> {
     noisy: bool,
     /// Sign of each watched expression; 0 if it stays at zero.
     watch_side: Vec<f64>,
+    /// Whether each watched expression is held at zero: by surfaces that are slid upon, or because
+    /// only switches move it.
+    held: Vec<bool>,
     /// Guards and watched expressions that left zero at the step's beginning.
     fresh_guard: Vec<bool>,
     fresh_watch: Vec<bool>,
     /// Of each guard whose zero was slid upon until now, by how much the speeds of its two sides
-    /// differ.
+    /// differ; and the same of each watched expression held there, with the sign of the side that
+    /// it leaves to.
     left: Vec<f64>,
+    left_watch: Vec<f64>,
     /// The event of each watched expression; none for a section.
     event_of: Vec<Option<usize>>,
     /// Whether each event's condition holds.
@@ -701,9 +706,11 @@ impl<'a> Follower<'a> {
             rests: false,
             noisy: false,
             watch_side: vec![0.0; watched],
+            held: vec![false; watched],
             fresh_guard: vec![false; guards],
             fresh_watch: vec![false; watched],
             left: vec![0.0; guards],
+            left_watch: vec![0.0; watched],
             event_of,
             holds: vec![false; events.len()],
             size: x.iter().map(|v| v.abs()).collect(),

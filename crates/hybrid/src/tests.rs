@@ -1485,6 +1485,46 @@ fn conditions_are_met_again_after_resets() {
     near(end(slides, 10.5)[0], 1.5, 1e-12);
 }
 
+/// A section is crossed where its expression comes to zero or jumps over it; while it stays at zero
+/// it is not, and where it leaves to the side that it came from it is crossed back.
+#[test]
+fn a_section_that_is_slid_upon_is_crossed_once_each_way() {
+    let quadratic = |p: f64, q: f64| -p / 2.0 + (p * p / 4.0 - q).sqrt();
+    // 1 - 1.5 t + t^2/4 = 0 and 1.5 t + t^2/4 = 1: sliding from there until t = 3.
+    let (from_above, from_below) = (3.0 - 5.0_f64.sqrt(), quadratic(6.0, -4.0));
+    for (f, start, section, want) in [
+        ("-sign(x)", 1.0, "x", vec![(1.0, -1.0)]),
+        ("-1.5*sign(x) + 0.5*t", 1.0, "x", vec![(from_above, -1.0), (3.0, 1.0)]),
+        ("-1.5*sign(x) + 0.5*t", 1.0, "-2*x*(1 + t)", vec![(from_above, 1.0), (3.0, -1.0)]),
+        ("-1.5*sign(x) + 0.5*t", -1.0, "x", vec![(from_below, 1.0)]),
+        ("1", 0.0, "floor(x) - 2", vec![(2.0, 1.0)]),
+        ("-1", 5.5, "floor(x) - 2", vec![(2.5, -1.0)]),
+        ("1", 0.0, "sign(x - 2)", vec![(2.0, 1.0)]),
+        ("1", 0.0, "(x - 3)*sign(x - 1)", vec![(1.0, -1.0), (3.0, 1.0)]),
+        ("-1", 2.0, "max(x, 1) - 1", vec![(1.0, -1.0)]),
+    ] {
+        for method in [Method::Dopri5, Method::Radau5, Method::Taylor] {
+            let text = format!("states = ['x']\nstart = [{start}]\nf = ['{f}']");
+            let record = twofold_system::Expression::parse_general(section, &["x"]).unwrap();
+            let options = Options {
+                t_end: 5.0,
+                method,
+                record: Record::Section(record),
+                ..Options::default()
+            };
+            let mut rows = Vec::new();
+            follow(&model(&text), &options, &mut |p| {
+                rows.push((p.t, p.direction.unwrap()));
+                true
+            })
+            .unwrap();
+            let fits = rows.len() == want.len()
+                && rows.iter().zip(&want).all(|(a, b)| (a.0 - b.0).abs() < 1e-9 && a.1 == b.1);
+            assert!(fits, "{method:?} {section} {rows:?} {want:?} {text}");
+        }
+    }
+}
+
 /// Conditions at equality: a counter is at least 5 when it is 5, and not above.
 #[test]
 fn counters_are_compared_as_they_are_written() {

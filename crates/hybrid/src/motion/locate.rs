@@ -84,12 +84,20 @@ impl Follower<'_> {
         }
         let Some(place) = self.place_of(sought) else { return 0.0 };
         let terms = self.rates(&self.config.clone()).1.terms;
-        // A surface that sliding has just left is tangent to the motion.
-        let left = if let Sought::Guard { guard, .. } = sought { self.left[guard] } else { 0.0 };
-        if change.abs() > SMALLEST_SLOPE * h * terms[place].max(left) {
+        if change.abs() > SMALLEST_SLOPE * h * terms[place].max(self.left(sought)) {
             return 0.0;
         }
         change
+    }
+
+    /// The speed by which rounding of a slope is measured where sliding has just left a surface: the
+    /// motion is tangent to it.
+    fn left(&self, sought: Sought) -> f64 {
+        match sought {
+            Sought::Guard { guard, .. } => self.left[guard],
+            Sought::Watched(i) => self.left_watch[i].abs(),
+            _ => 0.0,
+        }
     }
 
     /// Adds the first zero of each function's Taylor series; returns the values at the step's end
@@ -114,10 +122,7 @@ impl Follower<'_> {
             let begins = (self.is_fresh(*sought) && !far).then(|| {
                 let terms =
                     self.place_of(*sought).and_then(|place| terms.get(place)).unwrap_or(&0.0);
-                // A surface that sliding has just left is tangent to the motion.
-                let left =
-                    if let Sought::Guard { guard, .. } = sought { self.left[*guard] } else { 0.0 };
-                SMALLEST_SLOPE * step.h * terms.max(left)
+                SMALLEST_SLOPE * step.h * terms.max(self.left(*sought))
             });
             let one = [(*sought, *side)];
             let mut f = |theta: f64| {

@@ -15,6 +15,7 @@ impl Follower<'_> {
         let mut passed = Vec::new();
         let mut crossed = Vec::new();
         let (mut leave, mut opened) = (Vec::new(), Vec::new());
+        let held = self.held.clone();
         for sought in met {
             match *sought {
                 Sought::Guard { guard, .. } => {
@@ -24,37 +25,9 @@ impl Follower<'_> {
                     crossed.push(guard);
                 }
                 Sought::Watched(i) => {
-                    let side = self.watch_side[i];
                     passed.push(i);
-                    match self.event_of[i] {
-                        None => {
-                            let (mode, signs, direction) =
-                                (self.config.mode, &self.signs, Some(-side));
-                            let point = Point {
-                                t: self.t,
-                                x: &self.x,
-                                mode,
-                                signs,
-                                event: None,
-                                direction,
-                            };
-                            if !observe(&point) {
-                                return Ok(Some(Ending::Interrupted));
-                            }
-                        }
-                        Some(event) => {
-                            let When::Zero(_, direction) = &definition.events()[event].when else {
-                                continue;
-                            };
-                            let wanted = match direction {
-                                Direction::Both => true,
-                                Direction::Up => side < 0.0,
-                                Direction::Down => side > 0.0,
-                            };
-                            if wanted {
-                                fired.push(event);
-                            }
-                        }
+                    if !self.pass(i, definition, &mut fired, observe) {
+                        return Ok(Some(Ending::Interrupted));
                     }
                 }
                 // It is not zero there.
@@ -92,19 +65,29 @@ impl Follower<'_> {
             self.trains[contact.event] = Train::default();
         }
         self.left.fill(0.0);
+        self.left_watch.fill(0.0);
         if !leave.is_empty() {
             if self.ends_inside() {
                 return Err(self.no_mixture(&self.sliding));
             }
-            for (guard, _) in &leave {
-                let speed = |follower: &mut Self, side: f64| {
+            for (guard, plus) in &leave {
+                let rates = |follower: &mut Self, side: f64| {
                     let mut config = follower.config.clone();
                     config.sides[*guard] = side;
                     let (compiled, rates) = follower.rates(&config);
-                    compiled.place(*guard).map_or(0.0, |place| rates.first[place])
+                    let own = compiled.place(*guard).map_or(0.0, |place| rates.first[place]);
+                    (own, rates.first[compiled.active.len()..].to_vec())
                 };
                 let (low, high) = (self.low(*guard), self.high(*guard));
-                self.left[*guard] = (speed(self, high) - speed(self, low)).abs();
+                let ((high, all_high), (low, all_low)) = (rates(self, high), rates(self, low));
+                self.left[*guard] = (high - low).abs();
+                for (i, (all_high, all_low)) in all_high.iter().zip(&all_low).enumerate() {
+                    let change = all_high - all_low;
+                    if change.abs() > self.left_watch[i].abs() {
+                        let with = change * (high - low) > 0.0;
+                        self.left_watch[i] = if with == *plus { 1.0 } else { -1.0 } * change.abs();
+                    }
+                }
             }
             self.outcome.switches += 1;
             let mut config = self.config.clone();
@@ -119,6 +102,7 @@ impl Follower<'_> {
             self.adopt(config, rest);
         }
         let mut accumulates = None;
+        let switches = !(crossed.is_empty() && leave.is_empty());
         if !crossed.is_empty() {
             self.outcome.switches += 1;
             let sides = self.config.sides.clone();
@@ -134,13 +118,20 @@ impl Follower<'_> {
                 let found = self.switch_trains[guard].note(self.t, 0.0);
                 accumulates = accumulates.or(found.map(|(t, error)| (guard, t, error)));
             }
-            self.watch_jumps(definition, &mut passed, &mut fired);
+        }
+        let jumps = if switches { self.watch_jumps(&held, &passed) } else { Vec::new() };
+        for (i, _) in &jumps {
+            passed.push(*i);
+            if !self.pass(*i, definition, &mut fired, observe) {
+                return Ok(Some(Ending::Interrupted));
+            }
         }
         for i in passed {
             let old = self.watch_side[i];
             self.watch_side[i] = -old;
             self.fresh_watch[i] = true;
         }
+        jumps.iter().for_each(|(i, away)| self.fresh_watch[*i] = !away);
         fired.extend(self.new_conditions(definition));
         if let Some((guard, t, error)) = accumulates.filter(|_| fired.is_empty()) {
             if self.comes_to_rest(t) {

@@ -46,6 +46,9 @@ impl Follower<'_> {
         }
         for (i, side) in self.watch_side.iter().enumerate() {
             let place = compiled.active.len() + i;
+            if self.held[i] {
+                continue;
+            }
             if *side != 0.0
                 && !self.fresh_watch[i]
                 && self.stays_away(step, &ranges, place, 0.0, *side)

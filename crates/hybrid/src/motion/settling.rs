@@ -938,33 +938,90 @@ impl Follower<'_> {
         Err(HybridError::Stuck { t: self.t, x: self.x.clone(), why })
     }
 
-    /// Watched expressions that a switch made jump over zero have passed it.
-    pub(super) fn watch_jumps(
-        &mut self,
+    /// Finds the watched expressions that stay at zero: their gradients are sums of those of the
+    /// surfaces slid upon, or they depend on the sides of switches alone.
+    pub(super) fn hold_watched(&mut self) {
+        self.held.fill(false);
+        if self.held.is_empty() {
+            return;
+        }
+        let values = self.watched_values();
+        let active = self.compiled.active.len();
+        let is_zero = |i: &usize| {
+            values[active + i].abs() <= 1e-12 * self.magnitude(&self.equation.watched[*i])
+        };
+        let zero: Vec<usize> = (0..self.held.len()).filter(is_zero).collect();
+        if zero.is_empty() {
+            return;
+        }
+        let gradients = self.compiled.gradients(&self.variables);
+        let span = self.options.t_end - self.options.t_start;
+        let row = |place: usize| {
+            let mut row = vec![0.0; self.n + 1];
+            for (variable, slope) in self.compiled.touches[place].iter().zip(&gradients[place]) {
+                let size = self.size.get(*variable).map_or(span, |size| size.max(1e-300));
+                row[*variable] = slope * size;
+            }
+            row
+        };
+        let surfaces = self.sliding.iter().filter_map(|g| self.compiled.place(*g)).map(row);
+        let surfaces: Vec<Vec<f64>> = surfaces.collect();
+        for i in zero {
+            let place = active + i;
+            self.held[i] = self.compiled.touches[place].is_empty()
+                || !surfaces.is_empty() && is_sum_of(&surfaces, row(place));
+        }
+    }
+
+    /// A watched expression passes zero, or comes to it and stays: a row of the section, or an
+    /// event of this direction. Says whether more is wanted.
+    pub(super) fn pass(
+        &self,
+        i: usize,
         definition: &crate::Definition,
-        passed: &mut Vec<usize>,
         fired: &mut Vec<usize>,
-    ) {
+        observe: &mut dyn FnMut(&Point) -> bool,
+    ) -> bool {
+        let side = self.watch_side[i];
+        let Some(event) = self.event_of[i] else {
+            let (mode, signs, direction) = (self.config.mode, &self.signs, Some(-side));
+            return observe(&Point { t: self.t, x: &self.x, mode, signs, event: None, direction });
+        };
+        if let When::Zero(_, direction) = definition.events()[event].when
+            && (direction == Direction::Both || (direction == Direction::Up) == (side < 0.0))
+        {
+            fired.push(event);
+        }
+        true
+    }
+
+    /// The watched expressions that a switch made jump over zero or onto it, and those held at zero
+    /// until now that leave it to the side that they came from; and whether each is away from zero.
+    pub(super) fn watch_jumps(&mut self, held: &[bool], passed: &[usize]) -> Vec<(usize, bool)> {
         let mut values = vec![0.0; self.compiled.outputs];
         self.compiled.watched.evaluate(&self.variables, &mut values);
         let active = self.compiled.active.len();
+        let mut found = Vec::new();
         for i in 0..self.watch_side.len() {
             let (value, side) = (values[active + i], self.watch_side[i]);
             let rests =
                 self.contacts.iter().any(|c| c.watched == i) || passed.contains(&i) || side == 0.0;
-            if rests
-                || !(value * side < 0.0)
-                || value.abs() <= 1e-12 * self.magnitude(&self.equation.watched[i])
-            {
+            if rests || held[i] && self.held[i] {
                 continue;
             }
-            passed.push(i);
-            let Some(event) = self.event_of[i] else { continue };
-            let When::Zero(_, direction) = definition.events()[event].when else { continue };
-            if direction == Direction::Both || (direction == Direction::Up) == (side < 0.0) {
-                fired.push(event);
+            let away = value.abs() > 1e-12 * self.magnitude(&self.equation.watched[i]);
+            let leaves = held[i] && !away && {
+                self.begin_watching(i, true);
+                let ahead = std::mem::replace(&mut self.watch_side[i], side);
+                let left = self.left_watch[i];
+                if left != 0.0 { left * side < 0.0 } else { ahead == -side }
+            };
+            let onto = self.held[i] && self.compiled.touches[active + i].is_empty();
+            if leaves || away && value * side < 0.0 || onto {
+                found.push((i, away));
             }
         }
+        found
     }
 
     /// Finds the side of a watched expression; `zero`: it is zero here, whatever rounding says.
@@ -1059,6 +1116,29 @@ impl Follower<'_> {
         }
         new
     }
+}
+
+/// Whether a vector that is not zero is a sum of multiples of others, to rounding.
+fn is_sum_of(others: &[Vec<f64>], mut row: Vec<f64>) -> bool {
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let mut basis: Vec<Vec<f64>> = Vec::new();
+    let rest = |basis: &[Vec<f64>], row: &mut Vec<f64>| {
+        for b in basis.iter().chain(basis) {
+            let share = dot(row, b);
+            row.iter_mut().zip(b).for_each(|(v, b)| *v -= share * b);
+        }
+    };
+    for other in others {
+        let (size, mut new) = (dot(other, other).sqrt(), other.clone());
+        rest(&basis, &mut new);
+        let length = dot(&new, &new).sqrt();
+        if length > 1e-12 * size {
+            basis.push(new.iter().map(|v| v / length).collect());
+        }
+    }
+    let size = dot(&row, &row).sqrt();
+    rest(&basis, &mut row);
+    size > 0.0 && dot(&row, &row).sqrt() <= 1e-9 * size
 }
 
 /// Whether mixtures of 2^k fields have more than one velocity on their surfaces: the fields are not

@@ -47,6 +47,7 @@ impl Follower<'_> {
                 self.base.push((self.equation.compiled(&flipped), variables));
             }
         }
+        self.hold_watched();
         self.signs = self
             .equation
             .guards
