@@ -6,7 +6,8 @@
 //! smooth, and that is what is written on a [`Tape`] and evaluated: only the branches that hold are
 //! computed.
 
-use std::collections::{BTreeMap, HashMap};
+use std::cell::RefCell;
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::rc::Rc;
 
 use twofold_num::tape::{Program, Recorded};
@@ -92,7 +93,7 @@ pub struct Equation {
     pub watched: Vec<Expression>,
     /// For each event its new values as a program, where no switching function decides them.
     pub(crate) resets: Vec<Option<Program>>,
-    known: std::cell::RefCell<HashMap<Vec<i8>, Rc<Compiled>>>,
+    known: RefCell<HashMap<Vec<i8>, Rc<Compiled>>>,
 }
 
 /// Why an equation cannot be followed.
@@ -191,6 +192,7 @@ impl Equation {
                 at: &at,
                 v,
                 terms: HashMap::new(),
+                conditions: HashMap::new(),
                 guards: BTreeMap::new(),
             };
             plain.iter().map(|e| writer.number(e)).collect()
@@ -232,11 +234,16 @@ impl Equation {
     }
 
     fn sees_time(&self, e: &Expression) -> bool {
-        e.names().into_iter().any(|name| {
-            name == "t"
-                || self.definition.tables.iter().any(|(table, _)| table == name)
-                || self.term(name).is_some_and(|term| self.sees_time(term))
-        })
+        let (mut open, mut seen) = (e.names(), HashSet::new());
+        while let Some(name) = open.pop() {
+            if name == "t" || self.definition.tables.iter().any(|(table, _)| table == name) {
+                return true;
+            }
+            if seen.insert(name) {
+                open.extend(self.term(name).into_iter().flat_map(Expression::names));
+            }
+        }
+        false
     }
 
     /// The parameters' values.
@@ -415,12 +422,29 @@ impl Equation {
 
     /// Whether a condition holds in a configuration.
     pub fn holds(&self, e: &Expression, at: &Configuration) -> bool {
+        self.holds_with(e, at, &mut HashMap::new())
+    }
+
+    /// The same; conditions in terms are asked once each.
+    fn holds_with<'a>(
+        &'a self,
+        e: &'a Expression,
+        at: &Configuration,
+        known: &mut HashMap<&'a str, bool>,
+    ) -> bool {
         match e {
             Expression::Greater(a, b) => self.positive(&difference(a, b), at),
-            Expression::And(a, b) => self.holds(a, at) && self.holds(b, at),
-            Expression::Or(a, b) => self.holds(a, at) || self.holds(b, at),
-            Expression::Not(a) => !self.holds(a, at),
-            Expression::Name(name) => self.term(name).is_some_and(|term| self.holds(term, at)),
+            Expression::And(a, b) => self.holds_with(a, at, known) && self.holds_with(b, at, known),
+            Expression::Or(a, b) => self.holds_with(a, at, known) || self.holds_with(b, at, known),
+            Expression::Not(a) => !self.holds_with(a, at, known),
+            Expression::Name(name) => {
+                if let Some(holds) = known.get(name.as_str()) {
+                    return *holds;
+                }
+                let holds = self.term(name).is_some_and(|term| self.holds_with(term, at, known));
+                known.insert(name, holds);
+                holds
+            }
             _ => false,
         }
     }
@@ -437,6 +461,18 @@ impl Equation {
 
     /// The value of an expression at a state, following conditions by the numbers themselves.
     pub fn value(&self, e: &Expression, t: f64, x: &[f64]) -> f64 {
+        self.value_with(e, t, x, &RefCell::new(Vec::new()))
+    }
+
+    /// The same; terms are evaluated once each.
+    fn value_with(
+        &self,
+        e: &Expression,
+        t: f64,
+        x: &[f64],
+        known: &RefCell<Vec<Option<f64>>>,
+    ) -> f64 {
+        let terms = &self.definition.terms;
         let name = |name: &str| -> Option<f64> {
             if name == "t" {
                 return Some(t);
@@ -447,8 +483,12 @@ impl Equation {
             if let Some(value) = self.values.get(name) {
                 return Some(*value);
             }
-            if let Some(term) = self.term(name) {
-                return Some(self.value(term, t, x));
+            if let Some(i) = terms.iter().position(|(n, _)| n == name) {
+                known.borrow_mut().resize(terms.len(), None);
+                let value = known.borrow()[i];
+                let value = value.unwrap_or_else(|| self.value_with(&terms[i].1, t, x, known));
+                known.borrow_mut()[i] = Some(value);
+                return Some(value);
             }
             let table = self.definition.tables.iter().position(|(n, _)| n == name)?;
             Some(self.tables[table].value(self.tables[table].piece(t), t))
@@ -496,8 +536,14 @@ impl Equation {
         let (mut active, mut deciding) = (Vec::new(), Vec::new());
         let n = self.dimension();
         let tape = Tape::record(self.variables(), |v| {
-            let mut writer =
-                Writer { equation: self, at, v, terms: HashMap::new(), guards: BTreeMap::new() };
+            let mut writer = Writer {
+                equation: self,
+                at,
+                v,
+                terms: HashMap::new(),
+                conditions: HashMap::new(),
+                guards: BTreeMap::new(),
+            };
             let mut outputs: Vec<Recorded> =
                 self.definition.modes[at.mode].field.iter().map(|e| writer.number(e)).collect();
             writer.write_guards();
@@ -829,6 +875,7 @@ struct Writer<'a> {
     at: &'a Configuration,
     v: &'a [Recorded],
     terms: HashMap<String, Recorded>,
+    conditions: HashMap<String, bool>,
     /// Guards that were asked, with their values once written.
     guards: BTreeMap<usize, Option<Recorded>>,
 }
@@ -881,8 +928,13 @@ impl Writer<'_> {
             Expression::Or(a, b) => self.condition(a) || self.condition(b),
             Expression::Not(a) => !self.condition(a),
             Expression::Name(name) => {
-                let term = self.equation.term(name).cloned();
-                term.is_some_and(|term| self.condition(&term))
+                if let Some(holds) = self.conditions.get(name) {
+                    return *holds;
+                }
+                let equation = self.equation;
+                let holds = equation.term(name).is_some_and(|term| self.condition(term));
+                self.conditions.insert(name.clone(), holds);
+                holds
             }
             _ => false,
         }

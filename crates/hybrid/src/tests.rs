@@ -1525,6 +1525,20 @@ fn a_section_that_is_slid_upon_is_crossed_once_each_way() {
     }
 }
 
+/// Terms that name the term before twice are evaluated once each: 2^40 times would not end.
+#[test]
+fn nested_terms_take_no_exponential_time() {
+    let nested = |first: &str, next: &dyn Fn(usize) -> String, rest: &str| {
+        let terms: String = (0..40).map(|i| format!("a{} = '{}'\n", i + 1, next(i))).collect();
+        format!("states = ['x']\nstart = [1.1]\n{rest}\n[let]\na0 = '{first}'\n{terms}")
+    };
+    // sign(a - 1) + abs(a) = 1 + a for a > 1.
+    let numbers = nested("x", &|i| format!("sign(a{i} - 1) + abs(a{i})"), "f = ['a40']");
+    near(last(&numbers, 1.0), 41.1 * 1.0_f64.exp() - 40.0, 1e-8);
+    let events = "f = ['if(a40, 1, 2)']\n[[event]]\nwhen = 'a40 and x > 2'\nset = { x = 0.5 }";
+    near(last(&nested("x > 0", &|i| format!("a{i} and a{i}"), events), 1.0), 0.6, 1e-12);
+}
+
 /// Conditions at equality: a counter is at least 5 when it is 5, and not above.
 #[test]
 fn counters_are_compared_as_they_are_written() {

@@ -90,8 +90,8 @@ impl Follower<'_> {
         change
     }
 
-    /// The speed by which rounding of a slope is measured where sliding has just left a surface: the
-    /// motion is tangent to it.
+    /// The speed by which rounding of a slope is measured where sliding has just left a surface:
+    /// the motion is tangent to it.
     fn left(&self, sought: Sought) -> f64 {
         match sought {
             Sought::Guard { guard, .. } => self.left[guard],

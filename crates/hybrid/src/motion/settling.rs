@@ -959,8 +959,8 @@ impl Follower<'_> {
         let row = |place: usize| {
             let mut row = vec![0.0; self.n + 1];
             for (variable, slope) in self.compiled.touches[place].iter().zip(&gradients[place]) {
-                let size = self.size.get(*variable).map_or(span, |size| size.max(1e-300));
-                row[*variable] = slope * size;
+                let size = *self.size.get(*variable).unwrap_or(&span);
+                row[*variable] = slope * if size > 0.0 { size } else { 1.0 };
             }
             row
         };
