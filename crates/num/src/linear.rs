@@ -68,9 +68,9 @@ pub fn solve_any(a: &[f64], b: &[f64], smallest: f64) -> Option<Vec<f64>> {
 const MOST_ITERATIONS: usize = 60;
 
 /// The eigenvalues (real part, imaginary part) of a real matrix of `n` rows, given row by row:
-/// elimination to Hessenberg form and the shifted QR algorithm (Martin, Peters & Wilkinson 1970;
-/// EISPACK's `elmhes` and `hqr`). `None` if an entry is not finite, or an eigenvalue does not
-/// settle.
+/// balanced ([`balance`]), brought to Hessenberg form by elimination, and then the shifted QR
+/// algorithm (Martin, Peters & Wilkinson 1970; EISPACK's `elmhes` and `hqr`). `None` if an entry is
+/// not finite, or an eigenvalue does not settle.
 ///
 /// ```
 /// use twofold_num::linear::eigenvalues;
@@ -81,7 +81,10 @@ pub fn eigenvalues(matrix: &[f64], n: usize) -> Option<Vec<[f64; 2]>> {
     if matrix.len() != n * n || !matrix.iter().all(|v| v.is_finite()) {
         return None;
     }
-    let mut a: Vec<Vec<f64>> = matrix.chunks(n.max(1)).map(<[f64]>::to_vec).collect();
+    let units = balance(matrix, n);
+    let entry = |(k, v): (usize, &f64)| v * (units[k % n] / units[k / n]);
+    let balanced: Vec<f64> = matrix.iter().enumerate().map(entry).collect();
+    let mut a: Vec<Vec<f64>> = balanced.chunks(n.max(1)).map(<[f64]>::to_vec).collect();
     hessenberg(&mut a);
     let norm: f64 = a.iter().flatten().map(|v| v.abs()).sum();
     let mut found = vec![[0.0; 2]; n];
@@ -138,6 +141,54 @@ pub fn eigenvalues(matrix: &[f64], n: usize) -> Option<Vec<[f64; 2]>> {
         }
     }
     Some(found)
+}
+
+/// A matrix whose rows and columns differ in size by less than this factor is left as it is: a
+/// thousand in the units costs three digits of sixteen.
+const UNBALANCED: f64 = 1_048_576.0;
+
+/// Units for the states, powers of two, in which each row of a matrix of `n` rows is as large as
+/// its column, without the diagonal, to a factor of four (Parlett & Reinsch 1969): for linearised
+/// motion whose states have very different units. In them the entry of row i and column j is
+/// `units[j] / units[i]` times what it was. All 1 where no row is a million times as large or as
+/// small as its column.
+///
+/// ```
+/// use twofold_num::linear::balance;
+/// let units = balance(&[0.2, -1e18, 1e-18, 0.2], 2);
+/// assert!((0.5..=2.0).contains(&(1e-18 * units[0] / units[1])));
+/// assert_eq!(balance(&[0.2, -1e3, 1e-2, 0.2], 2), [1.0, 1.0]);
+/// ```
+pub fn balance(matrix: &[f64], n: usize) -> Vec<f64> {
+    let mut units = vec![1.0; n];
+    let mut most = UNBALANCED;
+    for _ in 0..MOST_ITERATIONS {
+        let mut settled = true;
+        for i in 0..n {
+            let beside = |entry: &dyn Fn(usize) -> f64| -> f64 {
+                (0..n).filter(|j| *j != i).map(|j| entry(j).abs()).sum()
+            };
+            let row = beside(&|j| matrix[i * n + j] * (units[j] / units[i]));
+            let column = beside(&|j| matrix[j * n + i] * (units[i] / units[j]));
+            let lopsided = row / column >= most || column / row >= most;
+            // Where one is zero the matrix falls apart, and nothing is gained.
+            if row > 0.0 && column > 0.0 && lopsided {
+                let mut by = 1.0;
+                while column * by * by < 0.5 * row {
+                    by *= 2.0;
+                }
+                while column * by * by >= 2.0 * row {
+                    by *= 0.5;
+                }
+                units[i] *= by;
+                (settled, most) = (false, 4.0);
+            }
+        }
+        if settled {
+            break;
+        }
+    }
+    units
 }
 
 /// Similar to the matrix, and zero below the first subdiagonal.
@@ -307,6 +358,28 @@ mod tests {
         }
         assert_eq!(sorted(&[0.0; 16], 4), [[0.0; 2]; 4]);
         assert_eq!(eigenvalues(&[f64::NAN], 1), None);
+    }
+
+    /// Of one matrix in units that differ by up to 1e18: 0.2 +- i and -3; and a ring.
+    #[test]
+    fn eigenvalues_have_no_units() {
+        for (a, b) in [(1.0, 1.0), (1e9, 1e-9), (1e-6, 1e12), (1e-150, 1.0)] {
+            let units = [a, b, a * b];
+            let plain = [0.2, -1.0, 0.5, 1.0, 0.2, 0.25, 0.0, 0.0, -3.0];
+            let scaled: Vec<f64> =
+                (0..9).map(|k| plain[k] * (units[k / 3] / units[k % 3])).collect();
+            let mut found = eigenvalues(&scaled, 3).unwrap();
+            found.sort_by(|x, y| x[0].total_cmp(&y[0]).then(x[1].total_cmp(&y[1])));
+            for (found, want) in found.iter().zip([[-3.0, 0.0], [0.2, -1.0], [0.2, 1.0]]) {
+                let off = (found[0] - want[0]).abs().max((found[1] - want[1]).abs());
+                assert!(off < 1e-13, "{a:e} {b:e}: {found:?}");
+            }
+        }
+        // x' = y, y' = z, z' = x with z in a unit of 1e-9: the third roots of one.
+        let ring = [0.0, 1.0, 0.0, 0.0, 0.0, 1e9, 1e-9, 0.0, 0.0];
+        for e in eigenvalues(&ring, 3).unwrap() {
+            assert!((e[0] * e[0] + e[1] * e[1] - 1.0).abs() < 1e-13, "{e:?}");
+        }
     }
 
     #[test]
