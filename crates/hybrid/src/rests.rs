@@ -10,7 +10,7 @@
 
 use twofold_num::Dual;
 use twofold_num::elementary::sqrt;
-use twofold_num::linear::{eigenvalues, solve_any};
+use twofold_num::linear::{balance, eigenvalues, solve_any};
 
 use crate::definition::{Direction, Event, When};
 use crate::equation::{Configuration, Equation, EquationError};
@@ -143,6 +143,12 @@ const MOST_ITERATIONS: usize = 60;
 const MOST_TOGETHER: usize = 4;
 /// Larger sets of surfaces are not looked at if there are more of one size than this.
 const MOST_SETS: usize = 256;
+/// Surfaces of one whole part, those nearest to the middle of its values in the box.
+const MOST_LEVELS: usize = 128;
+/// Places between two rests from which a third is looked for, in shares of the way.
+const BETWEEN: [f64; 3] = [0.5, 0.25, 0.75];
+/// Between more rests than these none are looked for.
+const MOST_PAIRED: usize = 24;
 
 /// The rests of a system in a box, by the smallest coordinates first.
 ///
@@ -184,26 +190,29 @@ pub fn rests(model: &Model, within: &[(f64, f64)]) -> Result<Vec<Rest>, RestErro
         let places: Vec<Vec<f64>> = (0..STARTS).map(|start| search.place(start)).collect();
         let configs: Vec<Configuration> =
             places.iter().map(|x| search.configuration(mode, x)).collect();
-        let mut active: Vec<usize> = Vec::new();
-        for config in &configs {
-            active.extend(search.equation.compiled(config).active.iter());
-        }
-        active.sort_unstable();
-        active.dedup();
-        active.retain(|g| !search.equation.guards[*g].whole);
+        let surfaces = search.surfaces(&configs);
         for together in 0..=MOST_TOGETHER.min(search.n) {
-            let sets = subsets(&active, together);
-            if sets.len() > MOST_SETS {
-                break;
+            let mut sets = subsets(&surfaces, together);
+            if sets.len() > MOST_SETS && together > 1 {
+                let single: Vec<Surface> =
+                    surfaces.iter().filter(|s| s.level.is_none()).copied().collect();
+                sets = subsets(&single, together);
+                if sets.len() > MOST_SETS {
+                    break;
+                }
             }
             let starts = match together {
-                0 | 1 => STARTS,
+                0 => STARTS,
+                1 if sets.len() <= MOST_SETS => {
+                    (STARTS / search.most_levels(&surfaces)).max(LEAST_STARTS)
+                }
                 _ => (STARTS / sets.len().max(1)).max(LEAST_STARTS),
             };
             for on in &sets {
-                for (x, config) in places.iter().zip(&configs).take(starts) {
-                    search.add(config, on, x, &mut found);
+                for (number, config) in configs.iter().enumerate().take(starts) {
+                    search.add(config, on, &places[number], number, &mut found);
                 }
+                search.add_between(mode, on, &mut found);
             }
         }
     }
@@ -228,8 +237,26 @@ pub fn rests(model: &Model, within: &[(f64, f64)]) -> Result<Vec<Rest>, RestErro
     Ok(found)
 }
 
-/// Subsets of so many numbers.
-fn subsets(of: &[usize], size: usize) -> Vec<Vec<usize>> {
+/// Where a switching function switches: at zero, or where its whole part becomes a number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Surface {
+    guard: usize,
+    level: Option<f64>,
+}
+
+impl Surface {
+    /// The switching function's answers below and above.
+    fn sides(&self) -> [f64; 2] {
+        self.level.map_or([-1.0, 1.0], |level| [level - 1.0, level])
+    }
+
+    fn is_of(surfaces: &[Self], guard: usize) -> bool {
+        surfaces.iter().any(|s| s.guard == guard)
+    }
+}
+
+/// Subsets of so many surfaces.
+fn subsets(of: &[Surface], size: usize) -> Vec<Vec<Surface>> {
     match (size, of.split_first()) {
         (0, _) => vec![Vec::new()],
         (_, None) => Vec::new(),
@@ -316,10 +343,95 @@ impl Search<'_> {
         self.within.iter().enumerate().map(|(i, (a, b))| a + (b - a) * share(i)).collect()
     }
 
-    /// Adds the rest that Newton's method comes to, if it is one and new.
-    fn add(&self, config: &Configuration, on: &[usize], start: &[f64], found: &mut Vec<Rest>) {
+    /// The surfaces that equations with these answers ask.
+    fn surfaces(&self, configs: &[Configuration]) -> Vec<Surface> {
+        let guards = &self.equation.guards;
+        let mut ends = vec![None; guards.len()];
+        for config in configs {
+            for guard in &self.equation.compiled(config).active {
+                let side = config.sides[*guard];
+                let (low, high) = ends[*guard].unwrap_or((side, side));
+                ends[*guard] = Some((side.min(low), side.max(high)));
+            }
+        }
+        let of = |(guard, ends): (usize, Option<(f64, f64)>)| -> Vec<Surface> {
+            match ends {
+                None => Vec::new(),
+                Some(_) if !guards[guard].whole => vec![Surface { guard, level: None }],
+                Some((low, high)) => {
+                    // Surfaces at the box's edges may have no place behind them.
+                    let spare = (0.5 * (high + 2.0 - low - MOST_LEVELS as f64)).max(0.0).floor();
+                    let first = low + spare;
+                    let count = (high + 2.0 - low - 2.0 * spare).min(MOST_LEVELS as f64) as usize;
+                    let levels = (0..count).map(|k| Some(first + k as f64));
+                    levels.map(|level| Surface { guard, level }).collect()
+                }
+            }
+        };
+        ends.into_iter().enumerate().flat_map(of).collect()
+    }
+
+    /// The number of surfaces of the switching function that has most.
+    fn most_levels(&self, surfaces: &[Surface]) -> usize {
+        let of = |guard: usize| surfaces.iter().filter(|s| s.guard == guard).count();
+        (0..self.equation.guards.len()).map(of).max().unwrap_or(0).max(1)
+    }
+
+    /// A surface's function as it is shown: zero there.
+    fn name(&self, surface: &Surface) -> String {
+        let expression = self.equation.guards[surface.guard].expression.to_string();
+        match surface.level {
+            Some(level) if level > 0.0 => format!("{expression} - {level}"),
+            Some(level) if level < 0.0 => format!("{expression} + {}", -level),
+            _ => expression,
+        }
+    }
+
+    /// Looks between all pairs of isolated rests on some surfaces: of three beside each other few
+    /// starts lead to the one in the middle.
+    fn add_between(&self, mode: usize, on: &[Surface], found: &mut Vec<Rest>) {
+        let names: Vec<String> = on.iter().map(|s| self.name(s)).collect();
+        let isolated = |r: &&Rest| {
+            r.family.is_none() && r.mode == mode && r.on.iter().map(|on| &on.surface).eq(&names)
+        };
+        let mut looked = 0;
+        loop {
+            let known: Vec<Vec<f64>> = found.iter().filter(isolated).map(|r| r.x.clone()).collect();
+            if known.len() == looked || known.len() > MOST_PAIRED {
+                return;
+            }
+            for (i, a) in known.iter().enumerate().skip(looked) {
+                for b in &known[..i] {
+                    for (number, share) in BETWEEN.into_iter().enumerate() {
+                        let place: Vec<f64> =
+                            a.iter().zip(b).map(|(a, b)| a + share * (b - a)).collect();
+                        let config = self.configuration(mode, &place);
+                        self.add(&config, on, &place, number, found);
+                    }
+                }
+            }
+            looked = known.len();
+        }
+    }
+
+    /// Adds the rest that Newton's method comes to, if it is one and new. It begins with equal
+    /// weights; where the equations do not fix their next step there, as where opposite fields
+    /// cancel, with others, one for each start.
+    fn add(
+        &self,
+        config: &Configuration,
+        on: &[Surface],
+        start: &[f64],
+        number: usize,
+        found: &mut Vec<Rest>,
+    ) {
         let middle = vec![0.5; on.len()];
-        let Some(mut zero) = self.settle(config, on, start, &middle, DEPENDENT) else { return };
+        let other = |i: usize| radical_inverse(number + 1, PRIMES[(self.n + i) % PRIMES.len()]);
+        let settled = self.settle(config, on, start, &middle, DEPENDENT).or_else(|| {
+            let weights: Vec<f64> = (0..on.len()).map(other).collect();
+            if on.is_empty() { None } else { self.settle(config, on, start, &weights, DEPENDENT) }
+        });
+        let Some(mut zero) = settled else { return };
         if !self.is_valid(config, on, &zero) || self.is_known(config, on, &zero.x, 0, found) {
             return;
         }
@@ -351,7 +463,7 @@ impl Search<'_> {
 
     /// Whether a zero of a mixture is a rest: in the box, on its own side of all other surfaces,
     /// with weights of a mixture.
-    fn is_valid(&self, config: &Configuration, on: &[usize], zero: &Zero) -> bool {
+    fn is_valid(&self, config: &Configuration, on: &[Surface], zero: &Zero) -> bool {
         let mixes = zero.weights.iter().all(|w| *w > 0.0 && *w < 1.0);
         mixes && self.is_inside(&zero.x) && self.is_its_own(config, &zero.x, on)
     }
@@ -361,13 +473,12 @@ impl Search<'_> {
     fn is_known(
         &self,
         config: &Configuration,
-        on: &[usize],
+        on: &[Surface],
         x: &[f64],
         dimension: usize,
         found: &[Rest],
     ) -> bool {
-        let names: Vec<String> =
-            on.iter().map(|g| self.equation.guards[*g].expression.to_string()).collect();
+        let names: Vec<String> = on.iter().map(|s| self.name(s)).collect();
         found.iter().any(|r| {
             let same = r.mode == config.mode && r.on.iter().map(|on| &on.surface).eq(names.iter());
             same && match &r.family {
@@ -474,14 +585,21 @@ impl Search<'_> {
     }
 
     /// Whether a state's own answers, but for those in `free`, are those of a configuration.
-    fn is_its_own(&self, config: &Configuration, x: &[f64], free: &[usize]) -> bool {
+    fn is_its_own(&self, config: &Configuration, x: &[f64], free: &[Surface]) -> bool {
         let own = self.configuration(config.mode, x);
         let compiled = self.equation.compiled(config);
-        compiled.active.iter().all(|g| free.contains(g) || own.sides[*g] == config.sides[*g])
+        let is_free = |g: usize| Surface::is_of(free, g);
+        compiled.active.iter().all(|g| is_free(*g) || own.sides[*g] == config.sides[*g])
     }
 
     /// The mixture on the surfaces `on`, by weights of their positive sides.
-    fn mixture(&self, config: &Configuration, on: &[usize], x: &[f64], weights: &[f64]) -> Mixture {
+    fn mixture(
+        &self,
+        config: &Configuration,
+        on: &[Surface],
+        x: &[f64],
+        weights: &[f64],
+    ) -> Mixture {
         let (n, k) = (self.n, on.len());
         let mut mixture = Mixture {
             local: Local { field: vec![0.0; n], jacobian: vec![0.0; n * n] },
@@ -491,16 +609,17 @@ impl Search<'_> {
             sizes: vec![0.0; n],
         };
         let mut corner = config.clone();
+        let guards: Vec<usize> = on.iter().map(|s| s.guard).collect();
         for bits in 0..1_usize << k {
             let is_above = |i: usize| bits >> i & 1 == 1;
-            for (i, guard) in on.iter().enumerate() {
-                corner.sides[*guard] = if is_above(i) { 1.0 } else { -1.0 };
+            for (i, surface) in on.iter().enumerate() {
+                corner.sides[surface.guard] = surface.sides()[usize::from(is_above(i))];
             }
-            let (local, values, gradients) = self.with_guards(&corner, on, x);
+            let (local, values, gradients) = self.with_guards(&corner, &guards, x);
             for i in 0..k {
                 // A guard may be asked on one side of another one only.
                 if mixture.values[i].is_nan() {
-                    mixture.values[i] = values[i];
+                    mixture.values[i] = values[i] - on[i].level.unwrap_or(0.0);
                     mixture.gradients[i * n..][..n].copy_from_slice(&gradients[i * n..][..n]);
                 }
             }
@@ -531,7 +650,7 @@ impl Search<'_> {
     fn settle(
         &self,
         config: &Configuration,
-        on: &[usize],
+        on: &[Surface],
         start: &[f64],
         weights: &[f64],
         dependent: f64,
@@ -570,14 +689,14 @@ impl Search<'_> {
 
     /// The switching function, none of those in `on`, that is zero at a state, to rounding, and on
     /// whose other side the equations are others.
-    fn boundary(&self, config: &Configuration, on: &[usize], x: &[f64]) -> Option<String> {
+    fn boundary(&self, config: &Configuration, on: &[Surface], x: &[f64]) -> Option<String> {
         let n = self.n;
         let own = self.local(config, x);
         let is_on = |guard: &usize| {
             let (_, values, gradients) = self.with_guards(config, &[*guard], x);
             // The distance that the state is known to.
             let reach: f64 = gradients.iter().zip(&self.widths).map(|(g, w)| (g * w).abs()).sum();
-            if on.contains(guard)
+            if Surface::is_of(on, *guard)
                 || self.equation.guards[*guard].whole
                 || !(values[0].abs() <= 1e-12 * reach)
             {
@@ -610,7 +729,7 @@ impl Search<'_> {
     }
 
     /// An isolated rest, with the linearised motion along its surfaces.
-    fn rest(&self, config: &Configuration, on: &[usize], zero: Zero) -> Option<Rest> {
+    fn rest(&self, config: &Configuration, on: &[Surface], zero: Zero) -> Option<Rest> {
         let (n, k) = (self.n, on.len());
         let Zero { x, weights, .. } = zero;
         let m = self.mixture(config, on, &x, &weights);
@@ -653,14 +772,16 @@ impl Search<'_> {
         let moved: Vec<f64> = x.iter().zip(&self.widths).map(|(x, w)| x + 1e-9 * w).collect();
         let blur = if k == 0 {
             let other = self.local(config, &moved).jacobian;
-            m.local.jacobian.iter().zip(&other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+            let units = balance(&m.local.jacobian, n);
+            let unit = |at: usize| units[at % n] / units[at / n];
+            let changes = m.local.jacobian.iter().zip(&other).map(|(a, b)| (a - b).abs());
+            changes.enumerate().map(|(at, change)| change * unit(at)).fold(0.0, f64::max)
         } else {
             0.0
         };
         let boundary = self.boundary(config, on, &x);
-        let name = |guard: &usize| self.equation.guards[*guard].expression.to_string();
-        let on =
-            on.iter().zip(&weights).map(|(g, w)| On { surface: name(g), weight: *w }).collect();
+        let on = on.iter().zip(&weights);
+        let on = on.map(|(s, w)| On { surface: self.name(s), weight: *w }).collect();
         let attracting = if k > 0 && !tangent { attracts(&normal, k) } else { None };
         let behind = self.behind(config.mode, &x);
         Some(Rest {
@@ -696,7 +817,7 @@ impl Search<'_> {
     fn family(
         &self,
         config: &Configuration,
-        on: &[usize],
+        on: &[Surface],
         zero: Zero,
         dimension: usize,
     ) -> Option<Rest> {
@@ -818,9 +939,47 @@ impl Step {
     }
 }
 
-/// The least solution of equations (row, right-hand side, size that rounding is measured by): rows
-/// are made orthogonal, the most independent first.
-fn least_step(mut rows: Vec<(Vec<f64>, f64, f64)>, dependent: f64) -> Option<Step> {
+/// The least solution of equations (row, right-hand side, size that rounding is measured by). Rows
+/// that only look alike because the unknowns have very different units are independent: that has
+/// no units.
+fn least_step(rows: Vec<(Vec<f64>, f64, f64)>, dependent: f64) -> Option<Step> {
+    let all = rows.first()?.0.len();
+    let step = orthogonal_step(rows.clone(), dependent)?;
+    if step.span.len() == all || rows.len() < all {
+        return Some(step);
+    }
+    // Rows and columns in turn by their largest entries.
+    let mut balanced = rows;
+    let mut units = vec![1.0; all];
+    for _ in 0..BALANCINGS {
+        for (row, right, size) in &mut balanced {
+            let most = row.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+            if most > 0.0 {
+                row.iter_mut().chain([right, size]).for_each(|v| *v /= most);
+            }
+        }
+        for (j, unit) in units.iter_mut().enumerate() {
+            let most = balanced.iter().fold(0.0_f64, |most, (row, ..)| most.max(row[j].abs()));
+            if most > 0.0 {
+                balanced.iter_mut().for_each(|(row, ..)| row[j] /= most);
+                *unit /= most;
+            }
+        }
+    }
+    match orthogonal_step(balanced, dependent) {
+        Some(other) if other.span.len() == all => {
+            let by = other.by.iter().zip(&units).map(|(s, unit)| s * unit).collect();
+            Some(Step { by, ..other })
+        }
+        _ => Some(step),
+    }
+}
+
+/// Times that rows and columns are balanced.
+const BALANCINGS: usize = 3;
+
+/// The least step in the unknowns' units: rows are made orthogonal, the most independent first.
+fn orthogonal_step(mut rows: Vec<(Vec<f64>, f64, f64)>, dependent: f64) -> Option<Step> {
     let all = rows.first()?.0.len();
     let mut step = Step { by: vec![0.0; all], span: Vec::new(), left_over: 0.0 };
     for (row, right, size) in &mut rows {

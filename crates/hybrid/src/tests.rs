@@ -1666,6 +1666,87 @@ fn stability_is_said_where_it_is_decided() {
     assert_eq!(kinds("states = ['x']\nf = ['-0.001*x']", &[(-10.0, 10.0)]), ["stable node"]);
 }
 
+/// One focus with eigenvalues 0.2 +- i, whatever the units of its states.
+#[test]
+fn a_rest_has_no_units() {
+    for unit in [1.0, 1e3, 1e9, 1e12, 1e17] {
+        let text = format!(
+            "states = ['x', 'y']\nf = ['0.2*x - {unit:e}*y*(1 + (x*y)^2)', '{:e}*x + 0.2*y']",
+            1.0 / unit
+        );
+        for within in [[(-5.0, 4.0); 2], [(-unit, 0.9 * unit), (-1.0 / unit, 0.8 / unit)]] {
+            let found = crate::rests::rests(&model(&text), &within).unwrap();
+            let [rest] = &found[..] else { panic!("{unit:e} {within:?}: {found:?}") };
+            assert_eq!(rest.kind(), "unstable focus", "{unit:e} {within:?}: {rest:?}");
+            for [re, im] in &rest.eigenvalues {
+                near(*re, 0.2, 1e-12);
+                near(im.abs(), 1.0, 1e-12);
+            }
+        }
+    }
+}
+
+/// Pseudo-equilibria on a circle on which equal weights of the fields cancel: the sliding field is
+/// (1 - x^2)/2, -x y/2.
+#[test]
+fn rests_on_a_circle_are_found() {
+    let h = "x^2 + y^2 - 1";
+    let text = format!("states = ['x', 'y']\nf = ['0.5 - x*sign({h})', '-y*sign({h})']");
+    for half in [1.5, 2.0, 10.0] {
+        let found = crate::rests::rests(&model(&text), &[(-half, half); 2]).unwrap();
+        let [left, middle, right] = &found[..] else { panic!("{half}: {found:?}") };
+        for (rest, [x, weight, rate]) in [(left, [-1.0, 0.25, 0.5]), (right, [1.0, 0.75, -0.5])] {
+            near(rest.x[0], x, 1e-12);
+            near(rest.x[1], 0.0, 1e-12);
+            near(rest.on[0].weight, weight, 1e-12);
+            near(rest.eigenvalues[0][0], rate, 1e-12);
+            assert_eq!(rest.on[0].surface, "x^2 + y^2 - 1");
+        }
+        assert!(middle.on.is_empty() && middle.x == [-0.5, 0.0], "{middle:?}");
+    }
+}
+
+/// Rests where a whole part becomes another number: x = k, where 1/2 - floor x is half of the time
+/// 1/2 and half of it -1/2, or mod(x, 1) - 1/4 three quarters of it -1/4.
+#[test]
+fn rests_on_whole_parts_are_found() {
+    let find = |f: &str, low: f64, high: f64| {
+        let text = format!("states = ['x']\nf = ['{f}']");
+        crate::rests::rests(&model(&text), &[(low, high)]).unwrap()
+    };
+    for (low, high) in [(-10.0, 10.0), (-2.0, 2.3), (0.5, 1.5)] {
+        let found = find("0.5 - floor(x)", low, high);
+        let [rest] = &found[..] else { panic!("{low} {high}: {found:?}") };
+        assert_eq!((rest.x[0], rest.kind().as_str()), (1.0, "stable"));
+        assert_eq!((rest.on[0].surface.as_str(), rest.on[0].weight), ("x - 1", 0.5));
+    }
+    let found = find("mod(x, 1) - 0.25", -0.5, 5.0);
+    let (on, off): (Vec<_>, Vec<_>) = found.iter().partition(|r| !r.on.is_empty());
+    assert_eq!((on.len(), off.len()), (6, 5), "{found:?}");
+    for (k, rest) in on.iter().enumerate() {
+        near(rest.x[0], k as f64, 1e-15);
+        near(rest.on[0].weight, 0.75, 1e-12);
+        assert_eq!(rest.attracting, Some(true));
+    }
+    assert!(off.iter().all(|r| r.kind() == "unstable node" && r.x[0].rem_euclid(1.0) == 0.25));
+    // With other surfaces: floor y = 2 and x = 0 at once.
+    let text = "states = ['x', 'y']\nf = ['-sign(x)', '1.5 - floor(y)']";
+    let found = crate::rests::rests(&model(text), &[(-3.0, 3.0); 2]).unwrap();
+    let [corner] = &found[..] else { panic!("{found:?}") };
+    assert_eq!((corner.x.as_slice(), corner.kind().as_str()), (&[0.0, 2.0][..], "stable"));
+}
+
+/// Of three rests within a thousandth of the box the one in the middle.
+#[test]
+fn rests_between_rests_are_found() {
+    for (middle, far) in [(1.0001, 1.0002), (1.00003, 1.0003)] {
+        let text = format!("states = ['x']\nf = ['(x - 1)*(x - {middle})*(x - {far})']");
+        let found = crate::rests::rests(&model(&text), &[(0.9, 1.1)]).unwrap();
+        let [_, rest, _] = &found[..] else { panic!("{found:?}") };
+        near(rest.x[0], middle, 1e-9);
+    }
+}
+
 /// Rests that fill a curve are one row with its ends; those on several surfaces have the weights of
 /// a mixture, or of more dimensions.
 #[test]
