@@ -596,6 +596,46 @@ fn tangent_vectors_pass_switches_by_saltation_matrices() {
     }
 }
 
+/// Exponents whatever the units of the states; minus infinity where sliding or a reset takes a
+/// direction away, and nowhere else.
+#[test]
+fn exponents_have_no_units_and_vanish_by_switches_alone() {
+    use crate::motion::tangent::exponents;
+    let of = |text: &str, t_end: f64, transient: f64, count: usize| {
+        let options = Options { t_end, ..Options::default() };
+        exponents(&model(text), &options, transient, count).unwrap()
+    };
+    for unit in [1.0, 1e6, 1e9] {
+        let text = format!(
+            "states = ['x', 'y']\nstart = [{:e}, 0]\nf = ['0.2*x - {:e}*y - x*r', '{:e}*x + 0.2*y \
+                - y*r']\n[let]\nr = '(x/{unit:e})^2 + (y*{unit:e})^2'",
+            0.5 * unit,
+            unit * unit,
+            1.0 / (unit * unit)
+        );
+        for transient in [0.0, 100.0] {
+            let found = of(&text, 600.0, transient, 2);
+            let (top, low) = (found.values[0], found.values[1]);
+            assert!(top.abs() < 1e-3 + found.errors[0], "{unit:e}: {found:?}");
+            assert!((low + 0.4).abs() < 1e-3 + found.errors[1], "{unit:e}: {found:?}");
+        }
+    }
+    let found =
+        of("states = ['x', 'y']\nstart = [1, 1]\nf = ['-x', '-3*y + 1e17*x']", 20.0, 1.0, 2);
+    near(found.values[0], -1.0, 1e-2);
+    near(found.values[1], -3.0, 1e-2);
+    let reset = "states = ['x', 'y']\nstart = [1, 1]\nf = ['-x', '-3*y']\n[[event]]\nevery = 1\nset \
+        = { y = '1' }";
+    assert_eq!(of(reset, 30.0, 3.0, 2).values[1], f64::NEG_INFINITY);
+    // The clock (c, s) drives q, whose growth, 0.3/sqrt(pi) - 0.001, leaves neighbours of the clock
+    // in its own direction alone.
+    let driven = "states = ['c', 's', 'q']\nstart = [1, 0, 1]\nf = ['c*g - s', 'c + s*g', \
+        'q*(30*exp(-(c/0.01)^2) - 0.001)']\n[let]\ng = '1 - c^2 - s^2'";
+    let found = of(driven, 400.0, 0.0, 3);
+    assert!((found.values[0] - 0.168_257).abs() < found.errors[0], "{found:?}");
+    assert!(found.values.len() < 3 && found.values.iter().all(|v| v.is_finite()), "{found:?}");
+}
+
 /// The converter's orbit as matrix exponentials give it (SciPy's `expm`, Newton's method on the
 /// period), and its averages: E + v2 = v1 whatever the ripple, and without ripple v2 = E d/(1 - d),
 /// or E d/sqrt(K) where the diode blocks before the period ends (Cuk & Middlebrook 1977).

@@ -230,6 +230,13 @@ fn of_general(arguments: &Arguments, question: &GeneralExponents) -> Result<cli:
                 text +=
                     &format!("{value:.6} +- {half_width:.1e} per unit time ({meaning}{mean})\n");
             }
+            if found.len() < question.count {
+                let missing = question.count - found.len();
+                text += &format!(
+                    "{missing} more not told from rounding: their directions are parallel to those \
+                        above in 13 digits; give states units in which they are of like size\n"
+                );
+            }
             text.into_bytes()
         }
     };

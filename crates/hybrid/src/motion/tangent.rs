@@ -36,6 +36,9 @@ pub(super) struct Tangents {
     pub bounds: Vec<[f64; 2]>,
     /// The size of each state in the last step.
     pub sizes: Vec<f64>,
+    /// Whether a matrix without an inverse has acted since the growth was noted last: of sliding
+    /// that began, or of a reset.
+    pub flattened: bool,
 }
 
 /// Field, gradient and speed before a condition is met.
@@ -249,7 +252,7 @@ impl Follower<'_> {
                 }
             }
         }
-        self.tangents = Some(Tangents { vectors, ..Tangents::default() });
+        self.tangents = Some(Tangents { vectors, flattened: k > 0, ..Tangents::default() });
         Ok(())
     }
 
@@ -446,6 +449,11 @@ impl Follower<'_> {
             (0..n).map(|i| (0..n).map(|j| by_state[i * n + j] * v[j]).sum()).collect()
         };
         let moved = times(&before.field);
+        let sizes = (tangents.sizes.len() == n).then_some(&tangents.sizes[..]);
+        let jump = |i: usize| (field[i] - moved[i] - by_time[i]) / before.speed;
+        let saltation: Vec<f64> =
+            (0..n * n).map(|at| by_state[at] + jump(at / n) * before.gradient[at % n]).collect();
+        tangents.flattened |= !has_inverse(&saltation, sizes.unwrap_or(&vec![1.0; n]));
         for y in &mut tangents.vectors {
             let later = before.gradient.iter().zip(y.iter()).map(|(g, y)| g * y).sum::<f64>()
                 / before.speed;
@@ -458,6 +466,38 @@ impl Follower<'_> {
         Ok(())
     }
 }
+
+/// Whether a matrix has an inverse, to rounding, in units of the states' sizes.
+fn has_inverse(matrix: &[f64], sizes: &[f64]) -> bool {
+    let n = sizes.len();
+    let unit = |i: usize| if sizes[i] > 0.0 { sizes[i] } else { 1.0 };
+    let mut rows: Vec<Vec<f64>> =
+        (0..n).map(|i| (0..n).map(|j| matrix[i * n + j] * (unit(j) / unit(i))).collect()).collect();
+    for row in &mut rows {
+        let largest = row.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+        row.iter_mut().for_each(|v| *v /= largest);
+    }
+    for k in 0..n {
+        let places = (k..n).flat_map(|i| (k..n).map(move |j| (i, j)));
+        let size = |(i, j): &(usize, usize)| rows[*i][*j].abs();
+        let Some((i, j)) = places.max_by(|a, b| size(a).total_cmp(&size(b))) else { break };
+        if !(rows[i][j].abs() > FLAT) {
+            return false;
+        }
+        rows.swap(k, i);
+        rows.iter_mut().for_each(|row| row.swap(k, j));
+        for i in k + 1..n {
+            let factor = rows[i][k] / rows[k][k];
+            for j in k..n {
+                rows[i][j] -= factor * rows[k][j];
+            }
+        }
+    }
+    true
+}
+
+/// Pivots below this, in rows of size one, are rounding.
+const FLAT: f64 = 1e-12;
 
 /// Elimination with pivots on numbers that carry a derivative.
 fn solve_duals(mut a: Vec<D>, mut b: Vec<D>) -> Vec<D> {
@@ -507,7 +547,7 @@ pub(super) fn explicit(options: &Options) -> Result<(), HybridError> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Exponents {
     /// The exponents, largest first, per unit time; minus infinity for directions that sliding
-    /// takes away.
+    /// takes away. Fewer than were asked for where a vector was not told from those before it.
     pub values: Vec<f64>,
     /// Half the width of a 95 % interval of each: the scatter of twenty parts of the run, or how
     /// far the growth swings about its line if that is more (in regular motion parts are alike, and
@@ -559,6 +599,8 @@ pub fn exponents(
         samples: vec![],
         every: 1,
         steps: 0,
+        units: Vec::new(),
+        told: count.min(n),
     });
     let (outcome, follower) = follower.run_whole(&mut |_| true)?;
     if outcome.ending != Ending::Finished {
@@ -571,7 +613,10 @@ pub fn exponents(
     let growth = follower.growth.ok_or_else(|| HybridError::Bad("there is no mean".into()))?;
     let part = (options.t_end - begin) / PARTS as f64;
     let mut found = Vec::new();
-    for (k, sums) in growth.sums.iter().enumerate() {
+    if growth.told == 0 {
+        return Err(HybridError::Bad("the tangent vector leaves the finite numbers".into()));
+    }
+    for (k, sums) in growth.sums.iter().enumerate().take(growth.told) {
         let rates: Vec<f64> = sums.iter().map(|s| s / part).collect();
         let from = growth.from.unwrap_or(begin);
         let mean = sums.iter().sum::<f64>() / (options.t_end - from);
@@ -596,6 +641,67 @@ pub(super) struct Growth {
     samples: Vec<(f64, Vec<f64>)>,
     every: u64,
     steps: u64,
+    /// The units in which vectors are orthogonal, one over a state's; none until the first step.
+    units: Vec<f64>,
+    /// So many vectors have been told from those before them and from rounding.
+    told: usize,
+}
+
+/// Sizes of states that differ by less than this factor have one unit.
+const ONE_UNIT: f64 = 1e6;
+
+/// One over the unit of each state, a power of two: its size in a motion with these bounds. Where
+/// units differ very much, vectors that are orthogonal in the plain product are parallel to
+/// rounding.
+fn units(bounds: &[[f64; 2]]) -> Vec<f64> {
+    let sizes: Vec<f64> = bounds.iter().map(|[a, b]| a.abs().max(b.abs())).collect();
+    let moving = || sizes.iter().copied().filter(|s| *s > 0.0 && s.is_finite());
+    let (low, high) = (moving().fold(f64::INFINITY, f64::min), moving().fold(0.0, f64::max));
+    let unit = |size: &f64| {
+        let mut unit = 1.0;
+        if high > ONE_UNIT * low && *size > 0.0 && size.is_finite() {
+            while unit * size >= 2.0 {
+                unit *= 0.5;
+            }
+            while unit * size < 1.0 {
+                unit *= 2.0;
+            }
+        }
+        unit
+    };
+    sizes.iter().map(unit).collect()
+}
+
+/// What the length of a vector was, and what is left of it beside those before.
+struct Left {
+    before: f64,
+    after: f64,
+}
+
+/// Makes vectors orthonormal in these units, one after the other. Those of which nothing is left
+/// but rounding are made zero.
+fn orthonormal(vectors: &mut [Vec<f64>], units: &[f64]) -> Vec<Left> {
+    let product = |a: &[f64], b: &[f64]| -> f64 {
+        a.iter().zip(b).zip(units).map(|((a, b), unit)| (a * unit) * (b * unit)).sum()
+    };
+    let mut left = Vec::with_capacity(vectors.len());
+    for i in 0..vectors.len() {
+        let (done, open) = vectors.split_at_mut(i);
+        let y = &mut open[0];
+        let before = product(y, y).sqrt();
+        for other in done.iter() {
+            let dot = product(other, y);
+            y.iter_mut().zip(other).for_each(|(y, o)| *y -= dot * o);
+        }
+        let after = product(y, y).sqrt();
+        if after > 1e-13 * before {
+            y.iter_mut().for_each(|v| *v /= after);
+        } else {
+            y.fill(0.0);
+        }
+        left.push(Left { before, after });
+    }
+    left
 }
 
 /// Most samples of the growth that are kept.
@@ -643,32 +749,39 @@ impl Follower<'_> {
         let (Some(growth), Some(tangents)) = (&mut self.growth, &mut self.tangents) else { return };
         let part = ((t - growth.begin) / (growth.end - growth.begin) * PARTS as f64)
             .clamp(0.0, PARTS as f64 - 1.0) as usize;
-        for i in 0..tangents.vectors.len() {
-            let (done, open) = tangents.vectors.split_at_mut(i);
-            let y = &mut open[0];
-            let size_before = y.iter().map(|v| v * v).sum::<f64>().sqrt();
-            for other in done.iter() {
-                let dot: f64 = other.iter().zip(y.iter()).map(|(a, b)| a * b).sum();
-                y.iter_mut().zip(other).for_each(|(y, o)| *y -= dot * o);
+        if growth.units.is_empty() {
+            growth.units = units(&tangents.bounds);
+            // They began as unit vectors of the states.
+            for (sums, unit) in growth.sums.iter_mut().zip(&growth.units) {
+                sums[0] -= if growth.from.is_some() { ln(*unit) } else { 0.0 };
             }
-            let size = y.iter().map(|v| v * v).sum::<f64>().sqrt();
-            let gone = !(size > 1e-13 * size_before);
+        }
+        let flattened = std::mem::take(&mut tangents.flattened);
+        let left = orthonormal(&mut tangents.vectors, &growth.units);
+        for (i, Left { before, after }) in left.iter().enumerate() {
+            let gone = !(*after > 1e-13 * before);
             if growth.from.is_some() {
-                growth.sums[i][part] += if gone { f64::NEG_INFINITY } else { ln(size) };
+                growth.sums[i][part] += if gone { f64::NEG_INFINITY } else { ln(*after) };
             }
-            if gone {
-                // Sliding has taken this direction away.
-                y.fill(0.0);
-            } else {
-                y.iter_mut().for_each(|v| *v /= size);
+            // Sliding has taken this direction away, or has done so before.
+            if gone && !flattened && *before != 0.0 {
+                growth.told = growth.told.min(i);
             }
         }
         if growth.from.is_some() {
             growth.sample(t);
         }
         // The mean begins with the first step that ends after the transient.
-        if t >= growth.begin {
-            growth.from = growth.from.or(Some(t));
+        if t >= growth.begin && growth.from.is_none() {
+            growth.from = Some(t);
+            let units = units(&tangents.bounds);
+            let left = match units == growth.units {
+                true => Vec::new(),
+                false => orthonormal(&mut tangents.vectors, &units),
+            };
+            growth.units = units;
+            let lost = left.iter().position(|l| l.before > 0.0 && !(l.after > 1e-13 * l.before));
+            growth.told = growth.told.min(lost.unwrap_or(usize::MAX));
         }
     }
 }
