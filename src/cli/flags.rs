@@ -110,7 +110,7 @@ pub struct RunFlags {
     pub atol: Option<f64>,
     /// Longest step, inf for any [default: a tenth of the time between restarts or kicks,
     /// NDSolve's; of general systems inf].
-    #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
+    #[arg(long, allow_hyphen_values = true, value_parser = longest, help_heading = "Method")]
     pub max_step: Option<f64>,
     /// Number of steps after which the run is given up [default: 400000000].
     #[arg(long, allow_negative_numbers = true, help_heading = "Method")]
@@ -947,6 +947,17 @@ impl RunFlags {
             ["all"] => ExitRule::All,
             _ => return Err(wrong()),
         })
+    }
+}
+
+/// A length: a finite number, or the word inf.
+fn longest(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(length) if length.is_infinite() && text.contains(char::is_numeric) => {
+            Err("beyond the range of double precision; give inf for any length".into())
+        }
+        Ok(length) => Ok(length),
+        Err(_) => Err("not a number; write it like 0.25, or inf".into()),
     }
 }
 
