@@ -188,25 +188,23 @@ impl Follower<'_> {
             if !quiet && !self.emit(self.t, Some(&event.name), observe) {
                 return Ok(Some(Ending::Interrupted));
             }
-            let seen = self.x.clone();
             if !event.set.is_empty() {
-                self.note_reset(*i, &event.set, &seen);
+                self.note_reset(*i, &event.set, &new);
             }
             match &self.equation.resets[*i] {
                 Some(program) => {
-                    self.variables[..self.n].copy_from_slice(&seen);
+                    self.variables[..self.n].copy_from_slice(&self.x);
                     self.variables[self.n] = self.t;
-                    let mut values = vec![0.0; event.set.len()];
+                    let mut values = std::mem::take(&mut self.room);
+                    values.resize(event.set.len(), 0.0);
                     program.evaluate(&self.variables, &mut values);
-                    event
-                        .set
-                        .iter()
-                        .zip(values)
-                        .for_each(|((state, _), value)| new[*state] = value);
+                    let set = event.set.iter().zip(&values);
+                    set.for_each(|((state, _), value)| new[*state] = *value);
+                    self.room = values;
                 }
                 None => {
                     for (state, value) in &event.set {
-                        new[*state] = self.equation.value(value, self.t, &seen);
+                        new[*state] = self.equation.value(value, self.t, &self.x);
                     }
                 }
             }

@@ -502,12 +502,26 @@ impl Follower<'_> {
         const FLAT: f64 = 0.1;
         const MOST_DOUBLINGS: usize = 48;
         let Some(place) = self.place_of(sought) else { return };
-        let (t, x, mut field) = (step.t + step.h, step.y.clone(), vec![0.0; self.n]);
-        self.rhs(t, &x, &mut field);
-        let slope = Self::along(&self.compiled, &self.variables, &field)[place];
-        if slope.abs() > FLAT * nearby.abs() || !(self.value_of(sought, t, &x) * before > 0.0) {
+        let t = step.t + step.h;
+        if !(self.value_of(sought, t, &step.y) * before > 0.0) {
             return;
         }
+        let (n, mut field) = (self.n, std::mem::take(&mut self.room));
+        field.resize(n, 0.0);
+        self.rhs(t, &step.y, &mut field);
+        let slope = match &self.compiled.affine[place] {
+            Some(sum) => sum.factors.iter().fold(0.0, |slope, (i, factor)| match *i {
+                i if i < n => slope + factor * field[i],
+                i if i == n => slope + factor,
+                _ => slope,
+            }),
+            None => Self::along(&self.compiled, &self.variables, &field)[place],
+        };
+        if slope.abs() > FLAT * nearby.abs() {
+            self.room = field;
+            return;
+        }
+        let x = step.y.clone();
         let mut later = f64::EPSILON * t.abs().max(longest);
         for _ in 0..MOST_DOUBLINGS {
             if step.h + later > longest {
@@ -528,10 +542,18 @@ impl Follower<'_> {
     pub(super) fn tell_poles(&mut self, step: &Step, theta: f64, met: &mut [Sought]) {
         const NEAR: f64 = 1e-9;
         const GROWTH: f64 = 100.0;
-        let (t, mut x) = (step.t + theta * step.h, vec![0.0; self.n]);
-        step.at(theta, &mut x);
+        let (t, mut x) = (step.t + theta * step.h, Vec::new());
         for sought in met {
             let Sought::Watched(i) = *sought else { continue };
+            // A sum of variables has no poles.
+            let plain = self.plain_place(*sought);
+            if plain.is_some_and(|place| self.compiled.affine[place].is_some()) {
+                continue;
+            }
+            if x.is_empty() {
+                x = vec![0.0; self.n];
+                step.at(theta, &mut x);
+            }
             let there = self.value_of(*sought, t, &x).abs();
             let e = &self.equation.watched[i];
             // The rounding of a sum that is zero has no size.
