@@ -609,22 +609,23 @@ fn relay_with_parabolic_feedback() {
         "{last:?} {exact}"
     );
 
-    // Gain 1, time-optimal: the switching curve is an orbit of f-, a fold at every point.
+    // Gain 1, time-optimal: the switching curve is an orbit of f-, along which the motion comes to
+    // rest at t = 2 sqrt(2).
     let optimal = builtin::<2>("relay-parabolic", &[("gain", 1.0)]);
-    let error = run(
-        &optimal,
-        vector![2.0, 0.0],
-        9.0,
-        &FilippovOptions::default(),
-        STAY,
-        &mut Trajectory::new(1),
-    )
-    .unwrap_err();
+    let mut out = Trajectory::new(1);
+    let end =
+        run(&optimal, vector![2.0, 0.0], 9.0, &FilippovOptions::default(), STAY, &mut out).unwrap();
+    assert!(end.x.amax() < 1e-6 && end.mode == Some(Mode::SlidingAttracting), "{end:?}");
+    let landing = out.events[0];
     assert!(
-        matches!(error, FilippovError::NonTransversal { t, .. } if (t
-            - 2.0_f64.sqrt()).abs() < 1e-9),
-        "{error}"
+        landing.kind == EventKind::Landing { from: Side::Plus }
+            && (landing.t - 2.0_f64.sqrt()).abs() < 1e-9,
+        "{landing:?}"
     );
+    let end =
+        run(&optimal, vector![2.0, 0.0], 2.5, &FilippovOptions::default(), STAY, &mut out).unwrap();
+    let v = 2.5 - 8.0_f64.sqrt();
+    close(end.x, vector![0.5 * v * v, v], 1e-9);
 }
 
 #[test]

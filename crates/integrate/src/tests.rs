@@ -1247,8 +1247,8 @@ const FILIPPOV_IN_THE_PLANE: &str = "
     relay-parabolic: 61 steps, 0 passages, d3ffe9d71cd37cca
     relay-parabolic: 117 steps, 0 passages, 0c02ee901678169c
     relay-parabolic: 93 steps, 0 passages, 18c5fd9d2f82f14a
-    relay-parabolic: 4 steps, 0 passages, bc4c10f401c59638
-    relay-parabolic: 3 steps, 0 passages, c0ad80198935b69c
+    relay-parabolic: 361 steps, 0 passages, d38a7ed95d48afe2
+    relay-parabolic: 33 steps, 0 passages, 1dc01941517acc2e
     fused-focus: 24 steps, 0 passages, f6bee66e3d9ccf84
     fused-focus: 18 steps, 0 passages, a24441c2af2f84b6
     relay-square: 19 steps, 0 passages, 73277e61a3b18b49

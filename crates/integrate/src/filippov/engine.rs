@@ -477,6 +477,17 @@ struct Limits {
     blur: f64,
     /// Distance of a zero of h from the surface, as a share of the state, above which h jumps.
     jump: f64,
+    /// At a zero h is smaller than this share of what it was halfway to it; at a pole or jump it is
+    /// not.
+    falls: f64,
+    /// What is below this share is as good as zero.
+    small: f64,
+    /// A field runs along the surface if it does so at these distances before and behind, as shares
+    /// of the states.
+    along: [f64; 3],
+    /// A field has no limit at the surface if from the first of these distances to the second, and
+    /// on to the third, it grows by as much again.
+    approach: [f64; 3],
     /// Sliding restarts on the surface when it has drifted off by this share of the state, or by
     /// `drift_in_tolerances`.
     drift: f64,
@@ -508,6 +519,10 @@ const LIMITS: Limits = Limits {
     kink: 1e-3,
     blur: 300.0,
     jump: 1e-7,
+    falls: 0.9,
+    small: 1e-6,
+    along: [1e-4, 1e-2, 0.1],
+    approach: [1e-4, 1e-8, 1e-12],
     drift: 1e-10,
     drift_in_tolerances: 10.0,
     departure_chords: 256,
@@ -931,6 +946,72 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         ends.min_by(|(a, _), (b, _)| a.total_cmp(b))
     }
 
+    /// Whether the slope of h at `x`, on the surface, is of the size that h has at a state of the
+    /// flight to it.
+    fn has_slope(&self, before: &SVector<f64, N>, x: &SVector<f64, N>) -> bool {
+        let slope = gradient(self.system, x).norm();
+        let mean = self.system.switching(before).abs() / (before - x).norm();
+        let steepest = gradient(self.system, before).norm().max(mean) / LIMITS.small;
+        slope.is_finite() && slope > LIMITS.small * mean && !(slope > steepest)
+    }
+
+    /// The states' size, by which distances along and across the surface are measured.
+    fn reach(&self) -> f64 {
+        let size = self.size.norm();
+        if size > 0.0 { size } else { 1.0 }
+    }
+
+    fn is_tangent(&self, x: &SVector<f64, N>, side: Side) -> bool {
+        let l = self.lie(x);
+        match side {
+            Side::Plus => l.p.abs() <= l.zero_p,
+            Side::Minus => l.q.abs() <= l.zero_q,
+        }
+    }
+
+    /// Whether the field of `side` is tangent to the surface here and all along its way there.
+    fn runs_along(&self, side: Side) -> bool {
+        let sided = self.sided();
+        let velocity = match side {
+            Side::Plus => sided.plus(&self.x),
+            Side::Minus => sided.minus(&self.x),
+        };
+        let per_speed = self.reach() / velocity.norm();
+        let on_the_way = LIMITS.along.iter().flat_map(|share| [-share, *share]);
+        let points = on_the_way
+            .map(|share| project(self.system, &(self.x + velocity * (share * per_speed))));
+        per_speed.is_finite()
+            && points.chain([self.x]).all(|x| finite(&x) && self.is_tangent(&x, side))
+    }
+
+    /// A field of which the domain ends on the surface, where it grows without bound: it makes no
+    /// sliding motion.
+    fn without_limit(&self) -> Option<Failure> {
+        let normal = gradient(self.system, &self.x).normalize() * self.reach();
+        SIDES.into_iter().find_map(|side| {
+            let (tape, ends) = self.field(side);
+            let at = |depth: f64| Failure::state(&(self.x + normal * (side.sign() * depth)));
+            let [far, near, nearest] = LIMITS.approach;
+            let across = |theta: f64| at(near * (1.0 - 2.0 * theta));
+            let (place, what) = ends.as_ref()?.first(&across, &[0.0, 1.0])?;
+            let value = |depth: f64| -> Vec<f64> {
+                let values = tape.values(&at(depth));
+                tape.outputs().iter().map(|node| values[*node].abs()).collect()
+            };
+            let (far, near, nearest) = (value(far), value(near), value(nearest));
+            let grows = |i: usize| {
+                let [first, second] = [near[i] - far[i], nearest[i] - near[i]];
+                first > 0.0 && second > 0.5 * first
+            };
+            let (t, state) = (self.t, Failure::state(&self.x));
+            ((place - 0.5).abs() <= 1e-3 && (0..N).any(grows)).then_some(Failure::Undefined {
+                t,
+                state,
+                what,
+            })
+        })
+    }
+
     /// Free flight until the surface or the end.
     fn fly(&mut self, side: Side, start: FlightStart) -> Result<State<N>, FilippovError> {
         let place = usize::from(side == Side::Minus);
@@ -1023,17 +1104,28 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                     }
                     let (t1, place) = (up_to(self.t_end, step.time(theta)), step.at(theta));
                     let x1 = project(self.system, &place);
-                    // A zero of a continuous h is on the surface but for rounding.
+                    // A zero of a continuous h is on the surface but for rounding, and h is smaller
+                    // there than before.
                     let travel = (step.x1 - step.x0).norm() + place.norm();
                     let moved = (x1 - place).norm();
-                    if moved.is_nan() || moved > LIMITS.jump * travel {
+                    let [before, there] = [0.5 * theta, theta].map(&height);
+                    let jumps = theta > LIMITS.same_moment
+                        && before > 0.0
+                        && there.abs() > LIMITS.falls * before;
+                    let on_surface = moved <= LIMITS.jump * travel;
+                    if jumps || !on_surface || !self.has_slope(&step.at(0.5 * theta), &x1) {
                         self.take(
                             side.into(),
                             t1,
                             place,
                             &Truncated { inner: step.interpolant, end: theta },
                         );
-                        return Err(FilippovError::Jump { t: t1, state: Failure::state(&place) });
+                        let (t, state) = (t1, Failure::state(&place));
+                        return Err(if jumps || there.abs() > LIMITS.small * before {
+                            FilippovError::Jump { t, state }
+                        } else {
+                            FilippovError::Slope { t, state }
+                        });
                     }
                     self.take(
                         side.into(),
@@ -1081,6 +1173,11 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             Side::Plus => (l.p, l.zero_p, l.pp, -l.q, l.zero_q, -l.mm),
             Side::Minus => (-l.q, l.zero_q, -l.mm, l.p, l.zero_p, l.pp),
         };
+        let slides = own.abs() <= own_zero && across < -across_zero && self.runs_along(side)
+            || own < -own_zero && across.abs() <= across_zero && self.runs_along(side.other());
+        if slides {
+            return Ok(self.land_for_good(side));
+        }
         if own >= -own_zero || (touch && own_second > 0.0) {
             if own_second.is_nan() || own_second <= 0.0 {
                 return self
@@ -1109,9 +1206,14 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             self.event(EventKind::Crossing { to: other }, from, Some(other.into()));
             return Ok(State::Free { side: other, start });
         }
+        Ok(self.land_for_good(side))
+    }
+
+    fn land_for_good(&mut self, from: Side) -> State<N> {
         self.accumulation = Accumulation::default();
-        self.event(EventKind::Landing { from: side }, from, Some(Mode::SlidingAttracting));
-        Ok(State::Sliding(Sliding::ATTRACTING))
+        let (kind, mode) = (EventKind::Landing { from }, Mode::SlidingAttracting);
+        self.event(kind, Some(from.into()), Some(mode));
+        State::Sliding(Sliding::ATTRACTING)
     }
 
     /// Sliding until a fold, a two-fold, the planned exit or the end.
@@ -1119,6 +1221,9 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
     where
         for<'b> SlidingFlow<'b, P, N>: VectorField<M>,
     {
+        if let Some(failure) = self.without_limit() {
+            return Err(failure.into());
+        }
         let direction = sliding.direction();
         let place = if direction > 0.0 { 2 } else { 3 };
         let gates = self.gates[place].take().unwrap_or_else(|| {
@@ -1151,6 +1256,9 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         let mut fresh = true;
         let mut idle = 0;
         let mut ahead = TwoFoldAhead::new();
+        let mut along = SIDES.into_iter().find(|side| {
+            !sliding.repelling && self.is_tangent(&self.x, *side) && self.runs_along(*side)
+        });
         if let Err(failure) =
             method.restart(&flow, 0.0, lift(&self.x), f64::INFINITY, f64::INFINITY)
         {
@@ -1172,7 +1280,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                 }
                 Err(failure) => return Err(self.cause_on_surface().unwrap_or(failure).into()),
             };
-            let end = self.sliding_end(&step, &sliding, t_base, fresh);
+            let end = self.sliding_end(&step, &sliding, along, t_base, fresh);
             fresh = false;
             let until = end.map_or(f64::INFINITY, |(theta, _)| theta);
             if let Some((theta, what)) =
@@ -1209,6 +1317,9 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             self.take(mode, t1, x1, &interpolant);
             if let Some((_, end)) = end {
                 break Some(end);
+            }
+            if along.is_some_and(|side| !self.is_tangent(&self.x, side)) {
+                (along, fresh) = (None, true);
             }
             if idle >= LIMITS.idle_steps {
                 self.count(&method.statistics());
@@ -1264,6 +1375,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         &self,
         step: &Step<'_, M>,
         sliding: &Sliding,
+        along: Option<Side>,
         t_base: f64,
         fresh: bool,
     ) -> Option<(f64, SlidingEnd)> {
@@ -1275,6 +1387,18 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             }
         };
         for (i, side) in [Side::Plus, Side::Minus].into_iter().enumerate() {
+            if along == Some(side) {
+                // Rounding of a margin that is zero is no end; what leads away is.
+                let leaves = |k: usize| {
+                    let z = step.at(k as f64 / CHORDS as f64);
+                    let x = project(self.system, &without_clock(&z));
+                    !self.is_tangent(&x, side) && sliding.margins(&self.sided(), &x)[i] < 0.0
+                };
+                if let Some(k) = (1..=CHORDS).find(|k| leaves(*k)) {
+                    propose((k - 1) as f64 / CHORDS as f64, SlidingEnd::Fold(side));
+                }
+                continue;
+            }
             let mut start = Start::Away;
             if fresh {
                 let l = self.lie(&self.x);

@@ -45,6 +45,10 @@
 //! **Two switching surfaces** are followed one at a time ([`run_two_surfaces`]); where they meet,
 //! the motion is followed if the four fields decide it, and refused if not.
 //!
+//! **A field that runs along the surface** everywhere (a closed valve, a saturation) is slid along
+//! if the other one points to the surface: the only velocity of Filippov's hull that is tangent to
+//! it is that field's own.
+//!
 //! **Non-transversal cases.** A fold whose second Lie derivative vanishes too (a cusp), and contact
 //! with a two-fold that is not reached along a sliding direction, end with
 //! [`FilippovError::NonTransversal`]; crossings that accumulate (invisible two-folds have such
@@ -341,6 +345,19 @@ pub enum FilippovError {
         t = Short(*t)
     )]
     Jump {
+        /// Time reached.
+        t: f64,
+        /// State reached.
+        state: Vec<f64>,
+    },
+    /// The switching function comes to zero without a slope.
+    #[error(
+        "the switching function h comes to 0 at t = {t}, state {state:?}, without a finite slope \
+            above 0, by which its sides are told there: write it with one, y for y^3, abs(y)*y or \
+            sqrt(abs(y))*sign(y)",
+        t = Short(*t)
+    )]
+    Slope {
         /// Time reached.
         t: f64,
         /// State reached.

@@ -623,3 +623,83 @@ fn thin_pulses_are_seen() {
         assert!((q - area).abs() < 1e-6, "{h}: {q}");
     }
 }
+
+/// A run of a plane system with these formulas.
+fn plane(
+    [h, plus, minus]: [&str; 3],
+    start: [f64; 2],
+    t_end: f64,
+) -> Result<FilippovSummary<2>, FilippovError> {
+    let text = format!(
+        "states = ['x', 'y']\nstart = [0, 0]\nh = '{h}'\nplus = [{plus}]\nminus = [{minus}]"
+    );
+    let text = twofold_system::Definition::from_toml(&text, "").unwrap_or_else(|e| panic!("{e}"));
+    let bound: Bound<2> = System::new(text).bind().unwrap();
+    let settings = FilippovOptions::default();
+    let rule = ExitRule::Undecided;
+    run(&bound, start.into(), t_end, &settings, rule, &mut Trajectory::new(1))
+}
+
+/// A closed valve, a saturation: one field runs along the surface, and the other one leads to it.
+#[test]
+fn a_field_that_runs_along_the_surface_is_slid_along() {
+    for (plus, minus, start, t_end, want) in [
+        ("'1', '0'", "'1', '1'", [0.0, -1.0], 3.0, [3.0, 0.0]),
+        ("'1', '-y'", "'1', '1'", [0.0, -1.0], 3.0, [3.0, 0.0]),
+        ("'1', '-y^2'", "'1', '1'", [0.0, -1.0], 3.0, [3.0, 0.0]),
+        ("'1', '0'", "'2', '1'", [0.0, -1.0], 3.0, [4.0, 0.0]),
+        ("'1', '-1'", "'3', 'y*x'", [0.0, 1.0], 3.0, [7.0, 0.0]),
+        ("'1', '-y'", "'1', '1'", [0.0, 1.0], 30.0, [30.0, 0.0]),
+        ("'cos(x)', '-1'", "'1', '0'", [0.0, 0.5], 2.0, [0.5403023058681398 + 1.5, 0.0]),
+        ("'1', '0'", "'1', '1'", [0.0, 0.0], 3.0, [3.0, 0.0]),
+    ] {
+        for mirrored in [false, true] {
+            let formulas = if mirrored { ["-y", minus, plus] } else { ["y", plus, minus] };
+            let end = plane(formulas, start, t_end).unwrap_or_else(|e| panic!("{formulas:?} {e}"));
+            let mut off = end.x - SVector::from(want);
+            if plus.starts_with("'cos") {
+                // sin(x) grows with x' = cos(x) until y = 0 at t = 0.5.
+                off[0] = end.x[0] - (0.5_f64.tanh().asin() + 1.5);
+            }
+            assert!(off.amax() < 1e-9, "{formulas:?} {}", end.x);
+        }
+    }
+    // The valve opens at x = 1: both fields are then tangent to the surface.
+    let end = plane(["y", "'1', 'x - 1'", "'1', '0'"], [0.0, 0.1], 3.0);
+    assert!(end.is_err(), "{end:?}");
+}
+
+/// h that jumps, has a pole, or has no slope where it comes to zero.
+#[test]
+fn a_switching_function_without_a_simple_zero_is_named() {
+    let crossing = |h: &str| plane([h, "'1', 'x'", "'0.5', '1'"], [-2.0, 1.0], 6.0);
+    let same = crossing("y").unwrap().x;
+    for h in ["1e12*y", "1e-12*y", "tanh(y)", "y*exp(5*x)"] {
+        assert!((crossing(h).unwrap().x - same).amax() < 1e-8, "{h}");
+    }
+    for h in ["y^3", "abs(y)*y", "sqrt(abs(y))*sign(y)"] {
+        let end = crossing(h);
+        assert!(matches!(end, Err(FilippovError::Slope { .. })), "{h}: {end:?}");
+    }
+    for end in [crossing("sign(y)"), plane(["tan(x)", "'1', '1'", "'1', '0'"], [0.0, 0.0], 3.0)] {
+        assert!(matches!(end, Err(FilippovError::Jump { .. })), "{end:?}");
+    }
+}
+
+/// Fields that grow without bound towards the surface make no sliding motion; those that end there
+/// do.
+#[test]
+fn sliding_needs_fields_with_values_on_the_surface() {
+    for (field, named) in [("ln(x)", "ln(x)"), ("1/x", "1/x"), ("ln(x)*y", "ln(x)")] {
+        let plus = format!("'-1', '{field}'");
+        let end = plane(["x", &plus, "'1', '0'"], [0.5, 0.1], 3.0);
+        let error = end.unwrap_err().to_string();
+        let at = error.contains("t = 0.5") || error.contains("t = 0.49999999");
+        assert!(error.contains(named) && at, "{error}");
+    }
+    // The area of the root, then half of nothing; a root's end costs half of a step's digits.
+    let end = plane(["x", "'-1', 'sqrt(x)'", "'1', '0'"], [0.5, 0.0], 3.0).unwrap();
+    assert!((end.x[1] - 2.0 / 3.0 * 0.5_f64.powf(1.5)).abs() < 1e-7, "{}", end.x);
+    let end = plane(["x - 1", "'-1', 'ln(x)'", "'1', '1/x'"], [1.5, 0.0], 3.0).unwrap();
+    assert!((end.x[1] - (1.5 * 1.5_f64.ln() - 0.5 + 1.25)).abs() < 1e-9, "{}", end.x);
+}
