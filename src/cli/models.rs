@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::CliError;
+use crate::hybrid::data::BadTable;
 use crate::hybrid::definition::is_general;
 use crate::hybrid::model::ModelError;
 use crate::hybrid::{Definition, Model};
@@ -65,7 +66,7 @@ pub fn each_once(flag: &str, texts: &[String]) -> Result<(), CliError> {
 pub fn named(name: &str, set: &[String], any: bool) -> Result<Option<Model>, CliError> {
     let path = Path::new(name);
     let built_in = library::general(name).or_else(|| library::text(name).filter(|_| any));
-    let (definition, folder) = match built_in {
+    let (definition, file) = match built_in {
         Some(text) => (Definition::from_toml(text, name), None),
         None => {
             if library::text(name).is_some() || !path.is_file() {
@@ -81,17 +82,26 @@ pub fn named(name: &str, set: &[String], any: bool) -> Result<Option<Model>, Cli
             } else {
                 Definition::from_toml(&text, name)
             };
-            (read, path.parent())
+            (read, path.parent().map(|folder| (folder, text)))
         }
     };
     let wrong = |problem: String| CliError::Usage(format!("--system {name}: {problem}"));
     let mut model = Model::new(definition.map_err(|e| wrong(e.to_string()))?);
     for (table, entry) in model.definition().tables().to_vec() {
-        let text = match folder {
-            Some(folder) => read_text(&folder.join(&entry.file))?,
-            None => library::table(&entry.file).unwrap_or_default().to_owned(),
+        let Some((folder, text)) = &file else {
+            let data = library::table(&entry.file).unwrap_or_default();
+            model = model.with_table(&table, data).map_err(|e| wrong(e.to_string()))?;
+            continue;
         };
-        model = model.with_table(&table, &text).map_err(|e| wrong(e.to_string()))?;
+        let about = |error: &BadTable| {
+            wrong(Definition::about_table(text, name, &table, error).to_string())
+        };
+        let data = read_text(&folder.join(&entry.file))
+            .map_err(|e| about(&BadTable::unread(e.to_string())))?;
+        model = model.with_table(&table, &data).map_err(|error| match &error {
+            ModelError::Table(bad) => about(bad),
+            _ => wrong(error.to_string()),
+        })?;
     }
     each_once("--set", set)?;
     for text in set {

@@ -16,8 +16,26 @@ pub struct Table {
 
 /// An error in a table's data.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{0}")]
-pub struct BadTable(String);
+#[error("{why}")]
+pub struct BadTable {
+    why: String,
+    /// The key of the table's entry that it is about.
+    pub(crate) key: &'static str,
+    /// What to do.
+    pub(crate) help: &'static str,
+}
+
+impl BadTable {
+    /// A file that could not be read, and why.
+    pub fn unread(why: String) -> Self {
+        Self { why, key: "file", help: "put the table's CSV file beside the system's file" }
+    }
+
+    fn data(why: String) -> Self {
+        let help = "give a line of column names, then rows of finite numbers, times increasing";
+        Self { why, key: "file", help }
+    }
+}
 
 impl Table {
     /// Reads the columns that `entry` names from a CSV text with a line of names; lines that begin
@@ -30,28 +48,41 @@ impl Table {
         let file = &entry.file;
         let mut reader = csv::ReaderBuilder::new()
             .comment(Some(b'#'))
+            .flexible(true)
             .trim(csv::Trim::All)
             .from_reader(csv.as_bytes());
-        let header = reader.headers().map_err(|e| BadTable(format!("{file}: {e}")))?.clone();
-        let column = |name: &str| {
+        let header = reader.headers().map_err(|e| BadTable::data(format!("{file}: {e}")))?.clone();
+        let column = |name: &str, key| {
             header.iter().position(|h| h == name).ok_or_else(|| {
                 let known: Vec<&str> = header.iter().collect();
-                BadTable(format!("{file} has no column `{name}`; it has {}", known.join(", ")))
+                let why = format!("{file} has no column `{name}`; it has {}", known.join(", "));
+                BadTable { why, key, help: "name a column as the file's first line has it" }
             })
         };
-        let (at, value) = (column(&entry.time)?, column(&entry.column)?);
+        let (at, value) = (column(&entry.time, "time")?, column(&entry.column, "column")?);
         let (mut knots, mut values) = (Vec::new(), Vec::new());
         for (row, record) in reader.records().enumerate() {
-            let record = record.map_err(|e| BadTable(format!("{file}: {e}")))?;
+            let record = record.map_err(|e| BadTable::data(format!("{file}: {e}")))?;
+            if record.len() != header.len() {
+                return Err(BadTable::data(format!(
+                    "{file}, row {}: {} cells for {} columns",
+                    row + 1,
+                    record.len(),
+                    header.len()
+                )));
+            }
             let cell = |i: usize| {
                 let text = record.get(i).unwrap_or_default();
                 text.parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(|| {
-                    BadTable(format!("{file}, row {}: `{text}` is not a finite number", row + 1))
+                    BadTable::data(format!(
+                        "{file}, row {}: `{text}` is not a finite number",
+                        row + 1
+                    ))
                 })
             };
             let (t, v) = (cell(at)?, cell(value)?);
             if knots.last().is_some_and(|last| t <= *last) {
-                return Err(BadTable(format!(
+                return Err(BadTable::data(format!(
                     "{file}, row {}: the time {t} does not come after the row before it",
                     row + 1
                 )));
@@ -60,7 +91,7 @@ impl Table {
             values.push(v);
         }
         Self::new(knots, &values, entry.interpolation)
-            .map_err(|BadTable(why)| BadTable(format!("{file}: {why}")))
+            .map_err(|bad| BadTable { why: format!("{file}: {bad}"), ..bad })
     }
 
     /// The function through these points.
@@ -73,7 +104,7 @@ impl Table {
         interpolation: Interpolation,
     ) -> Result<Self, BadTable> {
         if knots.len() < 2 {
-            return Err(BadTable("a table needs at least two rows".into()));
+            return Err(BadTable::data("a table needs at least two rows".into()));
         }
         let h: Vec<f64> = knots.windows(2).map(|w| w[1] - w[0]).collect();
         let slope: Vec<f64> =

@@ -33,6 +33,7 @@
 // A diagnostic is made once, when a file is read.
 #![allow(clippy::result_large_err)]
 
+use std::collections::{BTreeMap, HashSet};
 use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
@@ -43,6 +44,9 @@ use twofold_system::expression::{
     ExpressionError, Function, General, is_name, is_reserved_in_general,
 };
 use twofold_system::{Expression, definition::State};
+
+use crate::data::BadTable;
+use crate::model::evaluate;
 
 /// Most states of a general system.
 pub const MAX_STATES: usize = 100;
@@ -473,6 +477,19 @@ impl Definition {
         })
     }
 
+    /// An error of a table's data, at its place in the text of the system's file.
+    pub fn about_table(text: &str, origin: &str, table: &str, error: &BadTable) -> Diagnostic {
+        let place = inside(&inside(&key("tables"), table), error.key);
+        let help = Some(error.help.to_owned());
+        match span_of(text, &place) {
+            Some(span) => Diagnostic::new(error.to_string(), origin, text, span, help),
+            None => {
+                let origin = format!("{origin}, tables.{table}.{}", error.key);
+                Diagnostic::new(error.to_string(), &origin, "", 0..0, help)
+            }
+        }
+    }
+
     /// The system's name; empty if it has none.
     pub fn name(&self) -> &str {
         &self.document.name
@@ -546,13 +563,19 @@ impl Definition {
         let all: Vec<&str> = names.iter().map(|(_, n)| *n).collect();
         let conditions = conditions(d, &all);
         let parse = |place: Place, text: &str, known: &[&str]| {
-            let parsed = Expression::parse_general_with(text, known, &conditions);
-            parsed.map_err(|error: ExpressionError| Problem {
+            let refused = |error: ExpressionError, place| Problem {
                 place,
                 within: Some((text.to_owned(), error.span)),
                 message: error.message,
                 help: error.help,
-            })
+            };
+            match Expression::parse_general_with(text, known, &conditions) {
+                Err(error) => Err(refused(error, place)),
+                Ok(parsed) => match wrong_constants(&parsed, text) {
+                    Some(error) => Err(refused(error, place)),
+                    None => Ok(parsed),
+                },
+            }
         };
         let n = d.states.len();
         let list = |place: Place, texts: &[Constant]| -> Result<Vec<Expression>, Problem> {
@@ -565,6 +588,7 @@ impl Definition {
             texts.iter().enumerate().map(|(i, c)| parse(item(&place, i), &c.text(), &all)).collect()
         };
         let mut parameters: Vec<Parameter> = Vec::new();
+        let mut values: BTreeMap<String, f64> = BTreeMap::new();
         for (name, entry) in &d.parameters.0 {
             let place = inside(&key("parameters"), name);
             let known: Vec<&str> = parameters.iter().map(|p| p.name.as_str()).collect();
@@ -576,7 +600,17 @@ impl Definition {
                     (*above, *below),
                 ),
             };
-            let value = parse(place.clone(), &value.text(), &known)?;
+            let value = parse(place.clone(), &value.text(), &known).map_err(|mut problem| {
+                let later = |p: &&(String, ParameterEntry)| {
+                    let named = format!("`{}`", p.0);
+                    !known.contains(&p.0.as_str()) && problem.message.contains(&named)
+                };
+                if d.parameters.0.iter().any(|p| later(&p)) {
+                    problem.help =
+                        Some("a parameter may name those that stand before it".to_owned());
+                }
+                problem
+            })?;
             if value.names().contains(&"t") {
                 return problem(
                     place,
@@ -584,6 +618,12 @@ impl Definition {
                     Some("put it into [let]"),
                 );
             }
+            let number = evaluate(&value, &|name| values.get(name).copied());
+            if !number.is_finite() {
+                let message = format!("`{name}` is {number}");
+                return problem(place, message, Some("give a value that is a finite number"));
+            }
+            values.insert(name.clone(), number);
             parameters.push(Parameter { name: name.clone(), value, about, bounds });
         }
         let mut terms = Vec::new();
@@ -653,12 +693,19 @@ impl Definition {
         for (i, entry) in d.event.iter().enumerate() {
             let place = item(&key("event"), i);
             let constants: Vec<&str> = parameters.iter().map(|p| p.name.as_str()).collect();
+            let constant = |e: &Expression| evaluate(e, &|name| values.get(name).copied());
             let when = match (&entry.when, &entry.at, &entry.every) {
                 (Some(text), None, None) => {
                     let at = inside(&place, "when");
                     let parsed = parse(at.clone(), text, &all)?;
                     let named = matches!(&parsed, Expression::Name(name)
                         if conditions.contains(&name.as_str()));
+                    if !moves(&parsed, d, &terms) {
+                        let help = "name a state or t, or give the times of the event by at = [1]";
+                        let message = "this does not change, and so never passes zero or becomes \
+                            true";
+                        return problem(at, message, Some(help));
+                    }
                     if parsed.is_condition() || named {
                         if entry.direction.is_some() {
                             let help =
@@ -679,12 +726,32 @@ impl Definition {
                         Constants::One(one) => vec![one.clone()],
                         Constants::List(list) => list.clone(),
                     };
-                    let read =
-                        times.iter().map(|c| parse(inside(&place, "at"), &c.text(), &constants));
-                    When::At(read.collect::<Result<_, _>>()?)
+                    let at = inside(&place, "at");
+                    let read = times.iter().map(|c| parse(at.clone(), &c.text(), &constants));
+                    let read: Vec<Expression> = read.collect::<Result<_, _>>()?;
+                    let moments: Vec<f64> = read.iter().map(constant).collect();
+                    for (k, time) in moments.iter().enumerate() {
+                        if !time.is_finite() {
+                            let message = format!("`at` is {time}");
+                            return problem(at, message, Some("give a finite time"));
+                        }
+                        if moments[..k].contains(time) {
+                            let message = format!("the time {time} stands twice");
+                            let help = "an event fires once at a time: give each time once";
+                            return problem(at, message, Some(help));
+                        }
+                    }
+                    When::At(read)
                 }
                 (None, None, Some(period)) => {
-                    When::Every(parse(inside(&place, "every"), &period.text(), &constants)?)
+                    let at = inside(&place, "every");
+                    let read = parse(at.clone(), &period.text(), &constants)?;
+                    let period = constant(&read);
+                    if !(period.is_finite() && period > 0.0) {
+                        let message = format!("`every` is {period}");
+                        return problem(at, message, Some("give a time above 0"));
+                    }
+                    When::Every(read)
                 }
                 (None, None, None) => {
                     return problem(
@@ -730,6 +797,11 @@ impl Definition {
             }
             let name =
                 if entry.name.is_empty() { format!("event {}", i + 1) } else { entry.name.clone() };
+            if events.iter().any(|other: &Event| other.name == name) {
+                let message = format!("the name `{name}` is given to two events");
+                let help = "tables and `stopped by` tell events by their names: give each its own";
+                return problem(inside(&place, "name"), message, Some(help));
+            }
             events.push(Event { name, when, set, mode, from, stop: entry.stop, sticks });
         }
         let start = match &d.start {
@@ -779,6 +851,65 @@ impl Definition {
         let tables = d.tables.0.clone();
         Ok(Self { states, parameters, start, axes, terms, modes, events, tables, document })
     }
+}
+
+/// Whether an expression depends on a state, the time or a table.
+fn moves(e: &Expression, d: &Document, terms: &[(String, Expression)]) -> bool {
+    let (mut open, mut seen) = (e.names(), HashSet::new());
+    while let Some(name) = open.pop() {
+        let itself = name == "t"
+            || d.states.iter().any(|s| s.name == name)
+            || d.tables.0.iter().any(|(table, _)| table == name);
+        if itself {
+            return true;
+        }
+        if seen.insert(name) {
+            let term = terms.iter().find(|(term, _)| term == name);
+            open.extend(term.into_iter().flat_map(|(_, e)| e.names()));
+        }
+    }
+    false
+}
+
+/// A function with constants that give it no meaning: `clip` with its ends exchanged, `mod` by 0.
+fn wrong_constants(e: &Expression, text: &str) -> Option<ExpressionError> {
+    fn all<'a>(e: &'a Expression, of: General, found: &mut Vec<&'a [Expression]>) {
+        match e {
+            Expression::Apply(f, list) if *f == of => found.push(list),
+            _ => {}
+        }
+        e.parts().into_iter().for_each(|part| all(part, of, found));
+    }
+    let number = |e: &Expression| evaluate(e, &|_| None);
+    // Calls stand in the text in the order in which they are found.
+    let calls = |name: &'static str, of: General| {
+        let mut found = Vec::new();
+        all(e, of, &mut found);
+        let part_of_a_name = |c: char| c.is_ascii_alphanumeric() || c == '_';
+        let whole = |at: &usize| {
+            !text[..*at].ends_with(part_of_a_name)
+                && text[at + name.len()..].trim_start().starts_with('(')
+        };
+        let places: Vec<usize> = text.match_indices(name).map(|(at, _)| at).filter(whole).collect();
+        let span = move |i: usize| places.get(i).map_or(0..text.len(), |at| *at..at + name.len());
+        (found, span)
+    };
+    let (clips, span) = calls("clip", General::Clip);
+    if let Some(i) = clips.iter().position(|list| number(&list[1]) > number(&list[2])) {
+        let (low, high) = (&clips[i][1], &clips[i][2]);
+        return Some(ExpressionError {
+            span: span(i),
+            message: format!("clip's lower end {low} is above its upper end {high}"),
+            help: Some("write clip(x, low, high)".into()),
+        });
+    }
+    let (mods, span) = calls("mod", General::Mod);
+    let i = mods.iter().position(|list| number(&list[1]) == 0.0)?;
+    Some(ExpressionError {
+        span: span(i),
+        message: "mod by 0 has no value".into(),
+        help: Some("write mod(x, m) with m other than 0".into()),
+    })
 }
 
 /// The names in `[let]` that stand for conditions.

@@ -462,6 +462,52 @@ fn errors_point_into_the_file() {
         ),
         ("states = ['x']\nf = ['a']\n[let]\na = 'b'\nb = 'a'", "4:5", "depends on itself", ""),
         (
+            "states = ['x']\nf = ['clip(x, -1, 1) + clip(x, 2, -2)']",
+            "2:24",
+            "lower end 2 is above its upper end -2",
+            "clip(x, low, high)",
+        ),
+        ("states = ['x']\nf = ['x - mod(x, 0)']", "2:11", "mod by 0", "other than 0"),
+        (
+            "states = ['x']\nf = ['1']\n[parameters]\nlow = 1\na = '1/(low - 1)'",
+            "5:5",
+            "`a` is inf",
+            "a finite number",
+        ),
+        (
+            "states = ['x']\nf = ['1']\n[parameters]\na = 'b'\nb = 2",
+            "4:6",
+            "unknown name `b`",
+            "stand before it",
+        ),
+        (
+            "states = ['x']\nf = ['1']\n[parameters]\nT = 1\n[[event]]\nevery = 'T - 1'",
+            "6:9",
+            "`every` is 0",
+            "a time above 0",
+        ),
+        (
+            "states = ['x']\nf = ['1']\n[[event]]\nat = [2, 1, 1]",
+            "4:6",
+            "the time 1 stands twice",
+            "each time once",
+        ),
+        ("states = ['x']\nf = ['1']\n[[event]]\nat = '1/0'", "4:6", "`at` is inf", "finite time"),
+        (
+            "states = ['x']\nf = ['1']\n[parameters]\na = 1\n[let]\nb = 'a - 2'\n[[event]]\nwhen \
+                = 'b'",
+            "8:8",
+            "does not change",
+            "at = [1]",
+        ),
+        (
+            "states = ['x']\nf = ['1']\n[[event]]\nname = 'a'\nwhen = 'x'\n[[event]]\nname = \
+                'a'\nwhen = 'x - 1'",
+            "7:8",
+            "given to two events",
+            "its own",
+        ),
+        (
             "states = ['x']\nf = ['1']\n[parameters]\na = 't'",
             "4:5",
             "does not depend on the time",
@@ -474,6 +520,37 @@ fn errors_point_into_the_file() {
         assert_eq!(found, place, "{text}\n{error}");
         assert!(error.help.clone().unwrap_or_default().contains(help), "{text}\n{error}");
     }
+}
+
+#[test]
+fn errors_of_tables_point_into_the_systems_file() {
+    let text = "states = ['x']\nstart = [0]\nf = ['w']\n[tables.w]\nfile = 'w.csv'\ntime = \
+        't'\ncolumn = 'v'";
+    let model = model(text);
+    for (data, place, message, help) in [
+        ("s,v\n0,1\n1,2", "6:8", "no column `t`; it has s, v", "first line"),
+        ("t,u\n0,1\n1,2", "7:10", "no column `v`", "first line"),
+        ("t,v\n0,1\n1", "5:8", "w.csv, row 2: 1 cells for 2 columns", "rows of finite numbers"),
+        ("t,v\n0,1\n1,a", "5:8", "row 2: `a` is not a finite number", "finite numbers"),
+        ("t,v\n0,1\n0,2", "5:8", "row 2: the time 0 does not come after", "times increasing"),
+        ("t,v\n0,1", "5:8", "at least two rows", "rows of finite numbers"),
+    ] {
+        let Err(crate::model::ModelError::Table(error)) = model.clone().with_table("w", data)
+        else {
+            panic!("{data}")
+        };
+        let error = Definition::about_table(text, "f", "w", &error);
+        assert_eq!(format!("{}:{}", error.line, error.column), place, "{error}");
+        assert!(error.message.contains(message) && error.to_string().contains(help), "{error}");
+    }
+}
+
+/// An event that fires more often than there may be steps ends no run after hours.
+#[test]
+fn an_event_that_fires_too_often_is_refused_at_once() {
+    let text = "states = ['x']\nstart = [0]\nf = ['1']\n[[event]]\nevery = 1e-300";
+    let error = run(&model(text), 1.0).1.unwrap_err().to_string();
+    assert!(error.contains("`every` is 1e-300, 1.0e300 times"), "{error}");
 }
 
 /// Equilibria, and pseudo-equilibria with the eigenvalues that a formula gives.
@@ -2254,7 +2331,7 @@ fn the_domain_of_a_switching_function_ends() {
             "logarithm of a number that is not positive",
         ),
         ("if(sqrt(x) > 1, 1, 2)", -1.0, 0.0, "in the switching function sqrt(x) - 1"),
-        ("mod(x, 0)", 0.0, 0.0, "in the switching function x/0"),
+        ("mod(x, 0*t)", 0.0, 0.0, "in the switching function x/(0*t)"),
     ] {
         let (t, what) = ends(f, start);
         near(t, at, 1e-9);

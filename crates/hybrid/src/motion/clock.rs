@@ -40,6 +40,15 @@ impl Clock {
                             event.name
                         )));
                     }
+                    // Each ends a step.
+                    let count = (follower.options.t_end - follower.t) / period;
+                    if count > follower.options.max_steps as f64 {
+                        return Err(HybridError::Bad(format!(
+                            "{}: `every` is {period:e}, {count:.1e} times until t = {}, of which \
+                                each ends a step: give a longer time, or an earlier end (--t-end)",
+                            event.name, follower.options.t_end
+                        )));
+                    }
                     clock.periodic.push((period, (follower.t / period).floor() + 1.0, i));
                 }
                 _ => {}
