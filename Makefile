@@ -7,7 +7,7 @@ PROOFS  := printed-cycle coexistence saddles inner-law sensitivity contraction c
 RUN     := $(CARGO) run --release --locked --quiet
 
 .DEFAULT_GOAL := help
-.PHONY: help figures gallery report check bless papers test elementary rigor-test census capture proofs browser-test lint bench bench-peers torture ci clean bench-keep bench-cost
+.PHONY: help figures gallery report check bless papers test test-all elementary rigor-test census capture proofs browser-test lint bench bench-peers torture ci clean bench-keep bench-cost
 
 help: ## this list
 	@awk -F':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -35,7 +35,11 @@ papers: ## make and check every paper under papers/
 		$(RUN) --bin twofold -- paper report --quiet "$$(dirname "$$p")" && $(RUN) --bin twofold -- paper check --quiet "$$(dirname "$$p")" || exit 1; \
 	done
 
-test: ## all tests, in the debug profile
+# With the programs of `make figures`: what is built already is not built again.
+test: ## the tests of figures and their hashes, of commands, files and papers
+	@$(CARGO) test --release --locked --test it
+
+test-all: ## every test of every crate and of the documentation, too, in the debug profile, where an overflow is an error
 	@$(CARGO) test --locked
 
 rigor-test: ## millions of interval operations against exact integer arithmetic (minutes)
@@ -292,9 +296,10 @@ rehearse: ## a job of a workflow, its own lines, in a fresh clone: make rehearse
 
 # What is built once needs no notes for the next time; they take more room on the disk than all the rest.
 ci: export CARGO_INCREMENTAL = 0
-ci: lint test ## what CI runs; nothing in it rests on a store
+ci: lint test-all ## what CI runs; nothing in it rests on a store
 	@$(MAKE) --no-print-directory figures FIGURE_FLAGS=--fresh
 	@$(MAKE) --no-print-directory check
+	@$(MAKE) --no-print-directory test
 	@$(MAKE) --no-print-directory proofs-quick
 
 clean: ## remove everything that was built or computed

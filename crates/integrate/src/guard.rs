@@ -462,12 +462,15 @@ impl Gates {
         })
     }
 
-    /// Computes the operations of gates' arguments, or all, at `x`.
-    fn evaluate(&mut self, x: &[f64], all: bool) {
+    /// Computes the operations of gates' arguments, or all, at `x`; one of them may be `given`.
+    fn evaluate(&mut self, x: &[f64], all: bool, given: Option<(Node, f64)>) {
         let operations = self.tape.operations();
         for node in &self.needed[usize::from(all)] {
             let v = &self.values;
             self.values[*node] = match operations[*node] {
+                _ if given.is_some_and(|(of, _)| of == *node) => {
+                    given.map_or(f64::NAN, |(_, value)| value)
+                }
                 Operation::Variable(i) => x[i],
                 Operation::Constant(_) | Operation::Parameter(_) | Operation::Pi => {
                     self.fixed[*node]
@@ -492,13 +495,17 @@ impl Gates {
 
     /// The gates' arguments at `x`.
     fn arguments(&mut self, x: &[f64]) -> Vec<f64> {
-        self.evaluate(x, false);
+        self.evaluate(x, false, None);
         self.gates.iter().map(|(_, node)| self.values[*node]).collect()
     }
 
     /// The outputs at `x`.
     fn outputs(&mut self, x: &[f64]) -> Vec<f64> {
-        self.evaluate(x, true);
+        self.outputs_given(x, None)
+    }
+
+    fn outputs_given(&mut self, x: &[f64], given: Option<(Node, f64)>) -> Vec<f64> {
+        self.evaluate(x, true, given);
         self.tape.outputs().iter().map(|node| self.values[*node]).collect()
     }
 
@@ -527,6 +534,8 @@ pub(super) enum Undone {
 
 /// A step that ends so many resolutions of time behind a sign's change has ended at it.
 const LANDED: f64 = 1e3;
+/// A change of a sign is landed on if the step can err by more than this part of the tolerance.
+const FELT: f64 = 0.01;
 /// Steps towards one change of a sign that are taken back because it is found earlier in them.
 const MOST_LANDINGS: u32 = 8;
 
@@ -574,18 +583,18 @@ impl Gates {
         }
         let along = &self.along;
         if self.signs.iter().any(|[_, argument]| along[*argument].changes_sign()) {
-            return self.first_sign_change(step);
+            return self.first_sign_change(step, tolerance);
         }
         Ok(None)
     }
 
     /// Argument of a sign at `x`.
     fn argument(&mut self, argument: Node, x: &[f64]) -> f64 {
-        self.evaluate(x, false);
+        self.evaluate(x, false, None);
         self.values[argument]
     }
 
-    /// The first change of a sign in the step, but at its ends.
+    /// The first change of a sign in the step, but at its ends, of which the motion can tell.
     ///
     /// # Errors
     /// If the motion stays there.
@@ -594,13 +603,14 @@ impl Gates {
     fn first_sign_change<const N: usize>(
         &mut self,
         step: &Step<'_, N>,
+        tolerance: Tolerance,
     ) -> Result<Option<Undone>, Failure> {
         let h = step.length();
         let resolution = 4.0 * f64::EPSILON * (step.t0.abs() + h);
         let mut first: Option<(f64, [Node; 2])> = None;
         for sign in self.signs.clone() {
             let along = self.along[sign[1]];
-            if !along.changes_sign() {
+            if !along.changes_sign() || !self.is_felt(sign[0], step, tolerance) {
                 continue;
             }
             let argument = |theta: f64| self.argument(sign[1], step.at(theta).as_slice());
@@ -619,6 +629,28 @@ impl Gates {
             });
         }
         Ok(Some(Undone::SignChange(step.time(theta) + resolution)))
+    }
+
+    /// Whether the right-hand side at the step's end with the sign as it was at its beginning is so
+    /// much another that the tolerance could tell.
+    fn is_felt<const N: usize>(
+        &mut self,
+        sign: Node,
+        step: &Step<'_, N>,
+        tolerance: Tolerance,
+    ) -> bool {
+        self.evaluate(step.x0.as_slice(), true, None);
+        let before = self.values[sign];
+        let as_before = self.outputs_given(step.x1.as_slice(), Some((sign, before)));
+        let now = self.outputs(step.x1.as_slice());
+        let has_switch = self.levels.is_some() || self.ends_at_zero;
+        let components = now.len() - usize::from(has_switch);
+        as_before.iter().zip(&now).take(components).enumerate().any(|(o, (before, now))| {
+            let i = o % N;
+            let size = step.x0[i].abs().max(step.x1[i].abs());
+            let allowed = FELT * (tolerance.atol + tolerance.rtol * size);
+            !((before - now).abs() * step.length() <= allowed)
+        })
     }
 
     /// Whether the velocities on both sides of an argument's zero lead to it (Filippov 1988,
