@@ -420,6 +420,8 @@ impl<const N: usize> Interpolant<N> for ConstantState<N> {
 }
 
 const SIDES: [Side; 2] = [Side::Plus, Side::Minus];
+/// Lie derivatives of sizes between this and its reciprocal are of order one.
+const CLOCK: f64 = 65_536.0;
 /// Parts of a step between which the end of a domain is looked for.
 const QUARTERS: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 
@@ -475,6 +477,8 @@ struct Limits {
     kink: f64,
     /// Closer to a two-fold than so many tolerances there is nothing to integrate.
     blur: f64,
+    /// Rounding of the state, as a share of it, by which h is blurred.
+    blurred: f64,
     /// Distance of a zero of h from the surface, as a share of the state, above which h jumps.
     jump: f64,
     /// At a zero h is smaller than this share of what it was halfway to it; at a pole or jump it is
@@ -518,6 +522,7 @@ const LIMITS: Limits = Limits {
     departure: 1e-7,
     kink: 1e-3,
     blur: 300.0,
+    blurred: 64.0 * f64::EPSILON,
     jump: 1e-7,
     falls: 0.9,
     small: 1e-6,
@@ -691,6 +696,29 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             zero_p: zero(&p, &plus),
             zero_q: zero(&q, &minus),
         }
+    }
+
+    /// The factor, a power of two, by which the clock of the sliding flow runs: it would run in
+    /// units of the Lie derivatives, which are those of h over those of time. Where these are of
+    /// order one it is 1.
+    fn sliding_clock(&self) -> f64 {
+        let l = self.lie(&self.x);
+        let rate = l.zero_p.max(l.zero_q) / LIMITS.lie;
+        let mut clock = 1.0;
+        if rate > 0.0 && rate.is_finite() && !(1.0 / CLOCK..=CLOCK).contains(&rate) {
+            while rate * clock < 1.0 {
+                clock *= 2.0;
+            }
+            while rate * clock >= 2.0 {
+                clock *= 0.5;
+            }
+        }
+        clock
+    }
+
+    /// The rounding of h at a state.
+    fn blur(&self, x: &SVector<f64, N>) -> f64 {
+        LIMITS.blurred * gradient(self.system, x).abs().dot(&x.abs())
     }
 
     /// Counts a finished piece's work.
@@ -1034,6 +1062,10 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         let system = self.system;
         let mut flow = FreeFlow { system: Sided { system, depth: self.depth }, side };
         let (t_start, mut start) = (self.t, start);
+        let mut leaving = match start {
+            FlightStart::Tangent(second) => Some(second),
+            _ => None,
+        };
         if let Err(failure) =
             method.restart(&flow, self.t, self.x, self.t_end, self.settings.max_step)
         {
@@ -1062,9 +1094,16 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             let height = |theta: f64| side.sign() * self.system.switching(&step.at(theta));
             let length = step.length();
             let at_start = start.over(length);
-            start = FlightStart::Away;
+            // After a tangency the first steps may rise by less than the rounding of h.
+            let gone = step.t1 - t_start;
+            leaving = leaving.filter(|second| 0.5 * second * gone * gone <= self.blur(&step.x1));
+            start =
+                leaving.map_or(FlightStart::Away, |second| FlightStart::Transversal(second * gone));
             let enclosed = |x: &SVector<Enclosed, N>| self.system.switching(x).scale(side.sign());
-            let zero = first_zero_along(&step, &height, &enclosed, at_start);
+            let zero = match leaving {
+                Some(_) => None,
+                None => first_zero_along(&step, &height, &enclosed, at_start),
+            };
             // A field whose domain ends on the surface ends the flight there.
             let landing = zero.map_or(f64::INFINITY, |zero| zero.theta() - LIMITS.same_moment);
             if let Some((end, what)) = self.domain_end(&[side], &|theta| step.at(theta))
@@ -1247,7 +1286,9 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         let system = self.system;
         let mode = sliding.mode();
         let sided = Sided { system, depth: self.depth };
-        let flow = SlidingFlow { system: Sided { ..sided }, direction: sliding.direction() };
+        let clock = self.sliding_clock();
+        let flow =
+            SlidingFlow { system: Sided { ..sided }, direction: sliding.direction() * clock };
         let lift =
             |x: &SVector<f64, N>| SVector::<f64, M>::from_fn(|i, _| if i < N { x[i] } else { 0.0 });
         // The clock of the flow starts at zero with each restart, so that short times keep their
@@ -1280,7 +1321,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                 }
                 Err(failure) => return Err(self.cause_on_surface().unwrap_or(failure).into()),
             };
-            let end = self.sliding_end(&step, &sliding, along, t_base, fresh);
+            let end = self.sliding_end(&step, &sliding, along, (t_base, clock), fresh);
             fresh = false;
             let until = end.map_or(f64::INFINITY, |(theta, _)| theta);
             if let Some((theta, what)) =
@@ -1309,8 +1350,12 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             if sliding.plan.is_some() {
                 sliding.arc += chords::<N, M>(&step, theta).iter().sum::<f64>();
             }
-            let clock = (step.x0[N], z1[N]);
-            let interpolant = InPhysicalTime { system, inner: step.interpolant, end: theta, clock };
+            let interpolant = InPhysicalTime {
+                system,
+                inner: step.interpolant,
+                end: theta,
+                clock: (step.x0[N], z1[N]),
+            };
             let off = without_clock::<N, M>(&z1);
             let drift = system.switching(&off).abs();
             idle = if t1 - self.t <= LIMITS.idle * t1.abs() { idle + 1 } else { 0 };
@@ -1376,7 +1421,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         step: &Step<'_, M>,
         sliding: &Sliding,
         along: Option<Side>,
-        t_base: f64,
+        (t_base, clock): (f64, f64),
         fresh: bool,
     ) -> Option<(f64, SlidingEnd)> {
         let direction = sliding.direction();
@@ -1412,7 +1457,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                         propose(0.0, SlidingEnd::Fold(side));
                         continue;
                     }
-                    start = Start::Simple(rate * step.length());
+                    start = Start::Simple(rate * clock * step.length());
                 }
             }
             let sided = self.sided();

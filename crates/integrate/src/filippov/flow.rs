@@ -86,8 +86,8 @@ pub(super) fn desingularised<P: PiecewiseSmooth<N>, S: Elementary, const N: usiz
 }
 
 /// The desingularised sliding flow with physical time as an extra state: (x, t)' = +-(F(x), L-h -
-/// L+h). `M` is `N + 1`. The sign is + in the attracting region and - in the repelling one, so that
-/// time always runs forward.
+/// L+h) times a factor. `M` is `N + 1`. The sign is + in the attracting region and - in the
+/// repelling one, so that time always runs forward.
 #[derive(Clone, Copy, Debug)]
 pub struct SlidingFlow<'a, P, const N: usize> {
     pub(super) system: Sided<'a, P>,
@@ -131,7 +131,15 @@ pub(super) fn project<P: PiecewiseSmooth<N>, const N: usize>(
             break;
         }
         let g = gradient(system, &y);
-        let next = y - g * (h / g.norm_squared());
+        let square = g.norm_squared();
+        // A function of very small or large numbers has a gradient whose square is none.
+        let by = if square.is_normal() {
+            g * (h / square)
+        } else {
+            let (unit, largest) = (g / g.amax(), g.amax());
+            unit * (h / largest / unit.norm_squared())
+        };
+        let next = y - by;
         let there = system.switching(&next);
         if there.is_nan() || there.abs() >= h.abs() {
             break;
