@@ -110,7 +110,7 @@ impl Orbit {
     /// The stability that the multipliers imply, within their error.
     pub fn stability(&self) -> Stability {
         let (largest, error) = (self.largest_modulus(), self.multiplier_error);
-        let isolated = self.multipliers.iter().all(|m| distance(*m, [1.0, 0.0]) > error);
+        let isolated = self.is_isolated();
         if largest > 1.0 + error {
             Stability::Unstable
         } else if !isolated {
@@ -120,6 +120,11 @@ impl Orbit {
         } else {
             Stability::Stable
         }
+    }
+
+    /// Whether no multiplier is 1 within its error.
+    fn is_isolated(&self) -> bool {
+        self.multipliers.iter().all(|m| distance(*m, [1.0, 0.0]) > self.multiplier_error)
     }
 
     /// The rate per unit time at which neighbours approach it in the end, negative if they leave;
@@ -210,6 +215,13 @@ impl Newton {
     }
 }
 
+/// The size of a difference of states, each in units of the loop's size as it has it, times the
+/// loop's extent.
+fn sized(difference: &[f64], r: &Returned) -> f64 {
+    let weighed = difference.iter().zip(&r.sizes).map(|(d, size)| d * (r.extent / size));
+    sqrt(weighed.map(|d| d * d).sum())
+}
+
 fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
     sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]))
 }
@@ -230,7 +242,7 @@ pub fn closed_orbit(
     for iterations in 0..=newton.iterations {
         let r = map.returned(&u, p, true)?;
         let difference: Vec<f64> = r.point.iter().zip(&u).map(|(a, b)| a - b).collect();
-        let residual = sqrt(difference.iter().map(|d| d * d).sum());
+        let residual = sized(&difference, &r);
         if settled(residual, before, newton.closed(&u, &r)?) {
             return orbit(map, u, p, r, residual, iterations);
         }
@@ -451,6 +463,8 @@ const JUMP: f64 = 0.75;
 const REACH: f64 = 0.4;
 /// An orbit of this share of the branch's largest extent has shrunk to a point.
 const GONE: f64 = 1e-4;
+/// A small loop that may be off by more than this share of itself is not told from the rest within.
+const TOLD: f64 = 0.03;
 
 /// A point of the branch, scaled: the state by its size, the parameter by its range.
 #[derive(Clone)]
@@ -487,6 +501,7 @@ struct Scales {
 ///             same: vec![vec![r2.sqrt(), 0.0]],
 ///             opposite: Vec::new(),
 ///             extent: 2.0 * u[0],
+///             sizes: vec![2.0 * u[0]; 2],
 ///             passes: true,
 ///             derivative_error: 0.0,
 ///             events: 0,
@@ -536,7 +551,16 @@ pub fn follow(
         } else {
             arclength(map, &guess, p, (&du, dp), &scales, options.newton)
         };
+        let widest = branch.orbits.iter().map(|o| o.extent).fold(0.0, f64::max);
         let next = match next {
+            Ok(next)
+                if next.extent <= VANISHING * widest
+                    && (last.is_isolated() || next.is_isolated())
+                    && !is_loop(map, &next) =>
+            {
+                let said = "the orbit shrinks to a point".to_owned();
+                Err(Trouble { obstacle: Obstacle::Point(next.point), said })
+            }
             Ok(next)
                 if !beyond
                     && (next.iterations > MANY
@@ -580,7 +604,6 @@ pub fn follow(
                 continue;
             }
         };
-        let widest = branch.orbits.iter().map(|o| o.extent).fold(0.0, f64::max);
         if next.extent <= GONE * widest {
             let (missed, said) = (
                 (next.parameter - last.parameter).abs(),
@@ -620,6 +643,21 @@ pub fn follow(
         }
     }
     branch
+}
+
+/// Whether a small orbit is one, and not the rest within: the rest is a zero of P(u) - u too, and
+/// on a branch through a plane on which the rests lie the next one. What the orbit's point may be
+/// off by, the residual and the error of the return over the distance of a multiplier from 1, is
+/// small beside the orbit. Orbits that fill a surface, with a multiplier 1 each, are not asked.
+fn is_loop(map: &dyn ReturnMap, orbit: &Orbit) -> bool {
+    let (u, p) = (&orbit.point, orbit.parameter);
+    let (Ok(fine), Ok(rough)) = (map.returned(u, p, false), map.roughly(u, p)) else {
+        return false;
+    };
+    let apart: Vec<f64> = fine.point.iter().zip(&rough.point).map(|(a, b)| a - b).collect();
+    let error = sized(&apart, &fine);
+    let from_one = orbit.multipliers.iter().map(|m| distance(*m, [1.0, 0.0])).fold(1.0, f64::min);
+    orbit.residual + error < TOLD * from_one * orbit.extent
 }
 
 /// Steps over a grazing are at most so many shortest steps.
@@ -683,6 +721,19 @@ fn finish(
 /// none beyond it.
 const VANISHING: f64 = 0.1;
 
+/// Passages of a plane in both directions that are so near to each other, as a share of the orbit,
+/// are about to meet.
+const TOUCHES: f64 = 0.1;
+
+/// Whether an orbit hardly passes the plane any more.
+fn touches_the_plane(orbit: &Orbit) -> bool {
+    let near = |back: &Vec<f64>| {
+        let square: f64 = back.iter().zip(&orbit.point).map(|(a, b)| (a - b) * (a - b)).sum();
+        sqrt(square) < TOUCHES * orbit.extent
+    };
+    orbit.opposite.iter().any(near)
+}
+
 /// The change at which a branch cannot be followed, and its end; the next member was looked for
 /// over `missed` of the parameter.
 fn ended(
@@ -695,13 +746,14 @@ fn ended(
     let here =
         |change| Some(Bifurcation { change, parameter: last.parameter, uncertainty: missed });
     let largest = orbits.iter().map(|o| o.extent).fold(0.0, f64::max);
+    let small = last.extent <= VANISHING * largest;
     match trouble.obstacle {
         Obstacle::Grazing => (here(Change::Grazing), End::Lost(trouble.said)),
         Obstacle::SetValued => (here(Change::SetValued), End::Lost(trouble.said)),
-        _ if last.extent <= VANISHING * largest => {
+        _ if small && !touches_the_plane(last) => {
             (Some(vanishing(map, orbits, missed)), End::Vanished)
         }
-        Obstacle::Reversed => {
+        obstacle if small || obstacle == Obstacle::Reversed => {
             let said =
                 "the orbit comes to touch the plane and no longer passes it: choose another plane";
             (None, End::Lost(said.into()))
@@ -790,7 +842,7 @@ fn arclength(
     for iterations in 0..=newton.iterations {
         let r = map.returned(&u, q, true)?;
         let difference: Vec<f64> = r.point.iter().zip(&u).map(|(a, b)| a - b).collect();
-        let residual = sqrt(difference.iter().map(|d| d * d).sum());
+        let residual = sized(&difference, &r);
         let along: f64 = (0..n).map(|i| du[i] * (u[i] - guess[i]) / scales.state).sum::<f64>()
             + dp * (q - p) / scales.parameter;
         let done = settled(residual, before, newton.closed(&u, &r)?) && along.abs() < 1e-6;
@@ -1053,6 +1105,7 @@ mod tests {
             derivative,
             opposite: Vec::new(),
             extent: 1.0,
+            sizes: vec![1.0; 2],
             passes: true,
             derivative_error: 0.0,
             events: 0,
@@ -1452,7 +1505,9 @@ mod tests {
             let derivative = vec![1.0 + p - 3.0 * x * x, 0.0, 0.0, 0.0];
             let time = std::f64::consts::TAU;
             let point = vec![x + x * (p - x * x), 0.0];
-            Ok(Returned { extent: x.abs(), passes: x > 0.0, time, ..once(point, derivative) })
+            let (extent, sizes) = (x.abs(), vec![x.abs(); 2]);
+            let passes = x > 0.0;
+            Ok(Returned { extent, sizes, passes, time, ..once(point, derivative) })
         }
         fn rest(&self, _: &[f64], p: f64) -> Option<(Vec<f64>, Vec<[f64; 2]>)> {
             Some((vec![0.0; 2], vec![[p, 1.0], [p, -1.0]]))

@@ -125,8 +125,10 @@ struct Plain<const N: usize> {
     same: Vec<Vec<f64>>,
     opposite: Vec<Vec<f64>>,
     extent: f64,
-    /// Largest component seen.
-    largest: f64,
+    /// The orbit's size as each state's unit has it.
+    sizes: SVector<f64, N>,
+    /// Each state's largest value.
+    largest: SVector<f64, N>,
     passes: bool,
 }
 
@@ -160,12 +162,13 @@ where
         });
         let size = DIFFERENCE * base.extent;
         let columns = SHARES.iter().find_map(|share| {
-            let delta = share * size;
+            let delta = base.sizes * (share * DIFFERENCE);
             // Some roundings of every component, over the difference; and what central differences
             // leave out.
             let left_out = DIFFERENCE * share * (DIFFERENCE * share);
-            derivative_error = 16.0 * f64::EPSILON * base.largest / delta + 10.0 * left_out;
-            columns(system, plane, returns, u, settings, &base, delta).transpose()
+            let rounding = (base.largest * (16.0 * f64::EPSILON)).component_div(&delta).amax();
+            derivative_error = rounding + 10.0 * left_out;
+            columns(system, plane, returns, u, settings, &base, &delta).transpose()
         });
         rows = match columns {
             Some(found) if !grazes => found?,
@@ -179,13 +182,15 @@ where
         same: base.same,
         opposite: base.opposite,
         extent: base.extent,
+        sizes: Failure::state(&base.sizes),
         passes: base.passes,
         derivative_error,
         events: base.itinerary.len(),
     })
 }
 
-/// The derivative by differences over `delta`, row by row; nothing if neighbours have other events.
+/// The derivative by differences over `delta` of each state, row by row; nothing if neighbours have
+/// other events.
 fn columns<P, const N: usize, const M: usize>(
     system: &P,
     plane: ReturnPlane,
@@ -193,7 +198,7 @@ fn columns<P, const N: usize, const M: usize>(
     u: &SVector<f64, N>,
     settings: &FloquetOptions,
     base: &Plain<N>,
-    delta: f64,
+    delta: &SVector<f64, N>,
 ) -> Result<Option<Vec<f64>>, Error>
 where
     P: PiecewiseSmooth<N>,
@@ -204,7 +209,7 @@ where
         let mut ends = [base.point; 2];
         for (end, sign) in ends.iter_mut().zip([1.0, -1.0]) {
             let mut moved = *u;
-            moved[j] += sign * delta;
+            moved[j] += sign * delta[j];
             let there = plain(system, plane, returns, &moved, settings)?;
             if there.itinerary != base.itinerary {
                 return Ok(None);
@@ -212,7 +217,7 @@ where
             *end = there.point;
         }
         for i in (0..N).filter(|i| *i != plane.axis) {
-            rows[i * N + j] = (ends[0][i] - ends[1][i]) / (2.0 * delta);
+            rows[i * N + j] = (ends[0][i] - ends[1][i]) / (2.0 * delta[j]);
         }
     }
     Ok(Some(rows))
@@ -273,9 +278,13 @@ where
         h if h < 0.0 => system.minus(u),
         _ => f,
     };
+    let extent = seen.extent.as_ref().map_or(0.0, Extent::diagonal);
+    let sizes = seen.extent.as_ref().map_or(SVector::zeros(), Extent::sizes);
+    let largest = seen.extent.as_ref().map_or(SVector::zeros(), Extent::largest);
     Ok(Plain {
-        largest: seen.extent.as_ref().map_or(0.0, Extent::largest),
-        extent: seen.extent.map_or(0.0, |e| e.diagonal()),
+        sizes,
+        largest,
+        extent,
         passes: (side[plane.axis] > 0.0) == plane.upward,
         point,
         time: landed.t + dt,
@@ -390,6 +399,66 @@ mod tests {
         // The nearest two do not.
         let r = of(2e-5, true).unwrap();
         assert!((r.derivative[0] - 6.0).abs() < 1e-4, "{r:?}");
+    }
+
+    /// A block on a belt in units `x` of length and `t` of time, its fields over `clock`, and `h`
+    /// times its switching function: the closed orbit has the turning point 0.463089814616 and the
+    /// period 6.736837191689.
+    struct StickSlip {
+        x: f64,
+        t: f64,
+        clock: f64,
+        h: f64,
+    }
+    impl StickSlip {
+        fn side<S: Elementary>(&self, s: &SVector<S, 2>, friction: f64) -> SVector<S, 2> {
+            let (x, v) = (s[0].scale(1.0 / self.x), s[1].scale(self.t / self.x));
+            let force = (v - S::from_f64(0.3)).scale(0.2) - x + S::from_f64(friction);
+            let unit = self.x / self.t / self.clock;
+            SVector::from([v.scale(unit), force.scale(unit / self.t)])
+        }
+    }
+    impl PiecewiseSmooth<2> for StickSlip {
+        fn switching<S: Elementary>(&self, s: &SVector<S, 2>) -> S {
+            (s[1] - S::from_f64(0.3 * self.x / self.t)).scale(self.h)
+        }
+        fn plus<S: Elementary>(&self, s: &SVector<S, 2>) -> SVector<S, 2> {
+            self.side(s, -1.0)
+        }
+        fn minus<S: Elementary>(&self, s: &SVector<S, 2>) -> SVector<S, 2> {
+            self.side(s, 1.0)
+        }
+    }
+
+    #[test]
+    fn a_return_has_no_units() {
+        let plane = ReturnPlane { axis: 1, value: 0.0, upward: true };
+        let returned = |system: StickSlip| {
+            let StickSlip { x, t, clock, h } = system;
+            let tolerance = Tolerance { rtol: 1e-11, atol: 1e-11 * x.min(x / t).min(1.0) };
+            let longest_return = 30.0 * t * clock;
+            let options = FloquetOptions { tolerance, longest_return, ..FloquetOptions::default() };
+            let start = SVector::from([0.463_089_814_616 * x, 0.0]);
+            let found = return_map(&system, plane, 1, &start, &options, true);
+            let r = found.unwrap_or_else(|e| panic!("{x:e} {t:e} {clock:e} {h:e}: {e}"));
+            let time = r.time / (6.736_837_191_689 * t * clock) - 1.0;
+            let place = r.point[0] / (0.463_089_814_616 * x) - 1.0;
+            assert!(
+                time.abs() < 1e-9 && place.abs() < 1e-9 && r.derivative[0].abs() < 1e-8,
+                "{x:e} {t:e} {clock:e} {h:e}: {time} {place} {r:?}"
+            );
+        };
+        for clock in [1e-12, 1e-9, 1e-3, 1.0, 1e6, 1e7, 1e8, 1e9, 1e12] {
+            returned(StickSlip { x: 1.0, t: 1.0, clock, h: 1.0 });
+        }
+        for h in [1e-300, 1e-12, 1e12, 1e300] {
+            returned(StickSlip { x: 1.0, t: 1.0, clock: 1.0, h });
+        }
+        for (x, t) in
+            [(1e-9, 1e-9), (1.0, 1e-9), (1e-6, 1e-9), (1.0, 1e9), (1e-9, 1e-6), (1e9, 1.0)]
+        {
+            returned(StickSlip { x, t, clock: 1.0, h: 1.0 });
+        }
     }
 
     #[test]

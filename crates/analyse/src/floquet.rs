@@ -136,8 +136,12 @@ struct Return<const N: usize> {
     same: Vec<Vec<f64>>,
     opposite: Vec<Vec<f64>>,
     extent: f64,
+    sizes: Vec<f64>,
     passes: bool,
 }
+
+/// A state that is never so large a share of the loop has a unit of its own.
+const OWN_UNIT: f64 = 1e-3;
 
 /// The box around a stretch of an orbit.
 pub(super) struct Extent<const N: usize> {
@@ -156,8 +160,16 @@ impl<const N: usize> Extent<N> {
         }
     }
 
-    pub(super) fn largest(&self) -> f64 {
-        self.low.amax().max(self.high.amax())
+    /// The largest value of each state.
+    pub(super) fn largest(&self) -> SVector<f64, N> {
+        self.low.abs().sup(&self.high.abs())
+    }
+
+    /// The size of the loop as each state has it: its diagonal, but of a state whose values are
+    /// far smaller in all of it, as in another unit, the largest of them.
+    pub(super) fn sizes(&self) -> SVector<f64, N> {
+        let all = self.diagonal();
+        self.largest().map(|own| if own > 0.0 && own < OWN_UNIT * all { own } else { all })
     }
 
     pub(super) fn diagonal(&self) -> f64 {
@@ -259,6 +271,8 @@ pub struct Returned {
     pub opposite: Vec<Vec<f64>>,
     /// Diagonal of the box around the orbit up to there: the size of the loop.
     pub extent: f64,
+    /// The size of the loop as each state has it: that, or less in a state of another unit.
+    pub sizes: Vec<f64>,
     /// Whether the motion passes the plane in its direction at the start, too.
     pub passes: bool,
     /// The rounding error of the derivative, if it is one of differences.
@@ -284,7 +298,7 @@ pub fn return_map<const N: usize, const M: usize, T: VectorField<M>>(
     if returns == 0 {
         return Err(Error::NoReturns);
     }
-    let Return { point, time, derivative, same, opposite, extent, passes } =
+    let Return { point, time, derivative, same, opposite, extent, sizes, passes } =
         returned::<N, M, T>(tangent, plane, returns, *u, settings)?;
     let derivative = (0..N * N).map(|k| derivative[(k / N, k % N)]).collect();
     let point = Failure::state(&point);
@@ -295,6 +309,7 @@ pub fn return_map<const N: usize, const M: usize, T: VectorField<M>>(
         same,
         opposite,
         extent,
+        sizes,
         passes,
         derivative_error: 0.0,
         events: 0,
@@ -375,8 +390,9 @@ fn returned<const N: usize, const M: usize, T: VectorField<M>>(
                 let column = |k: usize| landing[N * (j + 1) + k];
                 column(i) - f[i] / f[plane.axis] * column(plane.axis)
             });
-            let extent = extent.diagonal();
-            return Ok(Return { point, time: tc + dt, derivative, same, opposite, extent, passes });
+            let (extent, sizes) = (extent.diagonal(), Failure::state(&extent.sizes()));
+            let time = tc + dt;
+            return Ok(Return { point, time, derivative, same, opposite, extent, sizes, passes });
         }
     }
     let _ = state;

@@ -129,6 +129,8 @@ const MOST_RETURNS: usize = 32;
 /// Two crossings this near, in shares of their size, are taken for one when returns are counted:
 /// Newton's method then decides.
 const SAME_PASSAGE: f64 = 1e-3;
+/// States are of order one down to this size.
+const SMALL: f64 = 1e-3;
 /// Systems with up to so many states; a hysteretic switch adds one.
 const MOST_STATES: usize = 8;
 
@@ -334,7 +336,10 @@ impl ClosedOrbit {
                 t_end: self.settle,
                 method: super::spec::MethodSpec {
                     name: super::spec::Method::Dopri5,
-                    tolerance: Tolerance { rtol: 1e-9, atol: 1e-9 },
+                    tolerance: Tolerance {
+                        rtol: 1e-9,
+                        atol: (100.0 * self.tolerance.atol).min(1e-9),
+                    },
                     step_cap: twofold_integrate::StepCap::None,
                     max_steps: super::spec::DEFAULT_MAX_STEPS,
                     precision: None,
@@ -375,7 +380,8 @@ impl ClosedOrbit {
                 )));
             };
             point = state(*last);
-            let size = 1.0 + point.iter().fold(0.0_f64, |a, x| a.max(x.abs()));
+            let largest = point.iter().fold(0.0_f64, |a, x| a.max(x.abs()));
+            let size = if largest < SMALL { largest } else { 1.0 } + largest;
             let near = |row: usize| {
                 let d = state(row).iter().zip(&point).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
                 sqrt(d) < SAME_PASSAGE * size
@@ -813,6 +819,114 @@ mod tests {
 
     /// On the unit circle z is cos 2 theta: it passes 0 twice a turn in each direction, upwards at
     /// (1, -1)/sqrt 2 and opposite. What settles there is seen to come back at the second crossing.
+    /// The belt's block by any clock, with any positive multiple of h, and in any units of length
+    /// and time: period and turning point of order one, times the units.
+    #[test]
+    fn stick_slip_has_no_units() {
+        let filippov = SwitchSpec::Filippov { exit: ExitRule::Undecided, funnel: None };
+        let of = |(x, time, clock, h): (f64, f64, f64, f64)| {
+            let v = x / time;
+            let side = |sign: &str| {
+                let pull = format!("{:e}*(0.2*(v/{v:e} - 0.3) - x/{x:e} {sign} 1)", v / time);
+                format!("['v/{clock:e}', '({pull})/{clock:e}']")
+            };
+            let text = format!(
+                "states = ['x', 'v']\nh = '{h:e}*(v - 0.3*{v:e})'\nplus = {}\nminus = {}",
+                side("-"),
+                side("+")
+            );
+            let question = ClosedOrbit {
+                start: vec![0.0, 0.0],
+                settle: 50.0 * time * clock,
+                longest_return: 100.0 * time * clock,
+                tolerance: Tolerance { rtol: 1e-11, atol: 1e-11 * x.min(v).min(1.0) },
+                ..question(cases::of(&text), filippov, 1)
+            };
+            let answer = question.compute(&Executor::quiet(), &());
+            let answer = answer.unwrap_or_else(|e| panic!("{x:e} {time:e} {clock:e} {h:e}: {e}"));
+            let period: f64 = answer.fact("period").unwrap();
+            let point: Vec<f64> = answer.fact("point").unwrap();
+            let off =
+                [period / (6.736_837_191_689 * time * clock), point[0] / (0.463_089_814_616 * x)];
+            for off in off {
+                assert!((off - 1.0).abs() < 1e-8, "{x:e} {time:e} {clock:e} {h:e}: {off}");
+            }
+        };
+        for clock in [1e-9, 1e-3, 1.0, 1e6, 1e7, 1e8, 1e9] {
+            of((1.0, 1.0, clock, 1.0));
+        }
+        for h in [1e-300, 1e-12, 1e12, 1e300] {
+            of((1.0, 1.0, 1.0, h));
+        }
+        for (x, time) in [(1e-9, 1e-9), (1.0, 1e-9), (1e-6, 1e-9), (1.0, 1e9), (1e-9, 1e-6)] {
+            of((x, time, 1.0, 1.0));
+        }
+    }
+
+    /// The Brusselator's orbits end at its Hopf point, B = 1 + A^2, on a plane on which the rest
+    /// (A, B/A) lies for all B; the rest is none of them. The same of orbits by Filippov's rule,
+    /// whose radius is sqrt(mu) and multiplier exp(-4 pi mu), whatever rounding says.
+    #[test]
+    fn a_branch_ends_at_its_hopf_point() {
+        let follow = |question: &ClosedOrbit| {
+            let answer = question.compute(&Executor::quiet(), &()).unwrap();
+            let end: End = answer.fact("end").unwrap();
+            assert_eq!(end, End::Vanished);
+            let changes = answer.table("bifurcations").unwrap();
+            let last = changes.len() - 1;
+            assert_eq!(changes.words("change").nth(last), Some("hopf"));
+            let at = changes.numbers(&question.along.as_ref().unwrap().parameter)[last];
+            (answer.table("branch").unwrap().clone(), at)
+        };
+        for (a, steps) in [(1.0, 3), (1.0, 10), (1.0, 40), (2.0, 10)] {
+            let field = "['A + x^2*y - (B + 1)*x', 'B*x - x^2*y']";
+            let text = format!(
+                "states = ['x', 'y']\nh = 'x + 1000'\nplus = {field}\nminus = {field}\n\
+                    [parameters]\nA = {a}\nB = 3\n"
+            );
+            let hopf = 1.0 + a * a;
+            let question = ClosedOrbit {
+                start: vec![1.5 * a, 2.0],
+                settle: 100.0,
+                plane: ReturnPlane { axis: 0, value: a, upward: true },
+                tolerance: Tolerance { rtol: 1e-11, atol: 1e-11 },
+                along: Some(Along {
+                    parameter: "B".into(),
+                    from: 1.5 * hopf,
+                    to: 0.5 * hopf,
+                    steps,
+                    most: 1000,
+                }),
+                ..question(cases::of(&text), SwitchSpec::tanh(1e-3), 0)
+            };
+            let (branch, at) = follow(&question);
+            assert!((at - hopf).abs() < 1e-6, "{a} {steps}: {at}");
+            for row in 0..branch.len() {
+                let (b, y) = (branch.numbers("B")[row], branch.numbers("y")[row]);
+                assert!(b > hopf && (y - b / a).abs() > 1e-4, "{a} {steps}: {b} {y}");
+                let multiplier = branch.numbers("multiplier1_re")[row];
+                assert!(multiplier < 1.0, "{a} {steps}: {b} {multiplier}");
+            }
+        }
+        let filippov = SwitchSpec::Filippov { exit: ExitRule::Undecided, funnel: None };
+        let text = "states = ['x', 'y']\nh = 'x + 100'\nplus = ['mu*x - y - x*r', 'x + mu*y - \
+            y*r']\nminus = ['mu*x - y - x*r', 'x + mu*y - y*r']\n[let]\nr = 'x^2 + y^2'\n\
+            [parameters]\nmu = 0.2\n";
+        let along = Along { parameter: "mu".into(), from: 0.2, to: -0.2, steps: 40, most: 1000 };
+        let tolerance = Tolerance { rtol: 1e-11, atol: 1e-11 };
+        let circle = question(cases::of(text), filippov, 1);
+        let (branch, at) =
+            follow(&ClosedOrbit { start: vec![0.5, 0.0], tolerance, along: Some(along), ..circle });
+        assert!(at.abs() < 1e-9, "{at}");
+        let least = branch.numbers("mu").iter().fold(f64::INFINITY, |least, mu| mu.min(least));
+        assert!(least < 1e-4, "{least}");
+        for row in 0..branch.len() {
+            let (mu, x) = (branch.numbers("mu")[row], branch.numbers("x")[row]);
+            assert!((x * x / mu - 1.0).abs() < 0.05, "{mu} {x}");
+            assert_ne!(branch.words("stability").nth(row), Some("unstable"), "{mu}");
+        }
+    }
+
     #[test]
     fn returns_are_counted_in_the_settled_motion() {
         let field = ["x*(1 - x*x - y*y) - y", "y*(1 - x*x - y*y) + x", "-z + x*x - y*y - 4*x*y"];
