@@ -396,8 +396,13 @@ fn chaos_that_ends_in_dots_has_its_lifetime() {
 #[test]
 fn noise_is_noise() {
     let mut r = RandomStream::new(1, 0);
-    let e = judge(&sequence((0..3000).map(|_| [r.normal(), r.uniform()])));
-    assert_eq!(e.name, "noisy", "{e:?}");
+    let section = sequence((0..3000).map(|_| [r.normal(), r.uniform()]));
+    // Of a run without random numbers it is not said.
+    for (kicked, name) in [(true, "noisy"), (false, "undecided")] {
+        let question = Question { kicked, ..Question::default() };
+        let e = classify(&section, &question, &Thresholds::default());
+        assert_eq!(e.name, name, "{e:?}");
+    }
 }
 
 /// Chirikov's (1979) standard map: a sea around islands, where kicks let the orbit leak into the

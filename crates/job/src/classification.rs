@@ -8,9 +8,11 @@ use super::answer::{Answer, Stop};
 use super::exponent::LargestExponent;
 use super::question::{AnyQuestion, Ask, JobError, Question};
 use super::run::Run;
-use super::spec::{Observation, RunSpec, SwitchSpec};
+use super::spec::{Observation, RunSpec, SwitchSpec, in_units_of};
 use twofold_analyse::Direction;
-use twofold_analyse::attractor::{self, Evidence, SectionPoint, Thresholds, Verdict, classify};
+use twofold_analyse::attractor::{
+    self, Evidence, SectionPoint, Thresholds, Verdict, classify, has_no_future,
+};
 use twofold_analyse::lyapunov::{self, Exponent};
 use twofold_integrate::filippov::ExitRule;
 use twofold_integrate::{Monitor, Schedule};
@@ -92,7 +94,8 @@ impl Question for Classification {
     }
 }
 
-/// Numbers of the procedure that are not limits of the classifier.
+/// Numbers of the procedure that are not limits of the classifier. Times are in units of the
+/// motion's own clock ([`clock`]).
 #[derive(Clone, Copy, Debug, serde::Serialize)]
 struct Lengths {
     /// Time after which the first transient is over and a chaotic run is on its structure.
@@ -118,6 +121,21 @@ const LENGTHS: Lengths = Lengths {
     free_length: 5e4,
     hysteretic_average: 2_000.0,
 };
+
+/// The unit of time in which a motion returns to its section every 2 to 32 units: a power of 16, so
+/// that the same motion by another clock has the same averages. It is 1 for systems of order one.
+fn clock(return_time: f64) -> f64 {
+    let mut unit = 1.0;
+    if return_time > 0.0 && return_time.is_finite() {
+        while return_time >= 32.0 * unit {
+            unit *= 16.0;
+        }
+        while return_time < 2.0 * unit {
+            unit /= 16.0;
+        }
+    }
+    unit
+}
 
 /// A classification, or the exponent that it needs.
 pub(super) enum SoFar<T> {
@@ -164,7 +182,7 @@ impl Classification {
         let evidence = classify(&section, &question, &self.thresholds);
         Ok(match evidence.verdict {
             Verdict::Chaotic { .. } | Verdict::Undecided { .. } => {
-                SoFar::Awaits(Box::new(self.exponent(end)))
+                SoFar::Awaits(Box::new(self.exponent(end, &evidence)))
             }
             _ => SoFar::Judged(evidence),
         })
@@ -198,16 +216,22 @@ impl Classification {
         }
     }
 
-    /// The largest exponent of the run's system, from its final state.
-    fn exponent(&self, start: Vec<f64>) -> LargestExponent {
-        let settings = match self.run.switch {
+    /// The largest exponent of the run's system, from its final state; over times and with an
+    /// absolute tolerance in the units of its section.
+    fn exponent(&self, start: Vec<f64>, section: &Evidence) -> LargestExponent {
+        let usual = lyapunov::LyapunovOptions::default();
+        let duration = match self.run.switch {
             SwitchSpec::Hysteretic { .. }
             | SwitchSpec::Delayed { .. }
-            | SwitchSpec::Relay { .. } => lyapunov::LyapunovOptions {
-                duration: LENGTHS.hysteretic_average,
-                ..lyapunov::LyapunovOptions::default()
-            },
-            _ => lyapunov::LyapunovOptions::default(),
+            | SwitchSpec::Relay { .. } => LENGTHS.hysteretic_average,
+            _ => usual.duration,
+        };
+        let unit = clock(section.return_time);
+        let settings = lyapunov::LyapunovOptions {
+            tolerance: in_units_of(usual.tolerance, &[section.extent]),
+            transient: usual.transient * unit,
+            duration: duration * unit,
+            ..usual
         };
         LargestExponent {
             system: self.run.system.clone(),
@@ -242,10 +266,13 @@ impl Classification {
                 shown_from: 0.5 * twin.t_end,
                 ..attractor::Question::default()
             };
-            let verdict = classify(&section, &question, &self.thresholds).verdict;
-            let captured = verdict.cycle().map_or(f64::INFINITY, |c| c.captured_at);
+            let found = classify(&section, &question, &self.thresholds);
+            // What the plane shows on top of itself surrounds no closed orbit there.
+            let cycle = found.verdict.cycle().filter(|_| !has_no_future(&found, &self.thresholds));
+            let captured = cycle.map_or(f64::INFINITY, |c| c.captured_at);
+            let settled = LENGTHS.settling * clock(found.return_time);
             let loose: Vec<SectionPoint> =
-                section.into_iter().filter(|p| p.t > LENGTHS.settling && p.t < captured).collect();
+                section.into_iter().filter(|p| p.t > settled && p.t < captured).collect();
             if loose.len() >= LENGTHS.structure_points {
                 free.push(loose);
             }
@@ -357,6 +384,36 @@ mod tests {
         }
     }
 
+    /// Two limit cycles side by side: in the plane of one state of each their torus lies on top of
+    /// itself, by whatever ratio of frequencies; and what comes to a rest or drifts so slowly that
+    /// the run does not show where to.
+    #[test]
+    fn tori_are_no_noise_and_what_moves_on_is_no_torus() {
+        let torus = |ratio: f64, second: bool| {
+            let a = ["x*(1 - x*x - y*y) - y", "y*(1 - x*x - y*y) + x"].map(String::from);
+            let b = [
+                format!("u*(1 - u*u - w*w) - {ratio}*w"),
+                format!("w*(1 - u*u - w*w) + {ratio}*u"),
+            ];
+            let field = if second { [b, a].concat() } else { [a, b].concat() };
+            let states = if second { ["u", "w", "x", "y"] } else { ["x", "y", "u", "w"] };
+            evidence(&format!("{states:?}"), &format!("{field:?}"), vec![1.0, 0.0, 1.0, 0.0])
+                .unwrap()
+        };
+        for ratio in [1.618_033_988_749_895, 1.414_213_562_373_095, 2.718_281_828_459_045] {
+            for second in [false, true] {
+                let found = torus(ratio, second);
+                assert_eq!(found.name, "quasi-periodic", "{ratio} {second}: {}", found.summary);
+            }
+        }
+        let spiral = "['-5e-5*x - y', 'x - 5e-5*y']";
+        let found = evidence("['x', 'y']", spiral, vec![1.0, 0.0]).unwrap();
+        assert_eq!(found.name, "undecided", "{}", found.summary);
+        let drift = "['x*(1 - x*x - y*y) - y', 'y*(1 - x*x - y*y) + x', '1e-3']";
+        let found = evidence("['x', 'y', 'z']", drift, vec![1.0, 0.0, 0.0]).unwrap();
+        assert_eq!(found.name, "undecided", "{}", found.summary);
+    }
+
     fn run(system: System, switch: SwitchSpec, t_end: f64) -> Classification {
         Classification::of(crate::cases::run(
             system,
@@ -396,7 +453,7 @@ mod tests {
         for (switch, duration) in [(SwitchSpec::tanh(1e-2), 10_000.0), (hysteretic, 2000.0)] {
             let question = run(cases::decays(2), switch, 9.0);
             let of = |q: &Classification| {
-                let exponent = q.exponent(vec![1.0, 1.0]);
+                let exponent = q.exponent(vec![1.0, 1.0], &section_of(7.0));
                 exponent.found(&executor.ask(&exponent).unwrap())
             };
             let exponent = of(&question).unwrap();
@@ -407,8 +464,71 @@ mod tests {
         }
         let leaving =
             run(cases::smooth(&["x", "y"], "x + 1", &["x*x", "-y"]), SwitchSpec::tanh(1e-2), 0.5);
-        let exponent = leaving.exponent(vec![1.0, 1.0]);
+        let exponent = leaving.exponent(vec![1.0, 1.0], &section_of(7.0));
         assert_eq!(exponent.found(&executor.ask(&exponent).unwrap()), None);
+    }
+
+    /// Evidence about a section that is returned to so often.
+    fn section_of(return_time: f64) -> Evidence {
+        let none = classify(&[], &attractor::Question::default(), &Thresholds::default());
+        Evidence { return_time, extent: 1.0, ..none }
+    }
+
+    /// Averages last some hundred to some thousand returns: 10,000 where those of systems of order
+    /// one take 2 to 32.
+    #[test]
+    fn averages_are_in_units_of_the_motions_clock() {
+        let question = run(crate::cases::decays(2), SwitchSpec::tanh(1e-2), 9.0);
+        let average = |return_time: f64| {
+            let asked = question.exponent(vec![1.0, 1.0], &section_of(return_time)).settings;
+            assert_eq!(asked.transient, 0.01 * asked.duration);
+            asked.duration
+        };
+        for return_time in [2.0, 2.7, 20.3, 31.9, f64::NAN, 0.0, f64::INFINITY] {
+            assert_eq!(average(return_time), 1e4, "{return_time}");
+        }
+        for k in [-20, -3, 0, 1, 20] {
+            let power = 2.0_f64.powi(k);
+            for return_time in [2.0, 3.0, 31.0] {
+                let scaled = average(return_time * power);
+                assert!((312.0..5001.0).contains(&(scaled / (return_time * power))), "{scaled}");
+            }
+        }
+        // The same for a state's unit.
+        let small = Evidence { extent: 3e-9, ..section_of(7.0) };
+        let asked = question.exponent(vec![1.0, 1.0], &small).settings;
+        assert!((asked.tolerance.atol / 1e-18 - 1.0).abs() < 1e-6, "{asked:?}");
+    }
+
+    /// Lorenz's system by clocks of other units: irregular, of the exponent 0.9056 (Viswanath 1998)
+    /// in each; by the same bits where the unit is a power of 16.
+    #[test]
+    fn a_motion_is_the_same_by_any_clock() {
+        let judged = |unit: f64| {
+            let field = ["10*(y - x)", "x*(28 - z) - y", "x*y - 8/3*z"];
+            let field = field.map(|f| format!("({f})/{unit:?}"));
+            let field = field.each_ref().map(String::as_str);
+            let lorenz = crate::cases::smooth(&["x", "y", "z"], "z + 100", &field);
+            let mut question = run(lorenz, SwitchSpec::tanh(1e-2), 300.0 * unit);
+            question.run.observe = Observation::Section { coordinate: 2, value: 27.0 };
+            question.run.method.tolerance = Tolerance { rtol: 1e-9, atol: 1e-9 };
+            let evidence = question.ask(&Executor::quiet()).unwrap();
+            assert!(matches!(evidence.verdict, Verdict::Chaotic { .. }), "{}", evidence.summary);
+            let exponent = evidence.lyapunov.unwrap();
+            let [value, error] = [exponent.value, exponent.standard_error].map(|rate| rate * unit);
+            assert!(
+                (value - 0.9056).abs() < 4.0 * error && error < 0.03,
+                "{unit}: {value} {error}"
+            );
+            value
+        };
+        let own = judged(1.0);
+        for unit in [1e-6, 1e-3, 1e3, 1e6] {
+            judged(unit);
+        }
+        for unit in [1_048_576.0, 1.0 / 4096.0] {
+            assert_eq!(judged(unit), own);
+        }
     }
 
     /// Three oscillators of frequencies that have no common measure, seen in the positions of two

@@ -233,6 +233,16 @@ impl<'a> Turns<'a> {
         largest(last) > GROWTH * largest(before)
     }
 
+    /// Whether the run as a whole moves on, as what slowly comes to a rest or drifts does; what
+    /// stays on a ring comes back to where it was.
+    pub fn moves_on(&self, th: &Thresholds) -> bool {
+        let n = self.points.len() as f64;
+        let mean: Point =
+            std::array::from_fn(|k| self.points.iter().map(|q| q[k]).sum::<f64>() / n);
+        let spread = self.points.iter().map(|q| distance(q, &mean)).fold(0.0, f64::max);
+        drifts(self.points, 1, self.points.len(), spread, th)
+    }
+
     /// Mean duration of a turn in the last block.
     pub fn duration(&self) -> f64 {
         let n = self.times.len();

@@ -155,6 +155,12 @@ fn noisy(
     Verdict::Noisy { contrast, around }
 }
 
+/// Whether the images of neighbours in a section are as far apart as any two points: the plane does
+/// not show a return map.
+pub fn has_no_future(evidence: &Evidence, thresholds: &Thresholds) -> bool {
+    evidence.divergence.is_some_and(|d| d.skill < thresholds.skill)
+}
+
 fn deterministic(
     split: &Split,
     question: &Question<'_>,
@@ -201,30 +207,30 @@ fn deterministic(
     }
     evidence.zero_one = tail(0, 1);
     evidence.divergence = divergence(points, evidence.return_time);
-    if evidence.divergence.is_some_and(|d| d.skill < th.skill) {
-        return Verdict::Noisy { contrast: None, around: None };
-    }
+    // Neighbours without a common future, though nothing is random: the plane of two coordinates
+    // shows an attractor of more dimensions on top of itself. They say nothing then.
+    let blind = has_no_future(evidence, th);
     let exponent = question.lyapunov.map(|l| l.value > th.exponent_significance * l.standard_error);
     let votes = [
         evidence.zero_one.map(|k| k > th.zero_one),
-        evidence.divergence.map(|d| d.per_return > th.divergence),
+        evidence.divergence.filter(|_| !blind).map(|d| d.per_return > th.divergence),
         exponent,
     ];
     let yes = votes.iter().filter(|v| **v == Some(true)).count();
     let no = votes.iter().filter(|v| **v == Some(false)).count();
     if yes + no == 0 {
         Verdict::TooFew { points: points.len() }
-    } else if yes > no && exponent != Some(false) {
+    } else if yes > no && exponent != Some(false) && (!blind || exponent == Some(true)) {
         Verdict::Chaotic {
             lyapunov: question.lyapunov,
             bands: occupancy::bands(&points[points.len() / 2..], th),
         }
-    } else if no > yes && !turns.grows() {
+    } else if no > yes && !turns.grows() && !turns.moves_on(th) {
         let whole = Captured { from: 0, blocks: 0, settled: None };
         Verdict::QuasiPeriodic(describe(&turns, &whole, split, th))
     } else {
         // A tie, points that look irregular beside an exponent that is not above zero, or regular
-        // motion that reaches further and further out: nothing is claimed.
+        // motion that reaches further and further out or moves on: nothing is claimed.
         Verdict::Undecided { lyapunov: question.lyapunov }
     }
 }

@@ -77,7 +77,7 @@ pub struct Thresholds {
     /// A supplied largest exponent above this many of its standard errors counts as positive.
     pub exponent_significance: f64,
     /// Forecast skill of nearest neighbours (1: images of close points are close; 0: as far apart
-    /// as any two) below which a section is noise to us, whether or not kicks were announced.
+    /// as any two) below which neighbours say nothing: the plane shows no return map.
     pub skill: f64,
     /// Cells across the extent when structure is compared: 64 keeps several points per occupied
     /// cell of a section with 10^4 of them.
