@@ -488,6 +488,15 @@ pub fn follow_watched(
     follower.run_whole(observe).map(|(outcome, _)| outcome)
 }
 
+/// Whether an event's expression is zero, to rounding, where a motion with these options starts.
+/// Such a start waits until it is met again: the end of a run is a start of another only elsewhere.
+///
+/// # Errors
+/// If the equations are not complete, or the motion is not decided there.
+pub fn starts_on_an_event(model: &Model, options: &Options) -> Result<bool, HybridError> {
+    Ok(Follower::new(model, options)?.fresh_watch.iter().any(|fresh| *fresh))
+}
+
 /// [`follow_watched`], and whether the motion at a finished run's end rests: whether it goes on for
 /// a time `longer` than that without moving by more than `within` of the largest size of a state.
 /// Equations that see the time do not rest.

@@ -3,8 +3,8 @@
 use serde_json::{Value, json};
 use twofold_analyse::branch::{self, BranchOptions, End, Newton, Orbit, ReturnMap, Trouble};
 use twofold_analyse::floquet::Returned;
-use twofold_hybrid::motion::Record;
 use twofold_hybrid::motion::tangent::{Return, closed_orbit, once_around};
+use twofold_hybrid::motion::{Record, starts_on_an_event};
 use twofold_hybrid::rests::rests;
 use twofold_hybrid::{Ending, HybridError, Model, Options, follow};
 use twofold_integrate::Monitor;
@@ -27,6 +27,10 @@ pub struct GeneralOrbit {
     /// The parameter to follow it along.
     pub along: Option<Along>,
 }
+
+/// A settling that ends on an event is repeated so many times, by this share longer each time.
+const LONGER: u32 = 8;
+const LONGER_BY: f64 = 1.0 / 128.0;
 
 impl Question for GeneralOrbit {
     fn kind(&self) -> &'static str {
@@ -74,18 +78,26 @@ impl Question for GeneralOrbit {
             Return::Crossings(_) => self.settle,
         };
         if settle > 0.0 {
-            let t_end = options.t_start + settle;
-            let settling = Options {
-                t_end,
-                record: Record::Times { every: f64::INFINITY },
-                ..options.clone()
-            };
-            let end =
-                follow(&model, &settling, &mut |point| monitor.reached(point.t).is_continue())?;
-            if end.ending == Ending::Interrupted {
-                return Err(JobError::Interrupted);
+            let begin = options.clone();
+            for times in 0..=LONGER {
+                let longer = 1.0 + f64::from(times) * LONGER_BY;
+                let settling = Options {
+                    t_end: begin.t_start + settle * longer,
+                    record: Record::Times { every: f64::INFINITY },
+                    ..begin.clone()
+                };
+                let end =
+                    follow(&model, &settling, &mut |point| monitor.reached(point.t).is_continue())?;
+                if end.ending == Ending::Interrupted {
+                    return Err(JobError::Interrupted);
+                }
+                (options.start, options.mode) = (Some(end.x), end.mode);
+                // An event that would come at the very end would be lost.
+                let whole = matches!(self.after, Return::Period(_));
+                if whole || !starts_on_an_event(&model, &options)? {
+                    break;
+                }
             }
-            (options.start, options.mode) = (Some(end.x), end.mode);
         }
         let found = closed_orbit(&model, &options, &self.after)?;
         let mut answer = Answer::of_tables(Vec::new())
@@ -253,6 +265,21 @@ mod tests {
     }
 
     /// Settling ends in the second mode, from which the first one would not come back.
+    /// Up to 1 and down to -1 twice as fast, whenever settling ends: also at the ends.
+    #[test]
+    fn no_event_is_lost_at_the_end_of_settling() {
+        let text = "states = ['x']\nstart = [0]\n[modes.u]\nf = ['1']\n[modes.d]\nf = ['-2']\n\
+            [[event]]\nfrom = 'u'\nwhen = 'x - 1'\nmode = 'd'\n\
+            [[event]]\nfrom = 'd'\nwhen = 'x + 1'\nmode = 'u'";
+        for settle in [0.0, 0.5, 1.0, 2.0, 10.0, 200.0] {
+            let mut run = run(text, 1000.0);
+            run.options.record = Record::Section(expression("x", &run.model).unwrap());
+            let question = GeneralOrbit { run, settle, after: Return::Crossings(1), along: None };
+            let period: f64 = Executor::quiet().ask(&question).unwrap().fact("period").unwrap();
+            assert!((period - 3.0).abs() < 1e-9, "{settle}: {period}");
+        }
+    }
+
     #[test]
     fn an_orbit_is_searched_in_the_mode_in_which_settling_ends() {
         let text = "states = ['x']\nstart = [0]\n[modes.a]\nf = ['1']\n[modes.b]\nf = ['1']\n\
