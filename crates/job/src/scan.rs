@@ -169,6 +169,16 @@ impl Scan {
                 );
             }
         }
+        if let Base::Surfaces(run) = scan.sweep.run()
+            && scan.is_map()
+            && run.system.dimension() < 2
+        {
+            return Err(
+                "what runs end on is seen where they meet a section, which one state does \
+                not have: give a system of two states or more"
+                    .into(),
+            );
+        }
         let runs = scan.cells().saturating_mul(if follow == Some(Follow::Both) { 2 } else { 1 });
         if runs > MOST_RUNS {
             return Err(format!("{runs} runs; give at most {MOST_RUNS}, or use `twofold sweep`"));
@@ -348,8 +358,16 @@ impl Scan {
         }
         let middle = 0.5 * (run.options.t_start + run.options.t_end);
         let strobed = matches!(run.options.record, Record::Times { .. });
-        let mut late = Vec::new();
+        let mut late: Vec<(f64, Vec<f64>)> = Vec::new();
         let mut observe = |point: &twofold_hybrid::Point<'_>| {
+            // What is seen every period is the state after the events of that moment.
+            if strobed
+                && point.event.is_some()
+                && let Some((t, x)) = late.last_mut()
+                && *t == point.t
+            {
+                x.copy_from_slice(point.x);
+            }
             let counts = if strobed { point.event.is_none() } else { point.direction > Some(0.0) };
             if counts && point.t > middle {
                 late.push((point.t, point.x.to_vec()));

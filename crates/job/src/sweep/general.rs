@@ -80,10 +80,18 @@ impl GeneralOutcome {
         let GeneralRun { model, options } = &self.0;
         let strobed = matches!(options.record, Record::Times { .. });
         let plane = plane(&self.0);
-        let mut section = Vec::new();
+        let mut section: Vec<SectionPoint> = Vec::new();
         let mut observe = |point: &twofold_hybrid::Point<'_>| {
+            let u = plane.map(|i| i.map_or(0.0, |i| point.x[i]));
+            // What is seen every period is the state after the events of that moment.
+            if strobed
+                && point.event.is_some()
+                && let Some(last) = section.last_mut()
+                && last.t == point.t
+            {
+                last.u = u;
+            }
             if point.event.is_none() && (strobed || point.direction.is_some()) {
-                let u = plane.map(|i| i.map_or(0.0, |i| point.x[i]));
                 section.push(SectionPoint {
                     t: point.t,
                     u,
