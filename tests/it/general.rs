@@ -473,6 +473,22 @@ fn wrong_files_and_flags_are_refused() {
         2,
         &["did you mean bouncing-ball?", "driven-by-data"],
     );
+    // What every orbit or run has of its own is not also given for all.
+    let slip = ["--system", "stick-slip", "--section", "v=0", "--quiet"];
+    let along = ["orbit", "--along", "belt=0.3..0.2", "--set", "belt=0.5"];
+    refused(at, &[&along[..], &slip].concat(), 2, &["--set has no effect", "orbit its belt"]);
+    let eps = ["orbit", "--along", "eps=1e-2..1e-3", "--eps", "1e-2"];
+    refused(at, &[&eps[..], &slip].concat(), 2, &["--eps has no effect", "orbit its eps"]);
+    let over = ["scan", "--over", "params.belt=0.3,0.2", "--set", "belt=0.5", "--t-end", "9"];
+    refused(at, &[&over[..], &slip].concat(), 2, &["--set has no effect", "params.belt"]);
+    let wheel = ["orbit", "--system", "rimless-wheel", "--section", "a=0", "--quiet"];
+    let along = ["--along", "slope=0.1..0.2", "--set", "slope=0.1"];
+    refused(at, &[&wheel[..], &along].concat(), 2, &["--set has no effect", "orbit its slope"]);
+    // One state meets no section.
+    fs::write(at.join("one.toml"), "states = ['x']\nh = 'x'\nplus = ['-1']\nminus = ['1']")
+        .unwrap();
+    let one = ["sweep", "--system", "one.toml", "--over", "start.x=1,2", "--t-end", "9"];
+    refused(at, &one, 2, &["two states or more"]);
     // A system with one switch still says what it lacks, and who has it.
     fs::write(at.join("f.toml"), "states = ['x']\nh = 'x'\nplus = ['max(x, 1)']\nminus = ['1']")
         .unwrap();
@@ -731,6 +747,28 @@ const FOLDS: &str = "states = ['x']\nstart = [-1]\nf = ['p + x - x^3']\n[paramet
 /// The table of `twofold scan` with these arguments.
 fn scanned(folder: &Path, arguments: &[&str]) -> Table {
     from_csv(&good(folder, &[&["scan", "--quiet"], arguments].concat())).unwrap().1
+}
+
+/// A decay that is kicked by 1 at every whole time, looked at then: after the kick, as `orbit` does,
+/// x = 1/(1 - 1/e).
+#[test]
+fn scans_and_orbits_see_the_state_after_a_kick() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let kicked = "states = ['x']\nf = ['-k*x']\nstart = [0]\n[parameters]\nk = 1\n[[event]]\n\
+        every = 1\nset = { x = 'x + 1' }";
+    fs::write(at.join("kicked.toml"), kicked).unwrap();
+    let after = 1.0 / (1.0 - (-1.0_f64).exp());
+    let system = ["--system", "kicked.toml", "--period", "1"];
+    let scan = ["--t-end", "80", "--over", "params.k=1"];
+    let seen = scanned(at, &[&system[..], &scan].concat());
+    assert!(seen.len() > 30);
+    for x in seen.numbers("x") {
+        assert!((x - after).abs() < 1e-9, "{x} {after}");
+    }
+    let orbit =
+        String::from_utf8(good(at, &[&["orbit", "--quiet"], &system[..]].concat())).unwrap();
+    assert!(orbit.contains("x = 1.58197670"), "{orbit}");
 }
 
 /// An attractor is followed past the place where another begins: two folds at p = -+2/sqrt(27), and

@@ -22,6 +22,7 @@ use crate::job::general_orbit::GeneralOrbit;
 use crate::job::orbit::Along;
 use crate::job::rest::{Rest, Stability as RestStability};
 use crate::job::spec::Observation;
+use crate::job::sweep::{Axis, Coordinate, Values};
 use crate::job::{Answer, AnyQuestion, ClosedOrbit, Executor, JobError, Question, Stop, encode};
 use crate::num::elementary::ln;
 
@@ -128,6 +129,7 @@ impl Arguments {
                 return Err(CliError::Usage(format!("{flag} is {number}: give a time {least}")));
             }
         }
+        let along = self.followed(|name| name == "eps" && spec.system.parameter(name).is_none())?;
         Ok(ClosedOrbit {
             system: spec.system,
             switch: spec.switch,
@@ -137,8 +139,25 @@ impl Arguments {
             returns: self.returns,
             tolerance: spec.method.tolerance,
             longest_return: self.longest_return,
-            along: self.along.as_deref().map(along).transpose()?,
+            along,
         })
+    }
+
+    /// The parameter to follow along; `of_switch`: whether a name is one of the switch's numbers,
+    /// and not the system's.
+    fn followed(&self, of_switch: impl Fn(&str) -> bool) -> Result<Option<Along>, CliError> {
+        let Some(along) = self.along.as_deref().map(along).transpose()? else { return Ok(None) };
+        let name = along.parameter.clone();
+        let coordinate =
+            if of_switch(&name) { Coordinate::Eps } else { Coordinate::Parameter(name.clone()) };
+        let axis = Axis { coordinate, values: Values::Numbers(vec![along.from]) };
+        match self.flags.replaced_by(&[axis]) {
+            Some((flag, _)) => Err(CliError::no_effect(
+                flag,
+                format!("--along gives each orbit its {name}; leave it out"),
+            )),
+            None => Ok(Some(along)),
+        }
     }
 
     /// The question about a general system.
@@ -196,7 +215,7 @@ impl Arguments {
             return Err(CliError::Usage(format!("--settle is {settle}: give a time 0 or more")));
         }
         run.options.t_end = run.options.t_start + self.longest_return;
-        let along = self.along.as_deref().map(along).transpose()?;
+        let along = self.followed(|_| false)?;
         if let Some((along, text)) = along.as_ref().zip(self.along.as_deref())
             && !run.model.definition().parameters().iter().any(|p| p.name == along.parameter)
         {

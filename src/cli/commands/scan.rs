@@ -112,6 +112,12 @@ impl Arguments {
 
     fn prepared(&self) -> Result<(Scan, Drawn), CliError> {
         let usage = |text: String| Err(CliError::Usage(text));
+        if let Some((flag, axis)) = self.flags.replaced_by(&self.over) {
+            return Err(CliError::no_effect(
+                flag,
+                format!("--over {axis} gives every run its own; leave one of the two out"),
+            ));
+        }
         let two = match self.over.len() {
             1 => false,
             2 => true,

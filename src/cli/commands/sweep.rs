@@ -139,6 +139,10 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     }
 }
 
+const ONE_STATE: &str = "where a run ends is seen where it meets a section, which one state does \
+    not have: give a system of two states or more, or write this one with `f = [...]` instead of h, \
+    plus and minus";
+
 /// The sweep that the flags describe.
 fn sweep(arguments: &Arguments) -> Result<Sweep, CliError> {
     let usage = |text: String| Err(CliError::Usage(text));
@@ -152,6 +156,11 @@ fn sweep(arguments: &Arguments) -> Result<Sweep, CliError> {
         Some(run) => Base::from(run),
         None => Base::from(arguments.flags.spec(Use::Crossings)?),
     };
+    if let Base::Surfaces(run) = &base
+        && run.system.dimension() < 2
+    {
+        return usage(ONE_STATE.into());
+    }
     let mut over = arguments.over.clone();
     let given = [("--runs", arguments.runs.is_some()), ("--shift", arguments.shift.is_some())];
     if let (false, Some((flag, _))) = (over.is_empty(), given.iter().find(|(_, given)| *given)) {
