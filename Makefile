@@ -35,12 +35,13 @@ papers: ## make and check every paper under papers/
 		$(RUN) --bin twofold -- paper report --quiet "$$(dirname "$$p")" && $(RUN) --bin twofold -- paper check --quiet "$$(dirname "$$p")" || exit 1; \
 	done
 
-# With the programs of `make figures`: what is built already is not built again.
-test: ## the tests of figures and their hashes, of commands, files and papers
-	@$(CARGO) test --release --locked --test it
+# In the debug profile, where an overflow is an error.
+test: ## the tests of the whole program: figures and their hashes, commands, files, papers
+	@$(CARGO) test --locked --test it
 
-test-all: ## every test of every crate and of the documentation, too, in the debug profile, where an overflow is an error
-	@$(CARGO) test --locked
+test-all: test ## also the tests of every crate by itself and of the documentation
+	@$(CARGO) test --locked --lib --bins --examples
+	@$(CARGO) test --locked --doc
 
 rigor-test: ## millions of interval operations against exact integer arithmetic (minutes)
 	@$(CARGO) test --release --locked --test it rigor_interval:: -- --ignored
@@ -299,7 +300,6 @@ ci: export CARGO_INCREMENTAL = 0
 ci: lint test-all ## what CI runs; nothing in it rests on a store
 	@$(MAKE) --no-print-directory figures FIGURE_FLAGS=--fresh
 	@$(MAKE) --no-print-directory check
-	@$(MAKE) --no-print-directory test
 	@$(MAKE) --no-print-directory proofs-quick
 
 clean: ## remove everything that was built or computed
