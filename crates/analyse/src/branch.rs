@@ -95,6 +95,9 @@ pub struct Orbit {
     /// Events on the way (crossings of the switching surface, landings, departures), if the system
     /// is discontinuous.
     pub events: usize,
+    /// Whether a multiplier is 1 within the error of the return map's derivative: others beside it
+    /// may be closed, too.
+    pub fills: bool,
     /// Its passages through the plane in the counted direction, the point first.
     pub same: Vec<Vec<f64>>,
     /// Its passages in the other direction.
@@ -110,7 +113,7 @@ impl Orbit {
     /// The stability that the multipliers imply, within their error.
     pub fn stability(&self) -> Stability {
         let (largest, error) = (self.largest_modulus(), self.multiplier_error);
-        let isolated = self.is_isolated();
+        let isolated = self.multipliers.iter().all(|m| distance(*m, [1.0, 0.0]) > error);
         if largest > 1.0 + error {
             Stability::Unstable
         } else if !isolated {
@@ -120,11 +123,6 @@ impl Orbit {
         } else {
             Stability::Stable
         }
-    }
-
-    /// Whether no multiplier is 1 within its error.
-    fn is_isolated(&self) -> bool {
-        self.multipliers.iter().all(|m| distance(*m, [1.0, 0.0]) > self.multiplier_error)
     }
 
     /// The rate per unit time at which neighbours approach it in the end, negative if they leave;
@@ -287,7 +285,7 @@ fn orbit(
     // The start is the orbit's first passage; the last return is the start again.
     let returns = r.same.len().saturating_sub(1);
     let same = std::iter::once(u.clone()).chain(r.same.into_iter().take(returns)).collect();
-    let multiplier_error =
+    let (multiplier_error, fills) =
         multiplier_error(map, &u, p, &multipliers, residual / r.extent, r.derivative_error);
     Ok(Orbit {
         parameter: p,
@@ -299,6 +297,7 @@ fn orbit(
         extent: r.extent,
         multiplier_error,
         events: r.events,
+        fills,
         same,
         opposite: r.opposite,
     })
@@ -307,7 +306,7 @@ fn orbit(
 /// The error of multipliers: by how much those of a less accurate map differ, and by how much they
 /// change over the distance by which the orbit's point is off (the residual over the distance of
 /// the nearest multiplier from 1), ten times as fast as they change over the orbit. Where a
-/// multiplier is 1 within the first part, the points beside are as good.
+/// multiplier is 1 within the first part, the points beside are as good: this is said, too.
 fn multiplier_error(
     map: &dyn ReturnMap,
     u: &[f64],
@@ -315,8 +314,8 @@ fn multiplier_error(
     multipliers: &[[f64; 2]],
     residual: f64,
     least: f64,
-) -> f64 {
-    let Ok(rough) = map.roughly(u, p) else { return f64::INFINITY };
+) -> (f64, bool) {
+    let Ok(rough) = map.roughly(u, p) else { return (f64::INFINITY, false) };
     let rough = multipliers_of(&rough.derivative, map.states(), map.axis());
     let differences = multipliers
         .iter()
@@ -324,9 +323,9 @@ fn multiplier_error(
         .map(|(a, b)| distance(*a, *b))
         .fold(ROUNDING + least, f64::max);
     let from_one = multipliers.iter().map(|m| distance(*m, [1.0, 0.0])).fold(1.0, f64::min);
-    let misplaced =
-        if from_one > differences { (10.0 * residual / from_one).min(1.0) } else { 0.0 };
-    differences + misplaced
+    let fills = from_one <= differences;
+    let misplaced = if fills { 0.0 } else { (10.0 * residual / from_one).min(1.0) };
+    (differences + misplaced, fills)
 }
 
 fn less_identity(derivative: &[f64], n: usize) -> Vec<f64> {
@@ -555,7 +554,7 @@ pub fn follow(
         let next = match next {
             Ok(next)
                 if next.extent <= VANISHING * widest
-                    && (last.is_isolated() || next.is_isolated())
+                    && !(last.fills && next.fills)
                     && !is_loop(map, &next) =>
             {
                 let said = "the orbit shrinks to a point".to_owned();
@@ -1222,6 +1221,7 @@ mod tests {
             extent: 1.0,
             multiplier_error: 0.0,
             events: 0,
+            fills: false,
             same: Vec::new(),
             opposite: Vec::new(),
         }

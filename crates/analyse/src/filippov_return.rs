@@ -279,7 +279,8 @@ where
         _ => f,
     };
     let extent = seen.extent.as_ref().map_or(0.0, Extent::diagonal);
-    let sizes = seen.extent.as_ref().map_or(SVector::zeros(), Extent::sizes);
+    let sizes = seen.extent.as_ref().map(|extent| extent.sizes(settings.tolerance));
+    let sizes = sizes.unwrap_or(SVector::zeros());
     let largest = seen.extent.as_ref().map_or(SVector::zeros(), Extent::largest);
     Ok(Plain {
         sizes,

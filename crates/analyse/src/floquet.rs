@@ -142,6 +142,8 @@ struct Return<const N: usize> {
 
 /// A state that is never so large a share of the loop has a unit of its own.
 const OWN_UNIT: f64 = 1e-3;
+/// And a unit of its own is larger than this share of what has the same absolute as relative error.
+const RESOLVED: f64 = 1e-2;
 
 /// The box around a stretch of an orbit.
 pub(super) struct Extent<const N: usize> {
@@ -166,10 +168,11 @@ impl<const N: usize> Extent<N> {
     }
 
     /// The size of the loop as each state has it: its diagonal, but of a state whose values are
-    /// far smaller in all of it, as in another unit, the largest of them.
-    pub(super) fn sizes(&self) -> SVector<f64, N> {
-        let all = self.diagonal();
-        self.largest().map(|own| if own > 0.0 && own < OWN_UNIT * all { own } else { all })
+    /// far smaller in all of it, as in another unit, the largest of them. A state that has decayed
+    /// is not resolved so far.
+    pub(super) fn sizes(&self, tolerance: Tolerance) -> SVector<f64, N> {
+        let (all, resolved) = (self.diagonal(), RESOLVED * tolerance.atol / tolerance.rtol);
+        self.largest().map(|own| if own > resolved && own < OWN_UNIT * all { own } else { all })
     }
 
     pub(super) fn diagonal(&self) -> f64 {
@@ -390,7 +393,8 @@ fn returned<const N: usize, const M: usize, T: VectorField<M>>(
                 let column = |k: usize| landing[N * (j + 1) + k];
                 column(i) - f[i] / f[plane.axis] * column(plane.axis)
             });
-            let (extent, sizes) = (extent.diagonal(), Failure::state(&extent.sizes()));
+            let (extent, sizes) =
+                (extent.diagonal(), Failure::state(&extent.sizes(settings.tolerance)));
             let time = tc + dt;
             return Ok(Return { point, time, derivative, same, opposite, extent, sizes, passes });
         }

@@ -186,7 +186,7 @@ impl Map<'_> {
             derivative,
             opposite: Vec::new(),
             extent: turn.extent,
-            sizes: turn.sizes.into_iter().chain([turn.extent]).collect(),
+            sizes: vec![turn.extent; n + 1],
             passes: true,
             derivative_error: 0.0,
             events: usize::try_from(turn.changes).unwrap_or(usize::MAX),

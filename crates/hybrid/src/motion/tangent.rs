@@ -647,8 +647,6 @@ pub(super) struct Growth {
     told: usize,
 }
 
-/// A state that is never so large a share of a loop has a unit of its own.
-const OWN_UNIT: f64 = 1e-3;
 /// Sizes of states that differ by less than this factor have one unit.
 const ONE_UNIT: f64 = 1e6;
 
@@ -901,9 +899,6 @@ pub struct Turn {
     pub size: f64,
     /// The diagonal of the box around the way.
     pub extent: f64,
-    /// The same as each state has it: of one whose values are far smaller, as in another unit, the
-    /// largest of them.
-    pub sizes: Vec<f64>,
     /// Switches and events on the way.
     pub changes: u64,
 }
@@ -1015,17 +1010,13 @@ fn turn(
             }
         }
     }
-    let extent = bounds.iter().map(|[low, high]| (high - low) * (high - low)).sum::<f64>().sqrt();
-    let own = |[low, high]: &[f64; 2]| low.abs().max(high.abs());
-    let size = |own: f64| if own > 0.0 && own < OWN_UNIT * extent { own } else { extent };
     Ok(Turn {
         time: outcome.t - settings.t_start,
         end: outcome.x,
         mode: outcome.mode,
         matrix,
         size: follower.size.iter().fold(0.0_f64, |most, s| most.max(*s)),
-        extent,
-        sizes: bounds.iter().map(own).map(size).collect(),
+        extent: bounds.iter().map(|[low, high]| (high - low) * (high - low)).sum::<f64>().sqrt(),
         changes: outcome.switches + outcome.events,
     })
 }
