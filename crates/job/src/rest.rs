@@ -284,6 +284,32 @@ const POINTS: usize = 32;
 /// Share of the linear rate at which the distance has to fall at least.
 const AS_FAST: f64 = 0.75;
 
+/// Share of its length for which a run is followed further from a point at which its fields almost
+/// cancel, and the least change of a state, as a share of its size, by which it moves on.
+const FURTHER: f64 = 0.01;
+const MOVES: f64 = 1e-3;
+
+/// Whether a run goes on moving from its end, in any state as that one's size has it: fields that
+/// almost cancel in one unit may not in another.
+fn moves_on(executor: &dyn Ask, run: &RunSpec, end: &[f64]) -> Result<bool, JobError> {
+    let further = RunSpec {
+        start: end.to_vec(),
+        t_end: FURTHER * run.t_end,
+        observe: Observation::Times { every: FURTHER * run.t_end },
+        ..run.clone()
+    };
+    let there: Vec<f64> = match executor.ask(&Run(further)) {
+        Ok(answer) if answer.stop != Stop::Interrupted => answer.fact("state")?,
+        Ok(_) | Err(JobError::Interrupted) => return Err(JobError::Interrupted),
+        // From a point at which nothing holds a motion may not go on.
+        Err(_) => return Ok(false),
+    };
+    let states = there.iter().zip(end).zip(&run.start);
+    Ok(states.into_iter().any(|((there, end), start)| {
+        (there - end).abs() > MOVES * end.abs().max(start.abs()) + run.method.tolerance.atol
+    }))
+}
+
 /// The rest at which `run` ends, if it ends at one; `answer` is what it came to, with its section.
 /// A run that is kicked ends nowhere.
 ///
@@ -306,6 +332,9 @@ pub fn at_end(
         x.iter().copied().chain(more).collect()
     };
     let Some(rest) = near(&run.system, run.switch, &full(&end)) else { return Ok(None) };
+    if rest.eigenvalues.is_empty() && moves_on(executor, run, &end)? {
+        return Ok(None);
+    }
     let from = |x: &[f64]| distance(x, &rest.state[..n]);
     let (before, after) = (from(&run.start), from(&end));
     // Started there, or as near as rounding tells.
