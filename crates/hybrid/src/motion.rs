@@ -818,6 +818,15 @@ impl<'a> Follower<'a> {
             if self.outcome.steps >= self.options.max_steps {
                 return Err(HybridError::Budget { steps: self.outcome.steps, t: self.t });
             }
+            if let Some(met) = self.lands_at_a_root(clock.next().unwrap_or(f64::INFINITY)) {
+                h = 0.0;
+                let before = self.before(&met)?;
+                if let Some(ending) = self.meet(&definition, &met, &[], observe)? {
+                    return Ok(ending);
+                }
+                self.after(before)?;
+                continue;
+            }
             step.t = self.t;
             step.x.copy_from_slice(&self.x);
             self.rhs(step.t, &step.x, &mut room);

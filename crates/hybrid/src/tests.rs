@@ -522,6 +522,33 @@ fn errors_point_into_the_file() {
     }
 }
 
+/// x' = -sqrt(x) (Torricelli): (1 - t/2)^2, and from t = 2 on zero for ever.
+#[test]
+fn a_tank_runs_empty() {
+    let follow_by = |text: &str, t_end, method| {
+        follow(&model(text), &Options { t_end, method, ..Options::default() }, &mut |_| true)
+    };
+    for method in [Method::Dopri5, Method::Radau5, Method::Taylor] {
+        for f in ["-sqrt(x)", "-x^0.5", "-sqrt(2*x)/2^0.5"] {
+            let text = format!("states = ['x']\nstart = [1]\nf = ['{f}']");
+            let outcome = follow_by(&text, 3.0, method).unwrap();
+            assert!(outcome.x[0] == 0.0 && outcome.steps < 500, "{method:?} {f} {outcome:?}");
+            near(follow_by(&text, 1.5, method).unwrap().x[0], 0.0625, 1e-9);
+        }
+    }
+    let event = "states = ['x', 'y']\nstart = [1, 1]\nf = ['-sqrt(x)', 'sqrt(x) - sqrt(y)']\n\
+        [[event]]\nwhen = 'x'\n[[event]]\nwhen = 'y'";
+    let (events, outcome) = run(&model(event), 9.0);
+    assert_eq!(outcome.unwrap().x, [0.0, 0.0]);
+    near(events[0].0, 2.0, 1e-6);
+    assert_eq!(events.len(), 2);
+    // What decays for ever is not put to zero: y' = sqrt(x) sums up to 2.
+    let decays = "states = ['x', 'y']\nstart = [1, 0]\nf = ['-x', 'sqrt(x)']";
+    near(end(decays, 60.0)[1], 2.0, 1e-8);
+    // Nor is what leaves the domain.
+    assert!(run(&model("states = ['x']\nstart = [1]\nf = ['-1 - sqrt(x)']"), 3.0).1.is_err());
+}
+
 #[test]
 fn errors_of_tables_point_into_the_systems_file() {
     let text = "states = ['x']\nstart = [0]\nf = ['w']\n[tables.w]\nfile = 'w.csv'\ntime = \

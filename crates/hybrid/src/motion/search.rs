@@ -647,6 +647,114 @@ impl Follower<'_> {
         Ok(true)
     }
 
+    /// A motion that comes to where a root's argument is zero in finite time, and makes it stay so
+    /// (Torricelli's x' = -sqrt(x)), is put there where it comes to it before `limit` and what that
+    /// changes is about a step's error: the watched expressions that are zero there. Steps
+    /// would grow short without end.
+    pub(super) fn lands_at_a_root(&mut self, limit: f64) -> Option<Vec<Sought>> {
+        /// A flow a' = -c a^p comes to a = 0 in the time a/(c a^p (1 - p)) if p < 1.
+        const LARGEST_POWER: f64 = 0.9;
+        /// So many of a step's least errors count as nothing; steps of series go over the zero at
+        /// about ten.
+        const ERRORS: f64 = 20.0;
+        let compiled = self.compiled.clone();
+        let free = self.sliding.is_empty() && self.contacts.is_empty() && self.tangents.is_none();
+        if !free || !compiled.gates.contains(&Gate::Scale) {
+            return None;
+        }
+        let (n, t, x) = (self.n, self.t, self.x.clone());
+        let options = self.options;
+        let allowed = |follower: &Self, i: usize| {
+            ERRORS * options.atol.unwrap_or(0.01 * options.rtol * follower.size[i])
+        };
+        // Arguments, and their rates along a direction.
+        let arguments = |follower: &Self, t: f64, x: &[f64], along: &[f64], clock: f64| {
+            let mut duals: Vec<Dual<f64, 1>> =
+                follower.variables.iter().map(|v| Dual::constant(*v)).collect();
+            for i in 0..n {
+                duals[i] = Dual { value: x[i], partials: [along[i]] };
+            }
+            duals[n] = Dual { value: t, partials: [clock] };
+            let mut out = vec![Dual::constant(0.0); compiled.gates.len()];
+            compiled.gate_arguments.evaluate(&duals, &mut out);
+            out
+        };
+        let mut now = vec![0.0; n];
+        self.rhs(t, &x, &mut now);
+        let here = arguments(self, t, &x, &now, 1.0);
+        for gate in 0..here.len() {
+            let (a, rate) = (here[gate].value, here[gate].partials[0]);
+            if compiled.gates[gate] != Gate::Scale || !(a > 0.0 && rate < 0.0) {
+                continue;
+            }
+            let mut unit = vec![0.0; n];
+            let gradient: Vec<f64> = (0..n)
+                .map(|i| {
+                    unit[i] = 1.0;
+                    let slope = arguments(self, t, &x, &unit, 0.0)[gate].partials[0];
+                    unit[i] = 0.0;
+                    slope
+                })
+                .collect();
+            if !(a <= (0..n).map(|i| gradient[i].abs() * allowed(self, i)).sum::<f64>()) {
+                continue;
+            }
+            let brief = -1e-3 * a / rate;
+            let ahead: Vec<f64> = x.iter().zip(&now).map(|(x, f)| x + brief * f).collect();
+            let mut then = vec![0.0; n];
+            self.rhs(t + brief, &ahead, &mut then);
+            let later = arguments(self, t + brief, &ahead, &then, 1.0)[gate].partials[0];
+            let power = a * (later - rate) / (brief * rate * rate);
+            let left = -a / (rate * (1.0 - power));
+            let end = t + left;
+            if !(power < LARGEST_POWER && end < limit.min(self.options.t_end)) {
+                continue;
+            }
+            let square: f64 = gradient.iter().map(|g| g * g).sum();
+            let (mut there, mut stays) = (x.clone(), now.clone());
+            for _ in 0..3 {
+                // What falls as a^p has this mean.
+                for i in 0..n {
+                    there[i] = x[i] + left * (stays[i] + (now[i] - stays[i]) * (1.0 - power));
+                }
+                for _ in 0..3 {
+                    let off = arguments(self, end, &there, &unit, 0.0)[gate].value;
+                    there.iter_mut().zip(&gradient).for_each(|(x, g)| *x -= off * g / square);
+                }
+                self.rhs(end, &there, &mut stays);
+            }
+            let last = &arguments(self, end, &there, &stays, 1.0)[gate];
+            let small = |i: usize| (stays[i] - now[i]).abs() * left <= allowed(self, i);
+            if last.value != 0.0 || last.partials[0] != 0.0 || !(0..n).all(small) {
+                continue;
+            }
+            self.variables[..n].copy_from_slice(&there);
+            self.variables[n] = end;
+            let mut values = vec![0.0; compiled.outputs];
+            compiled.watched.evaluate(&self.variables, &mut values);
+            let (guards, watched) = values.split_at(compiled.active.len());
+            let keeps = |(guard, value): (&usize, &f64)| {
+                let side = self.config.sides[*guard];
+                let whole = self.equation.guards[*guard].whole;
+                if whole { value.floor() == side } else { value * side > 0.0 || side == 0.0 }
+            };
+            if !compiled.active.iter().zip(guards).all(keeps) {
+                return None;
+            }
+            let before = self.watched_values().split_off(guards.len());
+            let met = before.iter().zip(watched).zip(&self.watch_side).enumerate();
+            let met: Vec<Sought> = met
+                .filter(|(_, ((from, to), side))| **from * **side > 0.0 && !(**to * **side > 0.0))
+                .map(|(i, _)| Sought::Watched(i))
+                .collect();
+            (self.t, self.x) = (end, there);
+            let sees_time = self.equation.depends_on_time() || self.equation.events_see_time();
+            self.rests = !sees_time && stays.iter().all(|f| *f == 0.0);
+            return Some(met);
+        }
+        None
+    }
+
     /// The gradient of a watched expression in the states, at those that the variables hold.
     pub(super) fn gradient(&self, t: f64, place: usize) -> Vec<f64> {
         let n = self.n;

@@ -172,6 +172,19 @@ impl Follower<'_> {
         let broken = |terms: &Vec<f64>| !terms.iter().all(|c| c.is_finite());
         match series.terms[..n].iter().position(broken) {
             None => Ok(()),
+            // Fast growth of large numbers, far from a pole.
+            Some(i)
+                if series.terms[i][2].is_finite()
+                    && (series.terms[i][0] / series.terms[i][1]).abs()
+                        > 1e3 * f64::EPSILON * step.t.abs() =>
+            {
+                let name = &self.model.definition().states[i].name;
+                Err(stuck(format!(
+                    "the Taylor series of {name} has numbers beyond the range of double \
+                        precision: follow it by --method dopri5 or radau5, or measure time in \
+                        other units"
+                )))
+            }
             // Numbers too large, as before a pole.
             Some(i) if series.terms[i][2].is_finite() => Err(self.left_domain(step.t, &step.x)),
             Some(i) => {
