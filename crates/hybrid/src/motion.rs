@@ -289,6 +289,8 @@ pub enum HybridError {
 
 /// Largest number of times that a step is shortened before it is given up.
 const MOST_SHORTENINGS: usize = 200;
+/// Steps that are a smaller part of the run may be on their way to a root's end.
+const SHORT_STEP: f64 = 1e-4;
 /// Largest number of times that switches may make each other jump at one moment.
 const MOST_JUMPS: usize = 32;
 
@@ -623,6 +625,11 @@ impl Rates {
         if self.first[i].abs() > SMALLEST_SLOPE * self.terms[i] { self.first[i] } else { 0.0 }
     }
 
+    /// Whether no term moves the value, to first and second order.
+    fn stands_still(&self, i: usize) -> bool {
+        self.terms[i] == 0.0 && self.second[i] == 0.0
+    }
+
     /// -1, 0 or +1: the sign of the first derivative, or of the second where the first is zero.
     fn direction(&self, i: usize) -> f64 {
         let first = self.first_or_zero(i);
@@ -818,7 +825,9 @@ impl<'a> Follower<'a> {
             if self.outcome.steps >= self.options.max_steps {
                 return Err(HybridError::Budget { steps: self.outcome.steps, t: self.t });
             }
-            if let Some(met) = self.lands_at_a_root(clock.next().unwrap_or(f64::INFINITY)) {
+            let short = step.h < SHORT_STEP * (self.options.t_end - self.options.t_start);
+            if short && let Some(met) = self.lands_at_a_root(clock.next().unwrap_or(f64::INFINITY))
+            {
                 h = 0.0;
                 let before = self.before(&met)?;
                 if let Some(ending) = self.meet(&definition, &met, &[], observe)? {

@@ -1,5 +1,6 @@
 //! Sides of switching functions, and where motion goes from points where they are zero.
 
+use std::cell::Cell;
 use std::collections::HashMap;
 
 use twofold_system::expression::{Function, General};
@@ -232,13 +233,13 @@ impl Follower<'_> {
     /// Gives the functions in `zero` that are zero all along on the lower sides that they are on,
     /// and that nothing leads or presses there, the side of what rests at zero: max(x, 0) where x
     /// is negative, a counter that nothing counts.
-    fn let_rest(&mut self, config: &mut Configuration, zero: &[usize], sliding: &[usize]) {
+    /// Whether there are any.
+    fn let_rest(&mut self, config: &mut Configuration, zero: &[usize], sliding: &[usize]) -> bool {
+        let mut some = false;
         let stays = |follower: &mut Self, config: &Configuration, guard: usize| {
             let (compiled, rates) = follower.rates_with(config, &[guard]);
             compiled.place(guard).is_some_and(|p| {
-                rates.terms[p] == 0.0
-                    && rates.second[p] == 0.0
-                    && follower.is_zero_a_little_later(config, guard)
+                rates.stands_still(p) && follower.is_zero_a_little_later(config, guard)
             })
         };
         for _ in 0..zero.len() {
@@ -262,9 +263,11 @@ impl Follower<'_> {
                 }
             }
             if !changed {
-                return;
+                break;
             }
+            some = true;
         }
+        some
     }
 
     /// Whether a function is zero, and a short time of motion in this configuration later still.
@@ -313,6 +316,7 @@ impl Follower<'_> {
             zero.iter().map(|g| self.compiled.place(*g).map_or(f64::NAN, |p| values[p])).collect();
         let lows: Vec<f64> = zero.iter().map(|g| self.low(*g)).collect();
         let highs: Vec<f64> = zero.iter().map(|g| self.high(*g)).collect();
+        let some_rest = Cell::new(false);
         let vertex = |follower: &mut Self, plus: &dyn Fn(usize) -> bool| {
             let mut config = follower.config.clone();
             for (i, guard) in zero.iter().enumerate() {
@@ -320,12 +324,24 @@ impl Follower<'_> {
             }
             follower.ask_new(&mut config);
             follower.follow_sides(&mut config, &zero);
-            follower.let_rest(&mut config, &zero, &[]);
-            let own = follower.equation.compiled(&config);
-            let asked: Vec<bool> = zero.iter().map(|g| own.place(*g).is_some()).collect();
-            let (compiled, rates) = follower.rates_with(&config, &others(&zero, &asked));
-            let place: Vec<Option<usize>> = zero.iter().map(|g| compiled.place(*g)).collect();
-            (config, place, rates, asked)
+            let rates_of = |follower: &mut Self, config: Configuration| {
+                let own = follower.equation.compiled(&config);
+                let asked: Vec<bool> = zero.iter().map(|g| own.place(*g).is_some()).collect();
+                let (compiled, rates) = follower.rates_with(&config, &others(&zero, &asked));
+                let place: Vec<Option<usize>> = zero.iter().map(|g| compiled.place(*g)).collect();
+                (config, place, rates, asked)
+            };
+            let made = rates_of(follower, config);
+            let (config, place, rates, _) = &made;
+            let still = |i: usize| place[i].is_some_and(|p| rates.stands_still(p));
+            if (0..zero.len()).any(|i| !plus(i) && still(i)) {
+                let mut resting = config.clone();
+                if follower.let_rest(&mut resting, &zero, &[]) {
+                    some_rest.set(true);
+                    return rates_of(follower, resting);
+                }
+            }
+            made
         };
         let k = zero.len();
         // Sets of functions that depend on each other.
@@ -671,7 +687,9 @@ impl Follower<'_> {
         }
         self.ask_new(&mut config);
         self.follow_sides(&mut config, &zero);
-        self.let_rest(&mut config, &zero, &sliding);
+        if some_rest.get() {
+            self.let_rest(&mut config, &zero, &sliding);
+        }
         sliding.sort_unstable();
         self.adopt(config, sliding);
         let left = self.leave_by_jump(&zero, &before);
