@@ -232,6 +232,8 @@ impl<const N: usize> Dopri5<N> {
         let longest = self.max_step.min(self.t_end - t);
         let norm = |v: &SVector<f64, N>| self.norm(v, |i| x[i].abs());
         let h = starting_step(&x, &self.fsal, &norm, 0.2, longest, &|y| field.eval(t, y));
+        // The time moves.
+        let h = h.max((8.0 * f64::EPSILON * t.abs()).min(longest));
         self.statistics.evaluations += 1;
         h
     }

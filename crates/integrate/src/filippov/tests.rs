@@ -703,3 +703,33 @@ fn sliding_needs_fields_with_values_on_the_surface() {
     let end = plane(["x - 1", "'-1', 'ln(x)'", "'1', '1/x'"], [1.5, 0.0], 3.0).unwrap();
     assert!((end.x[1] - (1.5 * 1.5_f64.ln() - 0.5 + 1.25)).abs() < 1e-9, "{}", end.x);
 }
+
+/// Twisting control, x'' = -2 sgn(x) - sgn(x'): turns come together at x = 0, whatever the unit of
+/// the states is against the tolerance. From (1, 0) it comes to x = 0 in the time sqrt(2) with that
+/// speed; each half turn takes (1/3 + sqrt(1/3)) of the speed and leaves sqrt(1/3) of it.
+#[test]
+fn a_spiral_ends_at_any_tolerance() {
+    let left = (1.0_f64 / 3.0).sqrt();
+    let want = 2.0_f64.sqrt() * (1.0 + (1.0 / 3.0 + left) / (1.0 - left));
+    for (unit, atol) in [(1.0, 1e-12), (1.0, 1e-14), (1e9, 1e-8), (1e-9, 1e-23), (1.0, 1e-20)] {
+        let [one, three] = [1.0, 3.0].map(|v: f64| v * unit);
+        let text = format!(
+            "states = ['x', 'v']\nstart = [{unit:e}, 0]\nh = 'x'\nplus = ['v', '-{three:e}']\n\
+             minus = ['v', '-{three:e} + 4*{one:e}']\n[second]\nh = 'v'\n\
+             plus = ['v', '-{one:e}']\nminus = ['v', '{three:e}']"
+        );
+        let text = twofold_system::Definition::from_toml(&text, "").unwrap();
+        let faces = System::new(text).faces().unwrap();
+        let faces = faces.map(|pair| pair.map(|face| face.bind::<2>().unwrap()));
+        let mut settings = FilippovOptions::default();
+        settings.tolerance.atol = atol;
+        let mut seen = Trajectory::new(1);
+        let start = SVector::from([unit, 0.0]);
+        let rule = ExitRule::Undecided;
+        let end = run_two_surfaces(&faces, start, 20.0, &settings, rule, &mut seen, &())
+            .unwrap_or_else(|e| panic!("{unit:e} {atol:e}: {e}"));
+        assert!(end.x.amax() <= 1e-9 * unit, "{unit:e} {atol:e} {}", end.x);
+        let last = seen.events.last().unwrap().t;
+        assert!((last - want).abs() < 1e-6, "{unit:e} {atol:e} {last}");
+    }
+}
