@@ -980,7 +980,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         let slope = gradient(self.system, x).norm();
         let mean = self.system.switching(before).abs() / (before - x).norm();
         let steepest = gradient(self.system, before).norm().max(mean) / LIMITS.small;
-        slope.is_finite() && slope > LIMITS.small * mean && !(slope > steepest)
+        slope > LIMITS.small * mean && slope <= steepest && slope.is_finite()
     }
 
     /// The states' size, by which distances along and across the surface are measured.
