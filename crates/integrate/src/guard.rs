@@ -649,7 +649,8 @@ impl Gates {
             let i = o % N;
             let size = step.x0[i].abs().max(step.x1[i].abs());
             let allowed = FELT * (tolerance.atol + tolerance.rtol * size);
-            !((before - now).abs() * step.length() <= allowed)
+            let slight = (before - now).abs() * step.length() <= allowed;
+            !slight
         })
     }
 

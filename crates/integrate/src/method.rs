@@ -187,6 +187,52 @@ mod tests {
         }
     }
 
+    /// x' = -sign(x - 0.5 sin(t)), held from where it comes to the curve, and x' = sign(sin(W t)),
+    /// whose jumps are left each time; the time is the second state.
+    enum Jumping {
+        Held,
+        Left,
+    }
+    const W: f64 = 1e4;
+    impl VectorField<2> for Jumping {
+        fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+            let slope = match self {
+                Jumping::Held => -(x[0] - x[1].sin().scale(0.5)).sign(),
+                Jumping::Left => x[1].scale(W).sin().sign(),
+            };
+            vector![slope, S::one()]
+        }
+    }
+
+    struct Jump(Jumping, f64);
+    impl WithStepper<2> for Jump {
+        type Answer = Result<f64, crate::Failure>;
+        fn with<M: Stepper<2>>(self, mut stepper: M) -> Self::Answer {
+            let options = DriveOptions::to(self.1);
+            let start = vector![0.3, 0.0];
+            drive(&self.0, start, &options, &mut stepper, &mut Ignore, &()).map(|end| end.x[0])
+        }
+    }
+
+    /// Steps across a jump that attracts from both sides get nowhere.
+    #[test]
+    fn a_motion_that_is_held_at_a_jump_is_refused() {
+        let tolerance = Tolerance { rtol: 1e-8, atol: 1e-8 };
+        let others = |method: &Method| *method != Method::Layered;
+        for method in Method::ALL.into_iter().filter(others) {
+            let held = method.with_stepper(tolerance, Jump(Jumping::Held, 3.0));
+            let Err(crate::Failure::StaysOnJump { t, what, .. }) = held else {
+                panic!("{method:?} {held:?}")
+            };
+            // 0.3 - t = 0.5 sin(t).
+            assert!((t - 0.2003).abs() < 1e-2, "{method:?} {t} {what}");
+            let end = 25.0 * std::f64::consts::PI / W;
+            let left = method.with_stepper(tolerance, Jump(Jumping::Left, end)).unwrap();
+            // Errors of steps over 25 jumps.
+            assert!((left - 0.3 - std::f64::consts::PI / W).abs() < 2e-5, "{method:?} {left}");
+        }
+    }
+
     struct ToItsName;
     impl WithStepper<1> for ToItsName {
         type Answer = (String, u64);
