@@ -400,7 +400,7 @@ mod tests {
             evidence(&format!("{states:?}"), &format!("{field:?}"), vec![1.0, 0.0, 1.0, 0.0])
                 .unwrap()
         };
-        for ratio in [1.618_033_988_749_895, 1.414_213_562_373_095, 2.718_281_828_459_045] {
+        for ratio in [1.618_033_988_749_895, std::f64::consts::SQRT_2, std::f64::consts::E] {
             for second in [false, true] {
                 let found = torus(ratio, second);
                 assert_eq!(found.name, "quasi-periodic", "{ratio} {second}: {}", found.summary);
