@@ -554,7 +554,7 @@ pub fn follow(
         let next = match next {
             Ok(next)
                 if next.extent <= VANISHING * widest
-                    && !(last.fills && next.fills)
+                    && !(last.fills && next.fills && next.extent > GONE * widest)
                     && !is_loop(map, &next) =>
             {
                 let said = "the orbit shrinks to a point".to_owned();

@@ -931,6 +931,23 @@ mod tests {
             assert!((x * x / mu - 1.0).abs() < 0.05, "{mu} {x}");
             assert_ne!(branch.words("stability").nth(row), Some("unstable"), "{mu}");
         }
+        // Orbits that fill a plane, at weakening = 0, to the rest within: (1 - 0.3 weakening, 0).
+        let slip = ClosedOrbit {
+            start: vec![0.0, 0.0],
+            settle: 100.0,
+            tolerance,
+            along: Some(Along {
+                parameter: "weakening".into(),
+                from: 0.2,
+                to: -0.2,
+                steps: 40,
+                most: 1000,
+            }),
+            ..question(System::builtin("stick-slip").unwrap(), filippov, 1)
+        };
+        let (branch, at) = follow(&slip);
+        assert!(at.abs() < 1e-9, "{at}");
+        assert!(branch.numbers("weakening").iter().all(|w| *w > -1e-6), "{branch:?}");
     }
 
     #[test]
