@@ -455,8 +455,6 @@ fn columns_are_as_the_page_says() {
                 "orbit",
                 "--system",
                 "fused-focus",
-                "--set",
-                "mu=-0.01",
                 "--switch",
                 "filippov",
                 "--section",

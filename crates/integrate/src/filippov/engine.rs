@@ -7,7 +7,8 @@ use nalgebra::SVector;
 use super::automatic::Automatic;
 use super::exit::{Chooser, ExitPlan};
 use super::flow::{
-    FreeFlow, InPhysicalTime, Sided, SlidingFlow, Straight, Truncated, desingularised, project,
+    FreeFlow, InPhysicalTime, Sided, SlidingFlow, Straight, Truncated, desingularised, length,
+    project,
 };
 use super::two_fold::{AlongCurve, FusedFolds, SlidingAtTwoFold};
 use super::{
@@ -660,7 +661,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         // Resolved by the state's digits, or where the surface goes through zero so small that no
         // tolerance sees it.
         let least = (4.0 * f64::EPSILON * self.x.amax()).max(LIMITS.depth);
-        self.depth = Some(least * gradient(self.system, &self.x).norm());
+        self.depth = Some(least * length(&gradient(self.system, &self.x)));
         new
     }
 
@@ -977,9 +978,9 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
     /// Whether the slope of h at `x`, on the surface, is of the size that h has at a state of the
     /// flight to it.
     fn has_slope(&self, before: &SVector<f64, N>, x: &SVector<f64, N>) -> bool {
-        let slope = gradient(self.system, x).norm();
+        let slope = length(&gradient(self.system, x));
         let mean = self.system.switching(before).abs() / (before - x).norm();
-        let steepest = gradient(self.system, before).norm().max(mean) / LIMITS.small;
+        let steepest = length(&gradient(self.system, before)).max(mean) / LIMITS.small;
         slope > LIMITS.small * mean && slope <= steepest && slope.is_finite()
     }
 
@@ -1015,7 +1016,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
     /// A field of which the domain ends on the surface, where it grows without bound: it makes no
     /// sliding motion.
     fn without_limit(&self) -> Option<Failure> {
-        let normal = gradient(self.system, &self.x).normalize() * self.reach();
+        let normal = gradient(self.system, &self.x);
+        let normal = normal / length(&normal) * self.reach();
         SIDES.into_iter().find_map(|side| {
             let (tape, ends) = self.field(side);
             let at = |depth: f64| Failure::state(&(self.x + normal * (side.sign() * depth)));

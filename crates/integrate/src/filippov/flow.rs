@@ -149,6 +149,16 @@ pub(super) fn project<P: PiecewiseSmooth<N>, const N: usize>(
     y
 }
 
+/// A vector's length, also where its square is no number.
+pub(super) fn length<const N: usize>(v: &SVector<f64, N>) -> f64 {
+    let largest = v.amax();
+    if v.norm_squared().is_normal() || largest == 0.0 {
+        v.norm()
+    } else {
+        largest * (v / largest).norm()
+    }
+}
+
 /// The first part, up to the fraction `end`, of a step.
 pub(super) struct Truncated<'a, const N: usize> {
     pub inner: &'a dyn Interpolant<N>,
