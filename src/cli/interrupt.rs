@@ -1,5 +1,5 @@
-//! Ctrl-C, SIGTERM and a closed terminal (SIGHUP): the program ends within a second, prints one line, and leaves no temporary
-//! files.
+//! Ctrl-C, SIGTERM and a closed terminal (SIGHUP): the program ends within a second, prints one
+//! line, and leaves no temporary files.
 //!
 //! Most programs here write every picture as soon as it is finished: for them a signal removes the
 //! temporary files and ends the process. A command whose result grows row by row can ask for grace

@@ -489,5 +489,5 @@ fn scans_show_what_changes_and_where_starts_end() {
     wrong(&["--over", "start.x=-1..1:2", "--plot", "a.txt"], &[".png, .svg or .pdf"]);
     wrong(&["--over", "start.x=-1..1"], &["at random"]);
     wrong(&["--over", "start.q=-1..1:2"], &["start.q"]);
-    wrong(&["--over", "eps=1,2", "--over", "t-end=1,2", "--over", "start.x=1,2"], &["3 times"]);
+    wrong(&["--over", "eps=1,2", "--over", "start.y=1,2", "--over", "start.x=1,2"], &["3 times"]);
 }

@@ -399,8 +399,8 @@ fn let_it_work(running: &mut Running) {
     wait_until("a second of work", || used() >= 100);
 }
 
-/// Ctrl-C, SIGTERM and, on Linux, a closed terminal: within a second (and what a loaded machine adds), one line, what is finished
-/// stays, nothing else does.
+/// Ctrl-C, SIGTERM and, on Linux, a closed terminal: within a second (and what a loaded machine
+/// adds), one line, what is finished stays, nothing else does.
 #[cfg(unix)]
 #[test]
 fn signals_leave_at_once_and_keep_what_is_finished() {

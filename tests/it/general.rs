@@ -473,7 +473,7 @@ fn wrong_files_and_flags_are_refused() {
         2,
         &["did you mean bouncing-ball?", "driven-by-data"],
     );
-    // What every orbit or run has of its own is not also given for all.
+    // A number that every orbit or run has of its own is not also given for all.
     let slip = ["--system", "stick-slip", "--section", "v=0", "--quiet"];
     let along = ["orbit", "--along", "belt=0.3..0.2", "--set", "belt=0.5"];
     refused(at, &[&along[..], &slip].concat(), 2, &["--set has no effect", "orbit its belt"]);
@@ -485,8 +485,11 @@ fn wrong_files_and_flags_are_refused() {
     let along = ["--along", "slope=0.1..0.2", "--set", "slope=0.1"];
     refused(at, &[&wheel[..], &along].concat(), 2, &["--set has no effect", "orbit its slope"]);
     // One state meets no section.
-    fs::write(at.join("one.toml"), "states = ['x']\nh = 'x'\nplus = ['-1']\nminus = ['1']")
-        .unwrap();
+    fs::write(
+        at.join("one.toml"),
+        "states = ['x']\nstart = [1]\nh = 'x'\nplus = ['-1']\nminus = ['1']",
+    )
+    .unwrap();
     let one = ["sweep", "--system", "one.toml", "--over", "start.x=1,2", "--t-end", "9"];
     refused(at, &one, 2, &["two states or more"]);
     // A system with one switch still says what it lacks, and who has it.
@@ -749,8 +752,8 @@ fn scanned(folder: &Path, arguments: &[&str]) -> Table {
     from_csv(&good(folder, &[&["scan", "--quiet"], arguments].concat())).unwrap().1
 }
 
-/// A decay that is kicked by 1 at every whole time, looked at then: after the kick, as `orbit` does,
-/// x = 1/(1 - 1/e).
+/// A decay that is kicked by 1 at every whole time, looked at then: after the kick, as `orbit`
+/// does, x = 1/(1 - 1/e).
 #[test]
 fn scans_and_orbits_see_the_state_after_a_kick() {
     let folder = tempfile::tempdir().unwrap();

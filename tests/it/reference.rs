@@ -357,8 +357,8 @@ const COLUMNS: [(&str, &str); 46] = [
     ),
     (
         "signs",
-        "a character for each switching function: `+`, `-`, `0` where motion slides on its zero or it \
-            rests there, `#` for `floor` and `mod`, `.` where it decides nothing; the fact `signs` \
+        "a character for each switching function: `+`, `-`, `0` where motion slides on its zero or \
+            it rests there, `#` for `floor` and `mod`, `.` where it decides nothing; the fact `signs` \
             names the functions",
     ),
     ("piece", "number of the piece of the motion between two events"),
@@ -665,17 +665,25 @@ fn says_something(text: &str) -> bool {
 
 #[test]
 fn errors_are_as_the_page_says() {
-    let places = [
+    let of_runs = [
         ("The command line", "src/cli"),
         ("Systems and their files", "crates/system/src"),
         ("General systems", "crates/hybrid/src"),
         ("Integration", "crates/integrate/src"),
+    ];
+    let of_questions = [
         ("Orbits, sections and exponents", "crates/analyse/src"),
         ("Questions, sweeps and files", "crates/job/src"),
         ("Figures and pictures", "crates/paper/src"),
         ("Drawing", "crates/render/src"),
         ("Certificates", "crates/verify/src"),
     ];
+    hold("docs/errors.md", &[errors_of(&of_runs)]);
+    hold("docs/errors-of-questions.md", &[errors_of(&of_questions)]);
+}
+
+/// The messages of errors in these folders, each under its title.
+fn errors_of(places: &[(&str, &str)]) -> String {
     let mut block = String::new();
     for (title, folder) in places {
         let _ = write!(block, "## {title}\n\n");
@@ -689,7 +697,7 @@ fn errors_are_as_the_page_says() {
         }
         block.push('\n');
     }
-    hold("docs/errors.md", &[block]);
+    block
 }
 
 #[test]

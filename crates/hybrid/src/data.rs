@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+pub use crate::definition::BadTable;
 use crate::definition::{Interpolation, TableEntry};
 
 /// A table's values between its rows: on each piece a cubic in the time since the piece's
@@ -12,29 +13,6 @@ pub struct Table {
     pub knots: Vec<f64>,
     /// Coefficients of the cubic that begins at each knot but the last, lowest first.
     pub pieces: Vec<[f64; 4]>,
-}
-
-/// An error in a table's data.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{why}")]
-pub struct BadTable {
-    why: String,
-    /// The key of the table's entry that it is about.
-    pub(crate) key: &'static str,
-    /// What to do.
-    pub(crate) help: &'static str,
-}
-
-impl BadTable {
-    /// A file that could not be read, and why.
-    pub fn unread(why: String) -> Self {
-        Self { why, key: "file", help: "put the table's CSV file beside the system's file" }
-    }
-
-    fn data(why: String) -> Self {
-        let help = "give a line of column names, then rows of finite numbers, times increasing";
-        Self { why, key: "file", help }
-    }
 }
 
 impl Table {

@@ -45,8 +45,30 @@ use twofold_system::expression::{
 };
 use twofold_system::{Expression, definition::State};
 
-use crate::data::BadTable;
-use crate::model::evaluate;
+use crate::value::evaluate;
+
+/// An error in a table's data.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{why}")]
+pub struct BadTable {
+    pub(crate) why: String,
+    /// The key of the table's entry that it is about.
+    pub(crate) key: &'static str,
+    /// Remedy.
+    pub(crate) help: &'static str,
+}
+
+impl BadTable {
+    /// A file that could not be read, and why.
+    pub fn unread(why: String) -> Self {
+        Self { why, key: "file", help: "put the table's CSV file beside the system's file" }
+    }
+
+    pub(crate) fn data(why: String) -> Self {
+        let help = "give a line of column names, then rows of finite numbers, times increasing";
+        Self { why, key: "file", help }
+    }
+}
 
 /// Most states of a general system.
 pub const MAX_STATES: usize = 100;

@@ -17,7 +17,8 @@ use twofold_system::expression::{Function, General};
 
 use crate::data::Table;
 use crate::definition::{Definition, When, asks};
-use crate::model::{Model, ModelError, power, smooth};
+use crate::model::{Model, ModelError};
+use crate::value::{power, smooth};
 
 /// A switching function.
 #[derive(Clone, Debug, PartialEq)]
@@ -493,7 +494,7 @@ impl Equation {
             let table = self.definition.tables.iter().position(|(n, _)| n == name)?;
             Some(self.tables[table].value(self.tables[table].piece(t), t))
         };
-        crate::model::evaluate(e, &name)
+        crate::value::evaluate(e, &name)
     }
 
     /// The equations for the structure of this configuration.

@@ -47,6 +47,7 @@ pub mod selection;
 mod step;
 #[cfg(test)]
 mod tests;
+mod value;
 
 pub use definition::Definition;
 pub use equation::Equation;

@@ -542,7 +542,7 @@ fn a_tank_runs_empty() {
     assert_eq!(outcome.unwrap().x, [0.0, 0.0]);
     near(events[0].0, 2.0, 1e-6);
     assert_eq!(events.len(), 2);
-    // What decays for ever is not put to zero: y' = sqrt(x) sums up to 2.
+    // A state that decays for ever is not put to zero: y' = sqrt(x) sums up to 2.
     let decays = "states = ['x', 'y']\nstart = [1, 0]\nf = ['-x', 'sqrt(x)']";
     near(end(decays, 60.0)[1], 2.0, 1e-8);
     // Nor is what leaves the domain.
@@ -728,8 +728,8 @@ fn exponents_have_no_units_and_vanish_by_switches_alone() {
         of("states = ['x', 'y']\nstart = [1, 1]\nf = ['-x', '-3*y + 1e17*x']", 20.0, 1.0, 2);
     near(found.values[0], -1.0, 1e-2);
     near(found.values[1], -3.0, 1e-2);
-    let reset = "states = ['x', 'y']\nstart = [1, 1]\nf = ['-x', '-3*y']\n[[event]]\nevery = 1\nset \
-        = { y = '1' }";
+    let reset = "states = ['x', 'y']\nstart = [1, 1]\nf = ['-x', '-3*y']\n[[event]]\nevery = 1\n\
+        set = { y = '1' }";
     assert_eq!(of(reset, 30.0, 3.0, 2).values[1], f64::NEG_INFINITY);
     // The clock (c, s) drives q, whose growth, 0.3/sqrt(pi) - 0.001, leaves neighbours of the clock
     // in its own direction alone.

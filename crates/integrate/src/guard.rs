@@ -13,9 +13,9 @@
 //!
 //! A step that stands is exactly the method's own.
 //!
-//! Where the argument of a sign (a kink of `abs`, a jump) changes its own inside a step, the step is
-//! taken back, too, and ends just behind that zero: no step leads over one (Hairer, Norsett & Wanner
-//! 1993, sec. II.6). A jump that attracts from both sides cannot be followed and is refused.
+//! Where the argument of a sign (a kink of `abs`, a jump) changes its own inside a step, the step
+//! is taken back, too, and ends just behind that zero, unless the tolerance could not tell (Hairer,
+//! Norsett & Wanner 1993, sec. II.6). A jump that attracts from both sides is refused.
 //!
 //! Of a discontinuous system the fields at work are looked at, up to the surface, and a switching
 //! function as far as a step would miss that it passes the level at which it acts.

@@ -267,7 +267,7 @@ impl Classification {
                 ..attractor::Question::default()
             };
             let found = classify(&section, &question, &self.thresholds);
-            // What the plane shows on top of itself surrounds no closed orbit there.
+            // Points that lie on top of one another surround no closed orbit there.
             let cycle = found.verdict.cycle().filter(|_| !has_no_future(&found, &self.thresholds));
             let captured = cycle.map_or(f64::INFINITY, |c| c.captured_at);
             let settled = LENGTHS.settling * clock(found.return_time);

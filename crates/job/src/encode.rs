@@ -265,8 +265,8 @@ pub fn about_run(run: &dyn Question) -> Value {
     json!({ "kind": run.kind(), "question": run.json() })
 }
 
-/// The CSV file of a run, part by part. Its last line holds a digest of the rows and of what it says
-/// of the run.
+/// The CSV file of a run, part by part. Its last line holds a digest of the rows and of what it
+/// says of the run.
 pub struct CsvOfRun {
     about: Value,
     digest: RunningHash,

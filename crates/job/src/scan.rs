@@ -360,7 +360,7 @@ impl Scan {
         let strobed = matches!(run.options.record, Record::Times { .. });
         let mut late: Vec<(f64, Vec<f64>)> = Vec::new();
         let mut observe = |point: &twofold_hybrid::Point<'_>| {
-            // What is seen every period is the state after the events of that moment.
+            // Seen every period is the state after the events of that moment.
             if strobed
                 && point.event.is_some()
                 && let Some((t, x)) = late.last_mut()

@@ -140,8 +140,8 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
 }
 
 const ONE_STATE: &str = "where a run ends is seen where it meets a section, which one state does \
-    not have: give a system of two states or more, or write this one with `f = [...]` instead of h, \
-    plus and minus";
+    not have: give a system of two states or more, or write this one with `f = [...]` instead of \
+    h, plus and minus";
 
 /// The sweep that the flags describe.
 fn sweep(arguments: &Arguments) -> Result<Sweep, CliError> {

@@ -13,7 +13,7 @@ pub(super) struct Clock {
 impl Clock {
     pub(super) fn new(follower: &Follower) -> Result<Self, HybridError> {
         let constant = |e: &Expression| {
-            crate::model::evaluate(e, &|name| follower.equation.values().get(name).copied())
+            crate::value::evaluate(e, &|name| follower.equation.values().get(name).copied())
         };
         let mut clock = Self { once: Vec::new(), periodic: Vec::new() };
         for (i, event) in follower.model.definition().events().iter().enumerate() {

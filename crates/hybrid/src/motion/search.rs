@@ -713,7 +713,7 @@ impl Follower<'_> {
             let square: f64 = gradient.iter().map(|g| g * g).sum();
             let (mut there, mut stays) = (x.clone(), now.clone());
             for _ in 0..3 {
-                // What falls as a^p has this mean.
+                // The mean of a function that falls as a^p.
                 for i in 0..n {
                     there[i] = x[i] + left * (stays[i] + (now[i] - stays[i]) * (1.0 - power));
                 }

@@ -466,7 +466,7 @@ impl Follower<'_> {
                     return false;
                 }
                 let (_, base, direction, mut asked, _, rests) = at(self, plus.clone());
-                // What is zero all along on the side of another is no surface there.
+                // A function that is zero all along on the side of another is no surface there.
                 if slides.iter().any(|s| rests[*s]) {
                     return false;
                 }

@@ -672,7 +672,7 @@ fn units(bounds: &[[f64; 2]]) -> Vec<f64> {
     sizes.iter().map(unit).collect()
 }
 
-/// What the length of a vector was, and what is left of it beside those before.
+/// Length of a vector, and of what is left of it beside those before.
 struct Left {
     before: f64,
     after: f64,

@@ -485,7 +485,7 @@ struct Limits {
     /// At a zero h is smaller than this share of what it was halfway to it; at a pole or jump it is
     /// not.
     falls: f64,
-    /// What is below this share is as good as zero.
+    /// A share below this is as good as zero.
     small: f64,
     /// A field runs along the surface if it does so at these distances before and behind, as shares
     /// of the states.
@@ -975,13 +975,27 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         ends.min_by(|(a, _), (b, _)| a.total_cmp(b))
     }
 
-    /// Whether the slope of h at `x`, on the surface, is of the size that h has at a state of the
-    /// flight to it.
+    /// Whether h has a simple zero at `x`, on the surface: at some distance between rounding and
+    /// `before`, a state of the flight to it, h differs between both sides by what its slope says.
     fn has_slope(&self, before: &SVector<f64, N>, x: &SVector<f64, N>) -> bool {
-        let slope = length(&gradient(self.system, x));
-        let mean = self.system.switching(before).abs() / (before - x).norm();
-        let steepest = length(&gradient(self.system, before)).max(mean) / LIMITS.small;
-        slope > LIMITS.small * mean && slope <= steepest && slope.is_finite()
+        let h = |x: &SVector<f64, N>| self.system.switching(x);
+        let (normal, way) = (gradient(self.system, x), (before - x).norm());
+        let slope = length(&normal);
+        let steepest = length(&gradient(self.system, before)).max(h(before).abs() / way);
+        if !(slope > 0.0 && slope <= steepest / LIMITS.small) {
+            return false;
+        }
+        let normal = normal / slope;
+        let nearest = 10.0 * h(x).abs() / slope + 100.0 * f64::EPSILON * self.reach();
+        let mut distances = std::iter::successors(Some(nearest), |distance| Some(10.0 * distance))
+            .take_while(|distance| *distance < way)
+            .peekable();
+        distances.peek().is_none()
+            || distances.any(|distance| {
+                let rise = h(&(x + normal * distance)) - h(&(x - normal * distance));
+                let share = rise / (2.0 * slope * distance);
+                share.is_nan() || (0.5..2.0).contains(&share)
+            })
     }
 
     /// The states' size, by which distances along and across the surface are measured.

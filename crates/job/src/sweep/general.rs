@@ -83,7 +83,7 @@ impl GeneralOutcome {
         let mut section: Vec<SectionPoint> = Vec::new();
         let mut observe = |point: &twofold_hybrid::Point<'_>| {
             let u = plane.map(|i| i.map_or(0.0, |i| point.x[i]));
-            // What is seen every period is the state after the events of that moment.
+            // Seen every period is the state after the events of that moment.
             if strobed
                 && point.event.is_some()
                 && let Some(last) = section.last_mut()
