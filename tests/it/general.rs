@@ -490,7 +490,7 @@ fn wrong_files_and_flags_are_refused() {
         "states = ['x']\nstart = [1]\nh = 'x'\nplus = ['-1']\nminus = ['1']",
     )
     .unwrap();
-    let one = ["sweep", "--system", "one.toml", "--over", "start.x=1,2", "--t-end", "9"];
+    let one = ["sweep", "--system", "one.toml", "--over", "start.x=1,2", "--section", "x=0"];
     refused(at, &one, 2, &["two states or more"]);
     // A system with one switch still says what it lacks, and who has it.
     fs::write(at.join("f.toml"), "states = ['x']\nh = 'x'\nplus = ['max(x, 1)']\nminus = ['1']")

@@ -358,8 +358,8 @@ const COLUMNS: [(&str, &str); 46] = [
     (
         "signs",
         "a character for each switching function: `+`, `-`, `0` where motion slides on its zero or \
-            it rests there, `#` for `floor` and `mod`, `.` where it decides nothing; the fact `signs` \
-            names the functions",
+            it rests there, `#` for `floor` and `mod`, `.` where it decides nothing; the fact \
+            `signs` names the functions",
     ),
     ("piece", "number of the piece of the motion between two events"),
     (
