@@ -466,11 +466,12 @@ impl Gates {
     fn evaluate(&mut self, x: &[f64], all: bool, given: Option<(Node, f64)>) {
         let operations = self.tape.operations();
         for node in &self.needed[usize::from(all)] {
+            if let Some((_, value)) = given.filter(|(given, _)| given == node) {
+                self.values[*node] = value;
+                continue;
+            }
             let v = &self.values;
             self.values[*node] = match operations[*node] {
-                _ if given.is_some_and(|(of, _)| of == *node) => {
-                    given.map_or(f64::NAN, |(_, value)| value)
-                }
                 Operation::Variable(i) => x[i],
                 Operation::Constant(_) | Operation::Parameter(_) | Operation::Pi => {
                     self.fixed[*node]
