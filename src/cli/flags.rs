@@ -105,7 +105,8 @@ pub struct RunFlags {
     #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
     pub rtol: Option<f64>,
     /// Absolute tolerance [default: that of --rtol's default, and from a start of states below
-    /// 1e-3 as many powers of ten smaller; of general systems by the states' sizes].
+    /// 1e-3 as many powers of ten smaller; of general systems by the largest size that each state
+    /// has had: give one where a state falls by more than a million].
     #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
     pub atol: Option<f64>,
     /// Longest step, inf for any [default: a tenth of the time between restarts or kicks,

@@ -49,7 +49,7 @@ pub struct Rest {
     /// The switching surfaces on which it lies; none in a field.
     pub on: Vec<On>,
     /// Whether motion near by comes to all of these surfaces, however fast each of them switches;
-    /// nothing where that decides.
+    /// nothing where that decides, or where the fields there leave it open.
     pub attracting: Option<bool>,
     /// Whether the fields are tangent to a surface there, as at a two-fold or a fused focus: the
     /// motion along it is not determined near the rest, and has no eigenvalues.
@@ -108,7 +108,7 @@ impl Rest {
             }
             .into(),
             (true, _) if open => "unstable".into(),
-            _ if open => "decided by how fast each surface switches".into(),
+            _ if open => "not decided by the fields there".into(),
             _ if values.is_empty() => if repels { "unstable" } else { "stable" }.into(),
             (true, true) => "saddle".into(),
             (false, _) if neutral => "not decided by the linearised motion".into(),
@@ -255,14 +255,14 @@ impl Surface {
     }
 }
 
-/// Subsets of so many surfaces.
-fn subsets(of: &[Surface], size: usize) -> Vec<Vec<Surface>> {
+/// Subsets of so many.
+fn subsets<T: Clone>(of: &[T], size: usize) -> Vec<Vec<T>> {
     match (size, of.split_first()) {
         (0, _) => vec![Vec::new()],
         (_, None) => Vec::new(),
         (_, Some((first, rest))) => {
             let with = subsets(rest, size - 1).into_iter().map(|mut s| {
-                s.insert(0, *first);
+                s.insert(0, first.clone());
                 s
             });
             with.chain(subsets(rest, size)).take(MOST_SETS + 1).collect()
@@ -1018,36 +1018,45 @@ fn orthogonal_step(mut rows: Vec<(Vec<f64>, f64, f64)>, dependent: f64) -> Optio
     Some(step)
 }
 
+/// Principal minors of a matrix whose rows have entries of at most 1 are zero up to this.
+const MINOR_ROUNDING: f64 = 1e-12;
+
 /// Whether w' = D W w comes to zero for every diagonal matrix D > 0: `Some` if it does for all, or
-/// for none.
+/// for none. Nothing where D decides, or where w turns without growing or falling, so that only
+/// terms of higher order decide.
 fn attracts(w: &[f64], k: usize) -> Option<bool> {
-    let minor = |rows: &[usize]| {
-        let matrix: Vec<f64> =
-            rows.iter().flat_map(|i| rows.iter().map(move |j| w[i * k + j])).collect();
-        determinant_of_negative(matrix, rows.len())
+    // D is of no account: rows have the same unit.
+    let size = |i: usize| w[i * k..(i + 1) * k].iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+    let units: Vec<f64> = (0..k).map(size).collect();
+    let minor = |rows: &Vec<usize>| {
+        let entry = |(i, j): (&usize, &usize)| w[i * k + j] / units[*i];
+        let pairs = rows.iter().flat_map(|i| rows.iter().map(move |j| (i, j)));
+        let value = determinant_of_negative(pairs.map(entry).collect(), rows.len());
+        if value.abs() <= MINOR_ROUNDING { 0.0 } else { value }
     };
+    // The coefficients of the characteristic polynomial, by falling powers: each is a sum of minors
+    // times entries of D. One that is below zero for every D leaves an eigenvalue above zero.
     let all: Vec<usize> = (0..k).collect();
-    if minor(&all) < 0.0 {
-        // The product of the eigenvalues has the wrong sign, whatever D is.
+    let minors: Vec<Vec<f64>> =
+        (1..=k).map(|order| subsets(&all, order).iter().map(minor).collect()).collect();
+    let never_above = |minors: &Vec<f64>| minors.iter().all(|m| *m <= 0.0);
+    let none = |minors: &Vec<f64>| minors.iter().all(|m| *m == 0.0);
+    if minors.iter().any(|m| never_above(m) && !none(m)) {
+        return Some(false);
+    }
+    // s^3 + a s^2 + c and s^3 + b s + c with c > 0 have zeros on the right (Hurwitz: a b > c).
+    if k == 3 && !none(&minors[2]) && minors[..2].iter().any(none) {
         return Some(false);
     }
     if k <= 2 {
-        let diagonal: Vec<f64> = (0..k).map(|i| -w[i * k + i]).collect();
-        let trace: f64 = diagonal.iter().sum();
-        return match diagonal.iter().all(|d| *d >= 0.0) && trace > 0.0 {
-            true => Some(true),
-            false if diagonal.iter().all(|d| *d <= 0.0) => Some(false),
-            false => None,
-        };
+        let above = |minors: &Vec<f64>| minors.iter().all(|m| *m >= 0.0) && !none(minors);
+        return minors.iter().all(above).then_some(true);
     }
     // W + W^T is negative definite: so is that of D^1/2 W D^1/2, which has the eigenvalues of D W.
     let symmetric: Vec<f64> = (0..k * k).map(|p| 0.5 * (w[p] + w[p % k * k + p / k])).collect();
     let leading = |m: usize| {
-        let part: Vec<f64> = (0..m)
-            .flat_map(|i| (0..m).map(move |j| (i, j)))
-            .map(|(i, j)| symmetric[i * k + j])
-            .collect();
-        determinant_of_negative(part, m)
+        let part = (0..m).flat_map(|i| (0..m).map(move |j| (i, j)));
+        determinant_of_negative(part.map(|(i, j)| symmetric[i * k + j]).collect(), m)
     };
     (1..=k).all(|m| leading(m) > 0.0).then_some(true)
 }

@@ -358,6 +358,26 @@ fn events_happen_in_the_files_order_one_after_the_other() {
     near(outcome.x[1], 12.0, 1e-12);
 }
 
+/// 3 times 0.1 is 0.3 to rounding: it belongs to the run that ends there, and not to the next one.
+#[test]
+fn multiples_of_a_period_are_counted_to_rounding() {
+    let counted = |t_start: f64, t_end: f64, every: &str| {
+        let text = format!(
+            "states = ['n']\nstart = [0]\nf = ['0']\n[[event]]\n{every}\nset = {{ n = 'n + 1' }}"
+        );
+        let options = Options { t_start, t_end, ..Options::default() };
+        follow(&model(&text), &options, &mut |_| true).unwrap().x[0]
+    };
+    for end in 1..40 {
+        let middle = f64::from(end) / 10.0;
+        let parts = [counted(0.0, middle, "every = 0.1"), counted(middle, 4.0, "every = 0.1")];
+        assert_eq!(parts, [f64::from(end), f64::from(40 - end)], "{middle}");
+    }
+    // Two that happen together do so at one time: the second sees what the first has done.
+    let both = "every = 0.1\nset = { n = '10*n + 1' }\n[[event]]\nevery = 0.3";
+    assert_eq!(counted(0.0, 0.3, both), 112.0);
+}
+
 /// An event's expression that is zero at the start triggers the event at its next zero.
 #[test]
 fn an_event_that_is_zero_at_the_start_waits() {
@@ -1946,7 +1966,35 @@ fn rests_on_curves_and_on_several_surfaces() {
     assert_eq!(saddle.iter().map(|r| r.kind()).collect::<Vec<_>>(), ["unstable"]);
     let open =
         find("states = ['x', 'y']\nf = ['sign(x) + 4*sign(y)', '-4*sign(x) - 2*sign(y)']", 3.0, 2);
-    assert_eq!(open[0].kind(), "decided by how fast each surface switches");
+    assert_eq!(open[0].kind(), "not decided by the fields there");
+    // The linear law of a passage only turns (W = [0, -1; 1, 0]): what remains decides. Squares
+    // about the first corner close; a quarter turn about the others maps a to a/(1 + a).
+    for turning in [
+        "['-sign(y)', 'sign(x)']",
+        "['-sign(y) - x', 'sign(x) - y']",
+        "['if(y < 1, 2, 0) - x', 'if(x > 1, 2, 0) - y']",
+        "['if(y < 1, 2, 0) - x', 'if(x > 1, 3, 0) - y']",
+        "['-2*sign(y) + 0.5 - x', 'sign(x) - 0.5 - y']",
+    ] {
+        let found = find(&format!("states = ['x', 'y']\nf = {turning}"), 3.0, 2);
+        let [corner] = &found[..] else { panic!("{turning}: {} rows", found.len()) };
+        assert_eq!(
+            (corner.attracting, corner.kind().as_str()),
+            (None, "not decided by the fields there"),
+            "{turning}"
+        );
+    }
+    // In three relays that turn, s^3 = -d with d > 0 for any speeds: two eigenvalues on the right.
+    // With a weak pull the speeds decide; with a strong one W + W^T is negative definite.
+    for (pull, attracting) in [("0", Some(false)), ("-0.4", None), ("-1", Some(true))] {
+        let f = ["xy", "yz", "zx"].map(|pair| {
+            let (own, next) = pair.split_at(1);
+            format!("{pull}*sign({own}) - sign({next})")
+        });
+        let found = find(&format!("states = ['x', 'y', 'z']\nf = {f:?}"), 3.0, 3);
+        let corner = found.iter().find(|r| r.on.len() == 3).unwrap();
+        assert_eq!(corner.attracting, attracting, "{pull}");
+    }
     // A third state along the corner: z' = -z + s/2 - 0.4 u with s = 0.3 z, u = 0.1: z =
     // -0.04/0.85, eigenvalue -0.85.
     let edge = find(

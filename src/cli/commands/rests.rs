@@ -123,7 +123,7 @@ fn line(rest: &Resting, names: &[&str], with_mode: bool) -> String {
             let moves = match attracting {
                 Some(true) => ", which attract",
                 Some(false) => ", which repel",
-                None => ", whose speeds decide whether they attract",
+                None => ", and the fields there do not tell whether these attract",
             };
             let weights: Vec<String> = weights.iter().map(f64::to_string).collect();
             (on(&surfaces.join(" = 0 and "), moves), format!(" (weights {})", weights.join(", ")))

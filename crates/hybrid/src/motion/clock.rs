@@ -2,8 +2,18 @@
 
 use super::*;
 
+/// Multiples of a period are known to this part of themselves: 3 times 0.1 is not 0.3.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+
+/// Whether two times that are finite, and not 0, are the same to rounding.
+fn same(a: f64, b: f64) -> bool {
+    (a - b).abs() < ROUNDING * a.abs().max(b.abs())
+}
+
 /// Times at which something is known to happen: events' and tables' knots.
 pub(super) struct Clock {
+    /// The run's end: a multiple of a period that is the same to rounding is reached.
+    end: f64,
     /// Times to come, latest first, each with its event.
     once: Vec<(f64, Option<usize>)>,
     /// Period, next multiple, event.
@@ -15,7 +25,8 @@ impl Clock {
         let constant = |e: &Expression| {
             crate::value::evaluate(e, &|name| follower.equation.values().get(name).copied())
         };
-        let mut clock = Self { once: Vec::new(), periodic: Vec::new() };
+        let end = follower.options.t_end;
+        let mut clock = Self { end, once: Vec::new(), periodic: Vec::new() };
         for (i, event) in follower.model.definition().events().iter().enumerate() {
             match &event.when {
                 When::At(times) => {
@@ -49,7 +60,11 @@ impl Clock {
                             event.name, follower.options.t_end
                         )));
                     }
-                    clock.periodic.push((period, (follower.t / period).floor() + 1.0, i));
+                    let mut next = (follower.t / period).floor() + 1.0;
+                    if same(period * next, follower.t) {
+                        next += 1.0;
+                    }
+                    clock.periodic.push((period, next, i));
                 }
                 _ => {}
             }
@@ -64,7 +79,9 @@ impl Clock {
     pub(super) fn next(&self) -> Option<f64> {
         let once = self.once.last().map(|(t, _)| *t);
         let periodic = self.periodic.iter().map(|(p, k, _)| p * k).fold(f64::INFINITY, f64::min);
-        Some(once.unwrap_or(f64::INFINITY).min(periodic)).filter(|t| t.is_finite())
+        let next = once.unwrap_or(f64::INFINITY).min(periodic);
+        let next = if same(next, self.end) { next.min(self.end) } else { next };
+        next.is_finite().then_some(next)
     }
 
     /// The events that happen by `t`, in the file's order.
@@ -74,7 +91,7 @@ impl Clock {
             happening.extend(event);
         }
         for (period, multiple, event) in &mut self.periodic {
-            while *period * *multiple <= t {
+            while *period * *multiple <= t || same(*period * *multiple, t) {
                 *multiple += 1.0;
                 happening.push(*event);
             }
