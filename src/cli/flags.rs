@@ -106,7 +106,7 @@ pub struct RunFlags {
     pub rtol: Option<f64>,
     /// Absolute tolerance [default: that of --rtol's default, and from a start of states below
     /// 1e-3 as many powers of ten smaller; of general systems by the largest size that each state
-    /// has had: give one where a state falls by more than a million].
+    /// has had: give one where a state falls below a ten-thousandth of that].
     #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
     pub atol: Option<f64>,
     /// Longest step, inf for any [default: a tenth of the time between restarts or kicks,

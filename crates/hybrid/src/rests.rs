@@ -255,7 +255,7 @@ impl Surface {
     }
 }
 
-/// Subsets of so many.
+/// Subsets of `size`.
 fn subsets<T: Clone>(of: &[T], size: usize) -> Vec<Vec<T>> {
     match (size, of.split_first()) {
         (0, _) => vec![Vec::new()],
@@ -1025,11 +1025,11 @@ const MINOR_ROUNDING: f64 = 1e-12;
 /// for none. Nothing where D decides, or where w turns without growing or falling, so that only
 /// terms of higher order decide.
 fn attracts(w: &[f64], k: usize) -> Option<bool> {
-    // D is of no account: rows have the same unit.
+    // To scale a row is to choose another D: each gets entries of at most 1.
     let size = |i: usize| w[i * k..(i + 1) * k].iter().fold(0.0_f64, |most, v| most.max(v.abs()));
-    let units: Vec<f64> = (0..k).map(size).collect();
+    let sizes: Vec<f64> = (0..k).map(size).collect();
     let minor = |rows: &Vec<usize>| {
-        let entry = |(i, j): (&usize, &usize)| w[i * k + j] / units[*i];
+        let entry = |(i, j): (&usize, &usize)| w[i * k + j] / sizes[*i];
         let pairs = rows.iter().flat_map(|i| rows.iter().map(move |j| (i, j)));
         let value = determinant_of_negative(pairs.map(entry).collect(), rows.len());
         if value.abs() <= MINOR_ROUNDING { 0.0 } else { value }
@@ -1040,16 +1040,16 @@ fn attracts(w: &[f64], k: usize) -> Option<bool> {
     let minors: Vec<Vec<f64>> =
         (1..=k).map(|order| subsets(&all, order).iter().map(minor).collect()).collect();
     let never_above = |minors: &Vec<f64>| minors.iter().all(|m| *m <= 0.0);
-    let none = |minors: &Vec<f64>| minors.iter().all(|m| *m == 0.0);
-    if minors.iter().any(|m| never_above(m) && !none(m)) {
+    let all_zero = |minors: &Vec<f64>| minors.iter().all(|m| *m == 0.0);
+    if minors.iter().any(|m| never_above(m) && !all_zero(m)) {
         return Some(false);
     }
     // s^3 + a s^2 + c and s^3 + b s + c with c > 0 have zeros on the right (Hurwitz: a b > c).
-    if k == 3 && !none(&minors[2]) && minors[..2].iter().any(none) {
+    if k == 3 && !all_zero(&minors[2]) && minors[..2].iter().any(all_zero) {
         return Some(false);
     }
     if k <= 2 {
-        let above = |minors: &Vec<f64>| minors.iter().all(|m| *m >= 0.0) && !none(minors);
+        let above = |minors: &Vec<f64>| minors.iter().all(|m| *m >= 0.0) && !all_zero(minors);
         return minors.iter().all(above).then_some(true);
     }
     // W + W^T is negative definite: so is that of D^1/2 W D^1/2, which has the eigenvalues of D W.

@@ -376,6 +376,8 @@ fn multiples_of_a_period_are_counted_to_rounding() {
     // Two that happen together do so at one time: the second sees what the first has done.
     let both = "every = 0.1\nset = { n = '10*n + 1' }\n[[event]]\nevery = 0.3";
     assert_eq!(counted(0.0, 0.3, both), 112.0);
+    // A single time is what it is: this one comes after the end.
+    assert_eq!(counted(0.0, 0.3, "at = [0.30000000000000004]"), 0.0);
 }
 
 /// An event's expression that is zero at the start triggers the event at its next zero.

@@ -79,9 +79,8 @@ impl Clock {
     pub(super) fn next(&self) -> Option<f64> {
         let once = self.once.last().map(|(t, _)| *t);
         let periodic = self.periodic.iter().map(|(p, k, _)| p * k).fold(f64::INFINITY, f64::min);
-        let next = once.unwrap_or(f64::INFINITY).min(periodic);
-        let next = if same(next, self.end) { next.min(self.end) } else { next };
-        next.is_finite().then_some(next)
+        let periodic = if same(periodic, self.end) { periodic.min(self.end) } else { periodic };
+        Some(once.unwrap_or(f64::INFINITY).min(periodic)).filter(|t| t.is_finite())
     }
 
     /// The events that happen by `t`, in the file's order.
