@@ -105,8 +105,8 @@ pub struct RunFlags {
     #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
     pub rtol: Option<f64>,
     /// Absolute tolerance [default: that of --rtol's default, and from a start of states below
-    /// 1e-3 as many powers of ten smaller; of general systems by the largest size that each state
-    /// has had: give one where a state falls below a ten-thousandth of that].
+    /// 1e-3 as many powers of ten smaller; of general systems none: --rtol measures each state by
+    /// its own size, near zero by a hundredth of its largest one of late].
     #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
     pub atol: Option<f64>,
     /// Longest step, inf for any [default: a tenth of the time between restarts or kicks,

@@ -111,7 +111,8 @@ pub struct Options {
     pub mode: usize,
     /// Relative tolerance of a step.
     pub rtol: f64,
-    /// Absolute tolerance; without one each state is measured by its own size in the run so far.
+    /// Absolute tolerance; without one each state is measured by its own size, near zero by a
+    /// hundredth of its largest one of late.
     pub atol: Option<f64>,
     /// The longest step.
     pub max_step: f64,
@@ -442,6 +443,10 @@ struct Follower<'a> {
     holds: Vec<bool>,
     /// The largest size of each state so far.
     size: Vec<f64>,
+    /// The same of late: forgotten as a state falls far below it, and where an event sets it.
+    lately: Vec<f64>,
+    /// The rounding error of each speed, where a state has become small; else zero.
+    noise: Vec<f64>,
     trains: Vec<Train>,
     switch_trains: Vec<Train>,
     signs: String,
@@ -537,6 +542,11 @@ pub fn follow_to_rest(
     Ok((outcome, rests))
 }
 
+/// A state is small if it is below this part of its size of late, which is then forgotten by a
+/// factor a step: at the ends of steps in which it crosses zero it seldom is.
+const FORGET_BELOW: f64 = 1e-3;
+const FORGET_BY: f64 = 0.1;
+
 /// Steps between two words on the time reached.
 const STEPS_BETWEEN_WORDS: u64 = 64;
 
@@ -554,7 +564,12 @@ fn scale_now(follower: &Follower, step: &Step, out: &mut Vec<f64>) {
                 let moved = (step.y[i] - step.x[i]).abs();
                 let speed = step.k.iter().map(|k| k[i].abs()).fold(0.0, f64::max);
                 let least = (0.1 * moved).max(1e-6 * span * speed);
-                options.rtol * size.max(0.01 * follower.size[i]).max(least) + f64::MIN_POSITIVE
+                let noise = follower.noise[i];
+                // A rounding error without a bound leaves the old size.
+                let size = size.max(0.01 * follower.scale_of(i)).max(least);
+                options.rtol * size
+                    + if noise.is_finite() { 4.0 * step.h * noise } else { 0.0 }
+                    + f64::MIN_POSITIVE
             }
         }
     };
@@ -730,6 +745,8 @@ impl<'a> Follower<'a> {
             event_of,
             holds: vec![false; events.len()],
             size: x.iter().map(|v| v.abs()).collect(),
+            lately: x.iter().map(|v| v.abs()).collect(),
+            noise: vec![0.0; n],
             trains: vec![Train::default(); events.len()],
             switch_trains: vec![Train::default(); guards],
             signs: String::new(),
@@ -840,6 +857,7 @@ impl<'a> Follower<'a> {
             step.x.copy_from_slice(&self.x);
             self.rhs(step.t, &step.x, &mut room);
             step.k[0].copy_from_slice(&room);
+            self.noise.fill(0.0);
             if !room.iter().all(|v| v.is_finite()) {
                 if self.comes_to_rest(self.t) {
                     continue;
@@ -938,7 +956,12 @@ impl<'a> Follower<'a> {
                 return Ok(Ending::Interrupted);
             }
             for i in 0..self.n {
-                self.size[i] = self.size[i].max(step.y[i].abs());
+                let size = step.y[i].abs();
+                self.size[i] = self.size[i].max(size);
+                self.lately[i] = self.lately[i].max(size);
+                if size < FORGET_BELOW * self.lately[i] {
+                    self.lately[i] *= FORGET_BY;
+                }
             }
             let progress = end > self.t;
             self.t = end;
@@ -1047,7 +1070,7 @@ impl<'a> Follower<'a> {
         list: &mut Vec<(Sought, f64)>,
     ) -> Option<Accepted> {
         let mut length = longest;
-        let mut noise = None;
+        let (mut noise, mut noted) = (None, step.series.is_some());
         for tried in 0..=MOST_SHORTENINGS {
             step.take(length, &mut |t, x, out| self.rhs(t, x, out));
             scale_now(self, step, scale);
@@ -1057,7 +1080,15 @@ impl<'a> Follower<'a> {
                 let noise = noise.get_or_insert_with(|| self.noise_of_time(step));
                 scale.iter_mut().zip(noise).for_each(|(s, noise)| *s += 4.0 * length * *noise);
             }
-            let error = step.error(&|i| scale[i]);
+            let mut error = step.error(&|i| scale[i]);
+            if error > 1.0 && !noted {
+                // Whether rounding errors of speeds are a part of it.
+                noted = true;
+                if self.note_noise(step) {
+                    scale_now(self, step, scale);
+                    error = step.error(&|i| scale[i]);
+                }
+            }
             let factor = if error <= 1.0 {
                 // The structure that the step missed begins at `unseen`: the step is made to end
                 // before it.

@@ -17,7 +17,8 @@ pub(crate) struct Range {
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 impl Range {
-    fn new(middle: f64, radius: f64) -> Self {
+    /// All numbers this near to `middle`, and the rounding of both.
+    pub fn new(middle: f64, radius: f64) -> Self {
         Self {
             middle,
             radius: radius * (1.0 + ROUNDING) + ROUNDING * middle.abs() + f64::MIN_POSITIVE,
@@ -31,6 +32,11 @@ impl Range {
             0.5 * (low + high),
             0.5 * (high - low) + 16.0 * ROUNDING * low.abs().max(high.abs()),
         )
+    }
+
+    /// The distance from the middle up to which they are.
+    pub fn radius(self) -> f64 {
+        self.radius
     }
 
     /// Whether all numbers are on this side of `boundary`.

@@ -37,6 +37,10 @@ const D: [f64; 7] = [
 /// The real eigenvalue of the inverse of Radau IIA's matrix.
 const REAL_EIGENVALUE: f64 = 3.637_834_252_744_496;
 
+/// Iterations for the stages of an implicit step have settled when they change a state by no more
+/// than this part of itself.
+pub(crate) const SETTLED: f64 = 1e-14;
+
 /// Writes the derivatives at a time and state.
 pub(crate) type RightHandSide<'a> = dyn FnMut(f64, &[f64], &mut [f64]) + 'a;
 
@@ -251,7 +255,7 @@ impl Step {
                 let relative = d.abs() / reach[k % n];
                 if most.is_nan() || relative.is_nan() { f64::NAN } else { most.max(relative) }
             });
-            if size <= 1e-14 || (size <= 1e-11 && size >= 0.5 * last) {
+            if size <= SETTLED || (size <= 1e-11 && size >= 0.5 * last) {
                 settled = true;
                 break;
             }

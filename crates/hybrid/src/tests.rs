@@ -2468,3 +2468,67 @@ fn sliding_sees_the_conditions_of_both_sides() {
     near(found[0], 0.0, 1e-12);
     near(found[1], 1.5, 1e-9);
 }
+
+fn by_each_method(text: &str, t_end: f64) -> [Outcome; 3] {
+    [Method::Dopri5, Method::Radau5, Method::Taylor].map(|method| {
+        let options = Options { t_end, method, max_steps: 300_000, ..Options::default() };
+        follow(&model(text), &options, &mut |_| true)
+            .unwrap_or_else(|e| panic!("{method:?}: {e}\n{text}"))
+    })
+}
+
+/// A step's error is measured by what a state is, not by what it was long ago or before a reset.
+#[test]
+fn states_that_become_small_keep_their_digits() {
+    // The quadratic neuron, v = tan t between resets.
+    for peak in [1e3, 1e5, 1e7, 1e9_f64] {
+        let text = format!(
+            "states = ['v']\nstart = [0]\nf = ['v^2 + 1']\n[[event]]\nwhen = 'v - {peak}'\n\
+                direction = 'up'\nset = {{ v = '-{peak}' }}"
+        );
+        let period = 2.0 * peak.atan();
+        let want = (100.0 - (100.0 / period).round() * period).tan();
+        for outcome in by_each_method(&text, 100.0) {
+            near(outcome.x[0], want, 3e-8);
+        }
+    }
+    // Prey and predators (Volterra 1926) that fall to 1e-12 of their peaks and recover: the first
+    // integral stays.
+    let integral = |x: &[f64]| x[0] - x[0].ln() + x[1] - x[1].ln();
+    let text = "states = ['x', 'y']\nstart = [30, 1]\nf = ['x*(1 - y)', 'y*(x - 1)']";
+    for outcome in by_each_method(text, 100.0) {
+        near(integral(&outcome.x), integral(&[30.0, 1.0]), 1e-7);
+    }
+    // Decay over 40 decades, and growth again.
+    let text = "states = ['x', 'y']\nstart = [1, 0]\nf = ['if(t < 100, -x, x)', 'if(t > 190, x, \
+        0)']";
+    for outcome in by_each_method(text, 200.0) {
+        near(outcome.x[0], 1.0, 2e-6);
+        near(outcome.x[1], 1.0 - (-10.0_f64).exp(), 2e-6);
+    }
+    // A reset makes a large state small.
+    let text = "states = ['x']\nstart = [1e9]\nf = ['-x']\n[[event]]\nat = [1]\nset = { x = \
+        '1e-3' }";
+    for outcome in by_each_method(text, 3.0) {
+        near(outcome.x[0], 1e-3 * (-2.0_f64).exp(), 1e-11);
+    }
+}
+
+/// At a rest whose speeds are sums that cancel, or where a state is zero, rounding does not shorten
+/// the steps.
+#[test]
+fn rounding_at_a_rest_takes_no_steps() {
+    for (f, dimension) in [
+        ("'y', '0.3 - 0.1 - 0.2 - x - y'", 2),
+        ("'y', 'z - 1 - x - y', '1 - z'", 3),
+        ("'y', 'z', 'w', '0.3 - 0.1 - 0.2 - x - 4*y - 6*z - 4*w'", 4),
+        ("'y', '-x - 0.5*y - 0.4*sign(y - 0.2)'", 2),
+    ] {
+        let states = ["'x'", "'y'", "'z'", "'w'"][..dimension].join(", ");
+        let start = ["1", "0", "2", "1"][..dimension].join(", ");
+        let text = format!("states = [{states}]\nstart = [{start}]\nf = [{f}]");
+        for (outcome, most) in by_each_method(&text, 1000.0).iter().zip([10_000, 100_000, 1_000]) {
+            assert!(outcome.steps < most, "{} steps: {text}", outcome.steps);
+        }
+    }
+}

@@ -229,6 +229,10 @@ impl Follower<'_> {
             return Err(HybridError::Stuck { t: self.t, x: old, why });
         }
         let changed = new != old;
+        for i in (0..self.n).filter(|i| new[*i] != old[*i]) {
+            self.lately[i] = new[i].abs();
+            self.size[i] = self.size[i].max(new[i].abs());
+        }
         self.x = new;
         if changed || mode.is_some() {
             if let Some(mode) = mode {

@@ -578,28 +578,27 @@ impl Follower<'_> {
     pub(super) fn first_step(&mut self, field: &[f64]) -> f64 {
         let (rtol, atol) = (self.options.rtol, self.options.atol.unwrap_or(0.0));
         let span = self.options.t_end - self.t;
-        let scale: Vec<f64> = self
-            .x
-            .iter()
-            .zip(field)
-            .zip(&self.size)
-            .map(|((x, f), size)| {
-                atol + rtol * x.abs().max(0.01 * size).max(1e-3 * f.abs() * span.min(1.0))
-                    + f64::MIN_POSITIVE
-            })
-            .collect();
-        let norm = |v: &[f64]| {
-            (v.iter().zip(&scale).map(|(v, s)| (v / s) * (v / s)).sum::<f64>() / v.len() as f64)
+        let sizes: Vec<f64> =
+            self.x.iter().zip(&self.lately).map(|(x, s)| x.abs().max(0.01 * s)).collect();
+        let scale = |i: usize, speed: f64| {
+            atol + rtol * sizes[i].max(1e-3 * speed * span.min(1.0)) + f64::MIN_POSITIVE
+        };
+        let norm = |v: &[f64], scale: &[f64]| {
+            (v.iter().zip(scale).map(|(v, s)| (v / s) * (v / s)).sum::<f64>() / v.len() as f64)
                 .sqrt()
         };
-        let (d0, d1) = (norm(&self.x), norm(field));
+        let now: Vec<f64> = (0..self.n).map(|i| scale(i, field[i].abs())).collect();
+        let (d0, d1) = (norm(&self.x, &now), norm(field, &now));
         let h0 = if d0 < 1e-5 || d1 < 1e-5 { 1e-6 * span } else { 0.01 * d0 / d1 }.min(0.01 * span);
         let ahead: Vec<f64> = self.x.iter().zip(field).map(|(x, f)| x + h0 * f).collect();
         let mut there = vec![0.0; self.n];
         let t = self.t + h0;
         self.rhs(t, &ahead, &mut there);
         let difference: Vec<f64> = there.iter().zip(field).map(|(a, b)| a - b).collect();
-        let d = d1.max(norm(&difference) / h0);
+        // A state at zero without a speed has one there.
+        let then: Vec<f64> =
+            (0..self.n).map(|i| scale(i, field[i].abs().max(there[i].abs()))).collect();
+        let d = d1.max(norm(&difference, &then) / h0);
         let h1 = if d <= 1e-15 { h0 * 1e3 } else { rough_pow(0.01 / d, 0.2) };
         let h = if h1.is_finite() { (100.0 * h0).min(h1) } else { h0 };
         // The time moves.

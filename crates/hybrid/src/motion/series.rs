@@ -104,37 +104,20 @@ impl Follower<'_> {
             self.compiled.field.evaluate(&self.variables, &mut low);
             low
         };
-        let mut noise = vec![0.0; n];
-        let rounding = 8.0 * f64::EPSILON;
         let mut orders = Vec::new();
-        if self.separate.is_some() {
-            let (_, _, high) = self.separate_weights(step.t, &step.x, &low);
-            for i in 0..n {
-                if high[i] != low[i] {
-                    noise[i] += rounding * (low[i].abs() + (high[i] - low[i]).abs());
-                }
-            }
-        } else if !self.sliding.is_empty() {
+        if self.separate.is_none() && !self.sliding.is_empty() {
             let (_, matrix) = self.sliding_equations(step.t, &step.x, &low);
             orders.extend(pivots(matrix, self.sliding.len()));
-            for place in 0..self.sliding.len() {
-                let high = self.positive_field(place, step.t, &step.x);
-                for i in 0..n {
-                    if high[i] != low[i] {
-                        noise[i] += rounding * (low[i].abs() + (high[i] - low[i]).abs());
-                    }
-                }
-            }
         }
         if !self.contacts.is_empty() {
-            let mut out = low;
+            let mut out = low.clone();
             self.rhs(step.t, &step.x, &mut out);
-            let forces = self.contact_forces(&out);
             orders.extend(pivots(self.grips(&out), self.contacts.len()));
-            for (contact, force) in self.contacts.iter().zip(forces) {
-                noise[contact.state] += rounding * (out[contact.state].abs() + force.abs());
-            }
         }
+        let mut noise = self.noise_of_mixture(step.t, &step.x, &low);
+        self.note_noise(step);
+        let also = self.noise.iter().map(|also| if also.is_finite() { *also } else { 0.0 });
+        noise.iter_mut().zip(also).for_each(|(noise, also)| *noise = noise.max(also));
         let signs = self.config.sides.iter().zip(&self.equation.guards);
         let key = Key {
             compiled: Rc::as_ptr(&self.compiled) as usize,
@@ -241,7 +224,8 @@ impl Follower<'_> {
                     rough_pow((size + f64::MIN_POSITIVE) / c[k].abs(), 1.0 / power as f64)
                 };
                 let mut h = if is_state {
-                    let size = c[0].abs().max(0.01 * self.size[i]).max(1e-6 * span * c[1].abs());
+                    let size = c[0].abs().max(0.01 * self.scale_of(i));
+                    let size = size.max(1e-6 * span * c[1].abs());
                     by(self.options.atol.unwrap_or(0.0) + rtol * size, k)
                 } else {
                     by((rtol * c[0].abs()).max(series.rounding[i - self.n]), k)

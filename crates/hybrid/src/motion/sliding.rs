@@ -4,6 +4,15 @@
 use std::rc::Rc;
 
 use super::*;
+use crate::range::Range;
+use crate::step::SETTLED;
+use twofold_num::Arithmetic as _;
+
+/// A state this much smaller than it was has digits that rounding may take.
+const SMALL: f64 = 1e-3;
+/// Rounding errors reach a speed through so many other states in a step, as in a chain of
+/// integrators.
+const PASSES: usize = 3;
 
 impl Follower<'_> {
     pub(super) fn load(&self, config: &Configuration) -> Vec<f64> {
@@ -212,6 +221,85 @@ impl Follower<'_> {
                 .zip(forces)
                 .for_each(|(contact, force)| out[contact.state] += force);
         }
+    }
+
+    /// By the hundredth part of this, or by its own size, a state's error in a step is measured
+    /// where no `atol` is given: its largest size of late, or in the run if its speed has no known
+    /// rounding error.
+    pub(super) fn scale_of(&self, i: usize) -> f64 {
+        if self.noise[i].is_finite() { self.lately[i] } else { self.size[i] }
+    }
+
+    /// Bounds the rounding errors of speeds where a state has become small, beside which they may
+    /// count: those of the field's own terms, and those that reach it by the other states in a
+    /// step as long as the present one. False if no state is small.
+    pub(super) fn note_noise(&mut self, step: &Step) -> bool {
+        let small = |(lately, size): (&f64, &f64)| *lately < SMALL * size;
+        if self.options.atol.is_some() || !self.lately.iter().zip(&self.size).any(small) {
+            self.noise.fill(0.0);
+            return false;
+        }
+        let n = self.n;
+        let mixture = if self.sliding.is_empty() && self.contacts.is_empty() {
+            vec![0.0; n]
+        } else {
+            let mut low = vec![0.0; n];
+            self.variables[..n].copy_from_slice(&step.x);
+            self.variables[n] = step.t;
+            self.compiled.field.evaluate(&self.variables, &mut low);
+            self.noise_of_mixture(step.t, &step.x, &low)
+        };
+        let mut out = vec![Range::default(); n];
+        let mut noise = vec![0.0; n];
+        // Iterations of an implicit step leave so much of each state.
+        let left = if step.jacobian.is_some() { SETTLED } else { 0.0 };
+        for _ in 0..PASSES {
+            let states: Vec<Range> = (0..n)
+                .map(|i| Range::new(step.x[i], left * step.x[i].abs() + step.h * noise[i]))
+                .collect();
+            noise.copy_from_slice(&mixture);
+            let one = (&self.compiled, &self.variables);
+            let others = self.base.iter().map(|(compiled, variables)| (compiled, variables));
+            let corners = self.corners.iter().map(|(compiled, variables)| (compiled, variables));
+            for (compiled, variables) in std::iter::once(one).chain(others).chain(corners) {
+                let time = Range::new(step.t, 0.0);
+                let rest = variables[n + 1..].iter().map(|v| Range::from_f64(*v));
+                let given: Vec<Range> = states.iter().copied().chain([time]).chain(rest).collect();
+                compiled.field.evaluate(&given, &mut out);
+                noise.iter_mut().zip(&out).for_each(|(noise, out)| *noise += out.radius());
+            }
+        }
+        self.noise = noise;
+        true
+    }
+
+    /// Rounding errors of speeds that are mixtures of fields which cancel, or of a contact.
+    pub(super) fn noise_of_mixture(&mut self, t: f64, x: &[f64], low: &[f64]) -> Vec<f64> {
+        let n = self.n;
+        let rounding = 8.0 * f64::EPSILON;
+        let mut noise = vec![0.0; n];
+        let mut others = Vec::new();
+        if self.separate.is_some() {
+            others.push(self.separate_weights(t, x, low).2);
+        } else if !self.corners.is_empty() {
+            others = self.corner_mixture(t, x).1;
+        } else {
+            others.extend((0..self.sliding.len()).map(|place| self.positive_field(place, t, x)));
+        }
+        for high in others {
+            for i in (0..n).filter(|i| high[*i] != low[*i]) {
+                noise[i] += rounding * (low[i].abs() + (high[i] - low[i]).abs());
+            }
+        }
+        if !self.contacts.is_empty() {
+            let mut out = low.to_vec();
+            self.rhs(t, x, &mut out);
+            let forces = self.contact_forces(&out);
+            for (contact, force) in self.contacts.iter().zip(forces) {
+                noise[contact.state] += rounding * (out[contact.state].abs() + force.abs());
+            }
+        }
+        noise
     }
 
     /// Prepares the fields on all sides of the surfaces slid upon.
