@@ -11,11 +11,13 @@ use clap::ValueEnum;
 use super::CliError;
 use super::models::{each_once, known, named, names_a_file};
 use super::words::{History, Inside, KickLaw, Method, Reading, Relaxation, Transition};
+use crate::hybrid::Model;
 use crate::integrate;
 use crate::integrate::filippov::{ExitRule, Side, SlidingLaw};
 use crate::integrate::{Kick, Schedule, StepCap, Tolerance};
 use crate::job::spec::*;
 use crate::job::sweep::{Axis, Coordinate};
+use crate::job::translation::{MOST_STATES, model_with};
 use crate::num::decimal::DecimalError;
 use crate::num::{Decimal, Short};
 use crate::paper;
@@ -32,7 +34,8 @@ pub struct RunFlags {
     /// Give a parameter of the system another value; may be repeated.
     #[arg(long, value_name = "NAME=VALUE", allow_hyphen_values = true, help_heading = "System")]
     pub set: Vec<String>,
-    /// Rule in place of the discontinuity [default: smoothed].
+    /// Rule in place of the discontinuity [default: smoothed]; systems of more than four states
+    /// take smoothed and filippov.
     #[arg(long, value_enum, help_heading = "System")]
     pub switch: Option<Switch>,
     /// Parameters of the caricature: alpha = 1e-3 as the paper prints it, or 1e-1 as its figures
@@ -97,7 +100,7 @@ pub struct RunFlags {
     #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
     pub t_end: Option<f64>,
     /// Integration method [default: lsoda; dopri5 with --switch filippov, delayed or relay, and of
-    /// general systems, which take dopri5, radau5 and taylor].
+    /// general systems and those of more than four states, which take dopri5, radau5 and taylor].
     #[arg(long, value_enum, help_heading = "Method")]
     pub method: Option<Method>,
     /// Relative tolerance [default: 10^-7.97727, NDSolve's; with taylor-extended 1e-32 or what
@@ -188,6 +191,12 @@ pub struct RunFlags {
     #[arg(long, value_name = "FILE")]
     pub spec: Option<PathBuf>,
 }
+
+/// Flags of the switch that a system with h, plus and minus gets when it is read as a general one.
+pub const SWITCH: [&str; 4] = ["--switch", "--eps", "--transition", "--sigma"];
+
+/// Width of the layer of a switch without --eps.
+const EPS: f64 = 1e-3;
 
 /// A switch by name.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -574,6 +583,11 @@ enum Misuse {
     )]
     General { system: String },
     #[error(
+        "--switch: only systems of up to four states have this one, and here are {states}; give \
+            smoothed or filippov, or write it as f = [...], with a state or modes for the switch"
+    )]
+    SwitchOfManyStates { states: usize },
+    #[error(
         "--exit all follows many futures and records their paths; a sweep needs crossings: give \
             another rule"
     )]
@@ -743,14 +757,7 @@ impl RunFlags {
 
     fn described(&self, command: Use) -> Result<RunSpec, Misuse> {
         let system = self.described_system()?;
-        let eps = self.eps.unwrap_or(1e-3);
-        let transition = match (self.transition.unwrap_or(Transition::Tanh), self.sigma) {
-            (Transition::Tanh, Some(sigma)) => system::Transition::PerturbedTanh { sigma },
-            (Transition::Tanh, None) => system::Transition::Tanh,
-            (Transition::Arctan, _) => system::Transition::Arctan,
-            (Transition::Algebraic, _) => system::Transition::Algebraic,
-            (Transition::Erf, _) => system::Transition::Erf,
-        };
+        let (eps, transition) = (self.eps.unwrap_or(EPS), self.transition());
         let switch = match self.switch() {
             Switch::Smoothed => SwitchSpec::Smoothed { eps, transition },
             Switch::Hysteretic => SwitchSpec::Hysteretic {
@@ -884,6 +891,16 @@ impl RunFlags {
     }
 
     /// The system that --system, --reading, --set and the caricature's own flags describe.
+    fn transition(&self) -> system::Transition {
+        match (self.transition.unwrap_or(Transition::Tanh), self.sigma) {
+            (Transition::Tanh, Some(sigma)) => system::Transition::PerturbedTanh { sigma },
+            (Transition::Tanh, None) => system::Transition::Tanh,
+            (Transition::Arctan, _) => system::Transition::Arctan,
+            (Transition::Algebraic, _) => system::Transition::Algebraic,
+            (Transition::Erf, _) => system::Transition::Erf,
+        }
+    }
+
     fn described_system(&self) -> Result<System, Misuse> {
         let name = self.system_name();
         let mut system = match System::builtin(name) {
@@ -917,6 +934,31 @@ impl RunFlags {
             system = system.with(parameter.trim(), value).map_err(|e| refused(e.to_string()))?;
         }
         Ok(system)
+    }
+
+    /// A system with h, plus and minus in more states than its own engine is compiled for, as a
+    /// general one; none if the flags name no such system.
+    ///
+    /// # Errors
+    /// If a flag of the switch has no effect, or general systems cannot have it.
+    pub fn model_of_many_states(&self) -> Result<Option<Model>, CliError> {
+        // Errors of the system are said where its run is described.
+        let system = match self.described_system() {
+            Ok(system) if system.dimension() > MOST_STATES && self.spec.is_none() => system,
+            _ => return Ok(None),
+        };
+        let of_switch = |e: &&Effect| SWITCH.contains(&e.flag) && (e.given)(self);
+        if let Some(idle) = EFFECTS.iter().filter(of_switch).find(|e| !(e.works)(self, Use::Any)) {
+            return Err(CliError::no_effect(idle.flag, idle.why));
+        }
+        let switch = match self.switch() {
+            Switch::Smoothed => {
+                SwitchSpec::Smoothed { eps: self.eps.unwrap_or(EPS), transition: self.transition() }
+            }
+            Switch::Filippov => SwitchSpec::Filippov { exit: ExitRule::Undecided, funnel: None },
+            _ => return Err(Misuse::SwitchOfManyStates { states: system.dimension() }.into()),
+        };
+        Ok(Some(model_with(&system, switch)?))
     }
 
     fn seed(&self) -> u64 {

@@ -1,7 +1,7 @@
 //! Runs of general systems: which flags describe them, and how they are computed and delivered.
 
 use super::CliError;
-use super::flags::{RunFlags, Use};
+use super::flags::{RunFlags, SWITCH, Use};
 use super::models::named;
 use super::words::Method as Named;
 use crate::hybrid::motion::{Exit as Side, Method, Record};
@@ -35,25 +35,29 @@ fn usage(text: String) -> CliError {
     CliError::Usage(text)
 }
 
-/// The general system that the flags name, if they name one.
-///
-/// # Errors
-/// If its file cannot be read or understood.
-pub fn model(flags: &RunFlags) -> Result<Option<Model>, CliError> {
-    flags.system.as_deref().map_or(Ok(None), |name| named(name, &flags.set, false))
-}
-
 /// The run of a general system that the flags describe, if they name one.
 ///
 /// # Errors
 /// If a flag has no effect on it, or a value is wrong.
 pub fn run_of(flags: &RunFlags) -> Result<Option<GeneralRun>, CliError> {
-    let Some(model) = model(flags)? else { return Ok(None) };
+    let general = flags.system.as_deref().map_or(Ok(None), |name| named(name, &flags.set, false));
+    let (model, of_many_states) = match general? {
+        Some(model) => (model, false),
+        None => match flags.model_of_many_states()? {
+            Some(model) => (model, true),
+            None => return Ok(None),
+        },
+    };
     let recording = ["--chord", "--every"];
-    if let Some(flag) =
-        flags.given().into_iter().find(|f| !WORK.contains(f) && !recording.contains(f))
-    {
+    let works = |f: &&str| {
+        WORK.contains(f) || recording.contains(f) || (of_many_states && SWITCH.contains(f))
+    };
+    if let Some(flag) = flags.given().into_iter().find(|f| !works(f)) {
         let why = match flag {
+            _ if of_many_states => {
+                "it belongs to systems of up to four states, or to those with one switching \
+                    surface; leave it out"
+            }
             "--switch" => {
                 "a general system is followed exactly, from switch to switch; leave it out, or \
                     write the system with h, plus and minus"

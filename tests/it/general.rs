@@ -1004,3 +1004,51 @@ fn pictures_branches_and_rests_say_what_they_found() {
     let turned = ["rests", "--system", "fused.toml", "--within", "x=3..-3"];
     refused(at, &turned, 2, &["the lower bound comes first"]);
 }
+
+/// x' = y and y' pushed back to y = 0, beside eighteen decays: Filippov's motion slides from
+/// y(t) = 0 on, the smoothed one lies where the mixture is at rest, y = eps atanh(2 phi - 1).
+#[test]
+fn systems_of_many_states_are_general_ones() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let states: Vec<String> =
+        ["x".into(), "y".into()].into_iter().chain((1..=18).map(|k| format!("a{k}"))).collect();
+    let field = |y: &str| {
+        let decays = (1..=18).map(|k| format!("-{k}*a{k}"));
+        ["y".to_owned(), y.to_owned()].into_iter().chain(decays).collect::<Vec<_>>()
+    };
+    let start = [vec![0.3, 0.2], vec![1.0; 18]].concat();
+    let text = format!(
+        "states = {states:?}\nstart = {start:?}\nh = 'y'\nplus = {:?}\nminus = {:?}\n",
+        field("-x - 1"),
+        field("1 - x")
+    );
+    fs::write(at.join("many.toml"), text).unwrap();
+    let base = ["--system", "many.toml", "--t-end", "2", "--every", "1"];
+    let slid = run(at, &[&base[..], &["--switch", "filippov"]].concat());
+    assert_eq!(slid.words("signs").collect::<Vec<_>>(), ["+", "0", "0"]);
+    let smoothed = run(at, &[&base[..], &["--eps", "0.01"]].concat());
+    for table in [&slid, &smoothed] {
+        for k in 1..=18 {
+            let found = table.numbers(&format!("a{k}"));
+            near(found[1], (-f64::from(k)).exp(), 1e-9);
+        }
+    }
+    near(slid.numbers("y")[2], 0.0, 1e-12);
+    // phi = (1 - x)/2 where y' is 0; y' = -2 phi + 1 - x drifts by x' = y, a thousandth of that.
+    let x = smoothed.numbers("x")[2];
+    near(smoothed.numbers("y")[2], 0.01 * (-x).atanh(), 1e-4);
+    // The width is a parameter.
+    let by_eps = ["sensitivities", "--quiet", "--by", "eps", "--eps", "0.01"];
+    let table = from_csv(&good(at, &[&by_eps[..], &base[..4], &["--format", "csv"]].concat()));
+    assert!(names(&table.unwrap().1).contains(&"params.eps"));
+    let of = ["--system", "many.toml"];
+    for (flags, expected) in [
+        (&["--switch", "relay", "--band", "0.1"][..], "only systems of up to four states"),
+        (&["--switch", "filippov", "--eps", "0.1"], "--eps has no effect"),
+        (&["--kick-every", "1"], "belongs to systems of up to four states"),
+        (&["--method", "lsoda"], "general systems are followed by dopri5"),
+    ] {
+        refused(at, &[&["run"][..], &of, flags].concat(), 2, &[expected]);
+    }
+}

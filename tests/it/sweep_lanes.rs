@@ -188,12 +188,6 @@ fn rows_that_lanes_do_not_take_are_computed_alone() {
     let mut wheel = run(System::builtin("wheel").unwrap(), 3.0);
     wheel.start = vec![0.69267, 0.0, 0.0];
     are_the_rows(&Sweep::new(wheel, axes(&["method=lsoda", "shift.r=1e-6*5"]), None).unwrap());
-    let text = "states = [\"x\", \"y\", \"a\", \"b\", \"c\"]\nh = \"y\"\nplus = \
-        [\"y\", \"-x\", \"-a\", \"a - b\", \"-c\"]\nminus = [\"y\", \"1 - x\", \"-a\", \"a - \
-        b\", \"-c\"]\n";
-    let five = System::new(Definition::from_toml(text, "five.toml").unwrap());
-    let five = RunSpec { start: vec![0.3, 0.2, 1.0, 1.0, 1.0], ..run(five, 10.0) };
-    are_the_rows(&Sweep::new(five, axes(&["shift.x=1e-3*4"]), None).unwrap());
 }
 
 /// Rows whose verdict needs an exponent: these share lanes too. (`job::exponent` has more of them,

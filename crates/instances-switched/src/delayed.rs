@@ -91,10 +91,6 @@ late! {
     2 Bound<2>;
     3 Bound<3>;
     4 Bound<4>;
-    5 Bound<5>;
-    6 Bound<6>;
-    7 Bound<7>;
-    8 Bound<8>;
     3 Caricature;
 }
 

@@ -1,7 +1,7 @@
 //! Every discontinuous system by every method, compiled once: Filippov motion, and switches that
 //! act late or have a memory (see `twofold-instances`).
 //!
-//! Systems are a file's ([`Bound`]), in one to eight states. The paper's own is there as Rust code,
+//! Systems are a file's ([`Bound`]), in one to four states. The paper's own is there as Rust code,
 //! too: [`late`] and [`sliding`] choose.
 #![forbid(unsafe_code)]
 

@@ -99,10 +99,6 @@ motions! {
     2 Bound<2>;
     3 Bound<3>;
     4 Bound<4>;
-    5 Bound<5>;
-    6 Bound<6>;
-    7 Bound<7>;
-    8 Bound<8>;
     3 Caricature;
 }
 
@@ -179,7 +175,7 @@ macro_rules! two_surfaces {
     };
 }
 
-two_surfaces!(1, 2, 3, 4, 5, 6, 7, 8);
+two_surfaces!(1, 2, 3, 4);
 
 /// The discontinuous system with three states.
 ///

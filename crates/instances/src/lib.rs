@@ -7,9 +7,10 @@
 //! the compiler writes them side by side: orbits of smooth equations (here), with tangent vectors
 //! (`instances-tangent`), and of discontinuous systems (`instances-switched`).
 //!
-//! Equations are a file's, recorded as a program ([`BoundField`]), in one to eight states (nine
+//! Equations are a file's, recorded as a program ([`BoundField`]), in one to four states (five
 //! with a hysteretic phi). The paper's own are there as Rust code, too, which gives the same bits
-//! sooner: [`smoothed`] and [`hysteretic`] choose.
+//! sooner: [`smoothed`] and [`hysteretic`] choose. Systems of more states are followed by
+//! `twofold-hybrid`, which knows their number at run time.
 #![forbid(unsafe_code)]
 
 mod lanes;

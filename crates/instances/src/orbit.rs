@@ -4,8 +4,8 @@ use nalgebra::SVector;
 use twofold_analyse::digits::{Digits, DigitsQuestion, digits};
 use twofold_analyse::passage::{PassageAnswer, PassageQuestion, passage};
 use twofold_integrate::{
-    DriveOptions, Failure, MOST_STATES, Method, Monitor, Observer, PRECISIONS, Stepper, Summary,
-    Tolerance, WithStepper, drive, with_extended,
+    DriveOptions, Failure, Method, Monitor, Observer, PRECISIONS, Stepper, Summary, Tolerance,
+    WithStepper, drive, with_extended,
 };
 use twofold_system::{
     BindError, BoundField, Caricature, Compiled, Field, Hysteretic, Relaxation, Smoothed, System,
@@ -81,25 +81,8 @@ fn orbit<F: VectorField<N>, const N: usize>(
     }
 }
 
-/// [`orbit`] of an equation of many states.
-fn orbit_of_many<F: VectorField<N>, const N: usize>(
-    field: &F,
-    x0: SVector<f64, N>,
-    how: &How,
-    observer: &mut dyn Observer<N>,
-    monitor: &dyn Monitor,
-) -> Result<Summary<N>, Failure> {
-    let How { method, tolerance, options, .. } = *how;
-    let found =
-        method.with_common_stepper(tolerance, Waiting { field, x0, options, observer, monitor });
-    found.unwrap_or_else(|| {
-        let why = format!("it has {N} states, and the method is there for up to {MOST_STATES}");
-        Err(Failure::NotApplicable { method: method.name(), why })
-    })
-}
-
 macro_rules! orbits {
-    ($by:ident: $($n:literal $field:ty;)*) => {
+    ($($n:literal $field:ty;)*) => {
         $(impl Orbits<$n> for $field {
             fn orbit(
                 &self,
@@ -108,14 +91,13 @@ macro_rules! orbits {
                 observer: &mut dyn Observer<$n>,
                 monitor: &dyn Monitor,
             ) -> Result<Summary<$n>, Failure> {
-                $by(self, x0, how, observer, monitor)
+                orbit(self, x0, how, observer, monitor)
             }
         })*
     };
 }
 
 orbits! {
-    orbit:
     1 BoundField<1>;
     2 BoundField<2>;
     3 BoundField<3>;
@@ -123,14 +105,6 @@ orbits! {
     5 BoundField<5>;
     3 Smoothed<Caricature>;
     4 Hysteretic<Caricature>;
-}
-
-orbits! {
-    orbit_of_many:
-    6 BoundField<6>;
-    7 BoundField<7>;
-    8 BoundField<8>;
-    9 BoundField<9>;
 }
 
 /// Computations on orbits that visit a two-fold.

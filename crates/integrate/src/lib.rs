@@ -54,7 +54,7 @@ pub use driver::{DriveOptions, Ignore, Monitor, Observer, Summary, drive};
 pub use guard::Guarded;
 pub use layered::Layered;
 pub use lsoda::Lsoda;
-pub use method::{MOST_STATES, Method, PRECISIONS, WithStepper, with_extended};
+pub use method::{Method, PRECISIONS, WithStepper, with_extended};
 pub use radau5::Radau5;
 pub use schedule::{Kick, KickLaw, Kicker, Schedule, StepCap};
 pub use step::{Failure, Flow, Interpolant, Statistics, Step, Stepper, StopReason, Tolerance};

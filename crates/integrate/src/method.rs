@@ -11,9 +11,6 @@ use twofold_num::MultiFloat;
 /// [`MultiFloat`].
 pub const PRECISIONS: [u16; 2] = [106, 192];
 
-/// Maximum number of states in extended precision: four and a hysteretic phi.
-pub const MOST_STATES: usize = 5;
-
 /// An integration method.
 ///
 /// ```
@@ -85,22 +82,6 @@ impl Method {
                 user.with(Taylor::extended(tolerance).with_decimal_constants())
             }
             Method::Layered => user.with(Layered::new(tolerance)),
-        }
-    }
-
-    /// The same by the methods that equations of many states have; none for
-    /// [`Method::TaylorExtended`] and [`Method::Layered`], which are compiled for few.
-    pub fn with_common_stepper<U: WithStepper<N>, const N: usize>(
-        self,
-        tolerance: Tolerance,
-        user: U,
-    ) -> Option<U::Answer> {
-        match self {
-            Method::Lsoda => Some(user.with(Guarded::new(Lsoda::new(tolerance), tolerance))),
-            Method::Dopri5 => Some(user.with(Guarded::new(Dopri5::new(tolerance), tolerance))),
-            Method::Radau5 => Some(user.with(Guarded::new(Radau5::new(tolerance), tolerance))),
-            Method::Taylor => Some(user.with(Taylor::new(tolerance))),
-            Method::TaylorExtended | Method::Layered => None,
         }
     }
 }

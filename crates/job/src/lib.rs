@@ -68,6 +68,7 @@ pub mod spec;
 pub mod store;
 pub mod sweep;
 pub mod table;
+pub mod translation;
 
 pub use answer::{Answer, Stop};
 pub use classification::Classification;

@@ -12,6 +12,7 @@ use super::rest::{self, Rest};
 use super::run::Run;
 use super::spec::{Observation, RunSpec, SpecError, SwitchSpec};
 use super::table::{Column, Entry, Table};
+use super::translation::MOST_STATES;
 use twofold_analyse::branch::{
     self, Branch, BranchOptions, End, Newton, Obstacle, Orbit, ReturnMap, Trouble,
 };
@@ -131,8 +132,6 @@ const MOST_RETURNS: usize = 32;
 const SAME_PASSAGE: f64 = 1e-3;
 /// States are of order one down to this size.
 const SMALL: f64 = 1e-3;
-/// Systems with up to so many states; a hysteretic switch adds one.
-const MOST_STATES: usize = 8;
 
 impl Question for ClosedOrbit {
     fn kind(&self) -> &'static str {
@@ -252,7 +251,8 @@ impl ClosedOrbit {
             return wrong(
                 "system",
                 format!("one of {n} states"),
-                "closed orbits are looked for in systems of 2 to 8 states",
+                "such orbits are looked for in systems of 2 to 4 states; those of more as orbits \
+                    of general systems",
             );
         }
         if let Some(refused) = has_past(self.switch) {
@@ -574,10 +574,6 @@ impl Map<'_> {
                     2 => self.discontinuous::<2>(&system, u, settings, derivative),
                     3 => self.discontinuous::<3>(&system, u, settings, derivative),
                     4 => self.discontinuous::<4>(&system, u, settings, derivative),
-                    5 => self.discontinuous::<5>(&system, u, settings, derivative),
-                    6 => self.discontinuous::<6>(&system, u, settings, derivative),
-                    7 => self.discontinuous::<7>(&system, u, settings, derivative),
-                    8 => self.discontinuous::<8>(&system, u, settings, derivative),
                     n => Err(JobError::Other(format!("no closed orbits with {n} states")).into()),
                 };
             }
@@ -594,10 +590,6 @@ impl Map<'_> {
             3 => self.smooth::<3, 12>(&field, u, settings),
             4 => self.smooth::<4, 20>(&field, u, settings),
             5 => self.smooth::<5, 30>(&field, u, settings),
-            6 => self.smooth::<6, 42>(&field, u, settings),
-            7 => self.smooth::<7, 56>(&field, u, settings),
-            8 => self.smooth::<8, 72>(&field, u, settings),
-            9 => self.smooth::<9, 90>(&field, u, settings),
             n => Err(JobError::Other(format!("no closed orbits with {n} states")).into()),
         }
     }
@@ -705,9 +697,9 @@ mod tests {
     }
 
     #[test]
-    fn a_circle_is_found_in_two_to_eight_states() {
+    fn a_circle_is_found_in_two_to_four_states() {
         let known = (-0.4 * PI).exp();
-        for n in 2..=8 {
+        for n in 2..=MOST_STATES {
             for switch in switches() {
                 let answer =
                     question(circle(n), switch, 1).compute(&Executor::quiet(), &()).unwrap();
@@ -1106,8 +1098,8 @@ mod tests {
         assert_eq!(good.validate(), Ok(()));
         let of = |n: usize| question(cases::decays(n), smoothed, 0);
         for (wrong, field, word) in [
-            (of(1), "system", "2 to 8 states"),
-            (of(9), "system", "2 to 8 states"),
+            (of(1), "system", "2 to 4 states"),
+            (of(5), "system", "2 to 4 states"),
             (question(circle(2), smoothed, 2), "section", "count from 0"),
             (
                 ClosedOrbit { along: along("nu", 0.1, 0.2, 4), ..good.clone() },

@@ -68,7 +68,7 @@ pub fn simulate_until(
     Ok(recording)
 }
 
-/// Computes a run of a system with any number of states.
+/// Computes a run of a system with up to four states.
 ///
 /// # Errors
 ///
@@ -80,16 +80,13 @@ pub fn answer(spec: &RunSpec, monitor: &dyn Monitor) -> Result<Answer, JobError>
         2 => record::<2, 3>(spec, &mut Aside::default(), monitor)?.to_answer(spec),
         3 => three_states(spec, &mut Aside::default(), monitor)?.to_answer(spec),
         4 => record::<4, 5>(spec, &mut Aside::default(), monitor)?.to_answer(spec),
-        5 => record::<5, 6>(spec, &mut Aside::default(), monitor)?.to_answer(spec),
-        6 => record::<6, 7>(spec, &mut Aside::default(), monitor)?.to_answer(spec),
-        7 => record::<7, 8>(spec, &mut Aside::default(), monitor)?.to_answer(spec),
-        8 => record::<8, 9>(spec, &mut Aside::default(), monitor)?.to_answer(spec),
-        _ => return Err(too_many_states(spec, UP_TO_EIGHT)),
+        _ => return Err(too_many_states(spec, UP_TO_FOUR)),
     };
     if answer.stop == Stop::Found { Err(full(answer.fact("t")?)) } else { Ok(answer) }
 }
 
-const UP_TO_EIGHT: &str = "runs are computed with up to eight states";
+const UP_TO_FOUR: &str = "such runs have up to four states; those of more are runs of general \
+    systems (`translation::model_with`; --system FILE on the command line)";
 
 /// The end of a streamed run.
 #[derive(Clone, Debug, PartialEq)]
@@ -126,11 +123,7 @@ pub fn stream(
         2 => streamed(spec, rows, monitor, |aside| record::<2, 3>(spec, aside, monitor)),
         3 => streamed(spec, rows, monitor, |aside| three_states(spec, aside, monitor)),
         4 => streamed(spec, rows, monitor, |aside| record::<4, 5>(spec, aside, monitor)),
-        5 => streamed(spec, rows, monitor, |aside| record::<5, 6>(spec, aside, monitor)),
-        6 => streamed(spec, rows, monitor, |aside| record::<6, 7>(spec, aside, monitor)),
-        7 => streamed(spec, rows, monitor, |aside| record::<7, 8>(spec, aside, monitor)),
-        8 => streamed(spec, rows, monitor, |aside| record::<8, 9>(spec, aside, monitor)),
-        _ => Err(too_many_states(spec, UP_TO_EIGHT)),
+        _ => Err(too_many_states(spec, UP_TO_FOUR)),
     }
 }
 
@@ -662,8 +655,8 @@ mod tests {
 
     /// Decays at the rates 1, 2, 3 ...: as a whole, given away in parts, and computed in parts.
     #[test]
-    fn runs_have_one_to_eight_states() {
-        for n in 1..=8 {
+    fn runs_have_one_to_four_states() {
+        for n in 1..=4 {
             for switch in switches() {
                 let run = cases::run(cases::decays(n), switch, 1.0, EVERY);
                 let whole = answer(&run, &()).unwrap();
@@ -688,14 +681,14 @@ mod tests {
         }
         for switch in switches() {
             let many = cases::run(
-                cases::decays(9),
+                cases::decays(5),
                 switch,
                 1.0,
                 Observation::Section { coordinate: 0, value: 0.5 },
             );
             let said =
                 [answer(&many, &()).unwrap_err(), stream(&many, &mut |_| true, &()).unwrap_err()];
-            assert!(said.iter().all(|e| e.to_string().contains("up to eight states")), "{said:?}");
+            assert!(said.iter().all(|e| e.to_string().contains("up to four states")), "{said:?}");
         }
     }
 

@@ -52,7 +52,7 @@ use twofold_num::{Arithmetic, Decimal};
 pub use super::document::{About, Bounds};
 
 /// Maximum number of states of a system.
-pub const MAX_STATES: usize = 16;
+pub const MAX_STATES: usize = 100;
 /// Maximum number of parameters, and of intermediate terms.
 pub const MAX_NAMES: usize = 100;
 /// Maximum length of a file, in bytes.

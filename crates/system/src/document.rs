@@ -253,7 +253,7 @@ pub struct Document {
     /// Sources of the system, a string each.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub references: Vec<String>,
-    /// One to sixteen states, in order: a name, or a table (below).
+    /// One to a hundred states, in order: a name, or a table (below).
     pub states: Vec<StateEntry>,
     /// Start of runs: a number for each state. Without it runs need `--start`.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -27,7 +27,7 @@ use std::sync::Arc;
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
-use super::method::{MOST_STATES, Method, WithStepper};
+use super::method::{Method, WithStepper};
 use super::roots::{Crossing, CrossingFinder};
 use super::step::{Failure, Step, Tolerance};
 use super::{Dopri5, Guarded, Radau5, Taylor};
@@ -353,9 +353,6 @@ impl<'a, P: PiecewiseSmooth<N> + Clone, const N: usize> Delayed<'a, P, N> {
                 Ok(user.with(Sharp::new(self, [taylor(), taylor()])?))
             }
             (None, Method::TaylorExtended) => {
-                if const { N > MOST_STATES } {
-                    return refused("dopri5 or taylor, which follow any number of states");
-                }
                 let taylor = || {
                     let taylor = Taylor::<N, _>::extended(tolerance).with_decimal_constants();
                     match order {
