@@ -1,9 +1,14 @@
 //! Error against work for ODEPACK's LSODA (frozen, figures/workprecision/odepack) and for this
 //! crate's methods (computed).
 
+use nalgebra::SVector;
 use serde::Deserialize;
 use twofold::analyse::work_precision::{WorkPrecisionQuestion, weighted_error, work_precision};
-use twofold::integrate::{Method, StepCap, Tolerance};
+use twofold::integrate::{
+    Dopri5, DriveOptions, Failure, Guarded, Ignore, Lsoda, Method, Radau5, StepCap, Summary,
+    Tolerance, drive,
+};
+use twofold::system::BoundField;
 
 use super::problems::{Problem, Visit, for_each};
 
@@ -124,6 +129,30 @@ pub const MOST_STEPS: u64 = 200_000;
 /// Our methods.
 const METHODS: [Method; 3] = [Method::Lsoda, Method::Radau5, Method::Dopri5];
 
+/// The orbit of `start` by one of [`METHODS`].
+fn run<const N: usize>(
+    field: &BoundField<N>,
+    method: Method,
+    tolerance: Tolerance,
+    start: SVector<f64, N>,
+    options: &DriveOptions,
+) -> Result<Summary<N>, Failure> {
+    match method {
+        Method::Lsoda => {
+            let mut lsoda = Guarded::new(Lsoda::new(tolerance), tolerance);
+            drive(field, start, options, &mut lsoda, &mut Ignore, &())
+        }
+        Method::Radau5 => {
+            let mut radau5 = Guarded::new(Radau5::new(tolerance), tolerance);
+            drive(field, start, options, &mut radau5, &mut Ignore, &())
+        }
+        _ => {
+            let mut dopri5 = Guarded::new(Dopri5::new(tolerance), tolerance);
+            drive(field, start, options, &mut dopri5, &mut Ignore, &())
+        }
+    }
+}
+
 /// Every row: ODEPACK's, then ours, problem by problem. A method that fails or takes too long has
 /// no row.
 pub fn rows() -> Vec<Row> {
@@ -147,8 +176,10 @@ pub fn rows() -> Vec<Row> {
                 let error = known.error(&run.x);
                 row("odepack-lsoda", run.rtol, error, run.evaluations, run.jacobians, run.steps);
             }
-            let ours = work_precision(&problem.field, &question(known))
-                .expect("the reference is this problem's");
+            let ours = work_precision(&question(known), |method, tolerance, start, options| {
+                run(&problem.field, method, tolerance, start, options)
+            });
+            let ours = ours.expect("the reference is this problem's");
             for run in ours {
                 let (Some(error), Some(s)) = (run.error, run.statistics) else { continue };
                 row(

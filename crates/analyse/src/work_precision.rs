@@ -5,10 +5,8 @@ use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
 use twofold_integrate::{
-    DriveOptions, Failure, Ignore, Method, Statistics, StepCap, Stepper, StopReason, Summary,
-    Tolerance, WithStepper, drive,
+    DriveOptions, Failure, Method, Statistics, StepCap, StopReason, Summary, Tolerance,
 };
-use twofold_system::VectorField;
 
 /// Options of [`work_precision`]: everything that it depends on besides the equation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -67,14 +65,15 @@ pub fn weighted_error(x: &[f64], solution: &[f64], scale: f64) -> f64 {
     x.iter().zip(solution).map(|(x, r)| (x - r).abs() / (r.abs() + scale)).fold(0.0, f64::max)
 }
 
-/// Runs every method at every tolerance: method by method, both in the order asked for. A run that
-/// fails or is given up has its row, which says so.
+/// Runs every method at every tolerance: method by method, both in the order asked for. `run`
+/// follows the equation of `N` states from a start by a method. A run that fails or is given up has
+/// its row, which says so.
 ///
 /// # Errors
 /// [`DimensionError`] if the question is about another equation.
-pub fn work_precision<F: VectorField<N>, const N: usize>(
-    field: &F,
+pub fn work_precision<const N: usize>(
     question: &WorkPrecisionQuestion,
+    run: impl Fn(Method, Tolerance, SVector<f64, N>, &DriveOptions) -> Result<Summary<N>, Failure>,
 ) -> Result<Vec<WorkPrecisionRow>, DimensionError> {
     let q = question;
     let wrong = |what, v: &[f64]| DimensionError { what, got: v.len(), wanted: N };
@@ -87,7 +86,6 @@ pub fn work_precision<F: VectorField<N>, const N: usize>(
         DriveOptions { step_cap: q.step_cap, max_steps: q.max_steps, ..DriveOptions::to(q.t_end) };
     let runs = q.methods.iter().flat_map(|m| q.tolerances.iter().map(move |t| (*m, *t)));
     let rows = runs.map(|(method, tolerance)| {
-        let run = WorkPrecisionRun { field, x0: SVector::from(start), options };
         let mut row = WorkPrecisionRow {
             method,
             tolerance,
@@ -96,7 +94,7 @@ pub fn work_precision<F: VectorField<N>, const N: usize>(
             stop: None,
             failure: None,
         };
-        match method.with_stepper(tolerance, run) {
+        match run(method, tolerance, SVector::from(start), &options) {
             Ok(end) => {
                 row.error = (end.stop == StopReason::EndTime)
                     .then(|| weighted_error(end.x.as_slice(), &q.solution, q.scale));
@@ -109,27 +107,15 @@ pub fn work_precision<F: VectorField<N>, const N: usize>(
     Ok(rows.collect())
 }
 
-/// A run as a computation over any stepper.
-struct WorkPrecisionRun<'a, F, const N: usize> {
-    field: &'a F,
-    x0: SVector<f64, N>,
-    options: DriveOptions,
-}
-
-impl<F: VectorField<N>, const N: usize> WithStepper<N> for WorkPrecisionRun<'_, F, N> {
-    type Answer = Result<Summary<N>, Failure>;
-    fn with<M: Stepper<N>>(self, mut stepper: M) -> Self::Answer {
-        drive(self.field, self.x0, &self.options, &mut stepper, &mut Ignore, &())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use nalgebra::vector;
 
     use super::*;
+    use twofold_integrate::{Ignore, Stepper, WithStepper, drive};
     use twofold_num::Elementary;
     use twofold_num::elementary::exp;
+    use twofold_system::VectorField;
 
     /// x' = -1000 (x - 1): stiff enough to tell methods apart.
     struct Fast;
@@ -137,6 +123,20 @@ mod tests {
         fn eval<S: Elementary>(&self, x: &SVector<S, 1>) -> SVector<S, 1> {
             vector![(S::one() - x[0]).scale(1000.0)]
         }
+    }
+
+    struct Run<'a>(SVector<f64, 1>, &'a DriveOptions);
+    impl WithStepper<1> for Run<'_> {
+        type Answer = Result<Summary<1>, Failure>;
+        fn with<M: Stepper<1>>(self, mut stepper: M) -> Self::Answer {
+            drive(&Fast, self.0, self.1, &mut stepper, &mut Ignore, &())
+        }
+    }
+
+    fn rows(question: &WorkPrecisionQuestion) -> Result<Vec<WorkPrecisionRow>, DimensionError> {
+        work_precision(question, |method, tolerance, start, options| {
+            method.with_stepper(tolerance, Run(start, options))
+        })
     }
 
     fn question() -> WorkPrecisionQuestion {
@@ -154,7 +154,7 @@ mod tests {
 
     #[test]
     fn a_run_given_up_keeps_its_row_and_its_reason() {
-        let rows = work_precision(&Fast, &question()).unwrap();
+        let rows = rows(&question()).unwrap();
         let methods: Vec<_> = rows.iter().map(|r| r.method).collect();
         assert_eq!(methods, [Method::Radau5, Method::Radau5, Method::Dopri5, Method::Dopri5]);
         for r in &rows[..2] {
@@ -170,8 +170,7 @@ mod tests {
     #[test]
     fn failures_have_rows_too() {
         let tolerances = vec![Tolerance { rtol: 0.0, atol: 0.0 }];
-        let rows =
-            work_precision(&Fast, &WorkPrecisionQuestion { tolerances, ..question() }).unwrap();
+        let rows = rows(&WorkPrecisionQuestion { tolerances, ..question() }).unwrap();
         assert!(rows.iter().all(|r| r.failure.is_some() && r.error.is_none()), "{rows:?}");
     }
 
@@ -181,7 +180,7 @@ mod tests {
             WorkPrecisionQuestion { start: vec![0.0; 2], ..question() },
             WorkPrecisionQuestion { solution: Vec::new(), ..question() },
         ] {
-            assert!(work_precision(&Fast, &wrong).is_err());
+            assert!(rows(&wrong).is_err());
         }
     }
 
