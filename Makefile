@@ -215,9 +215,12 @@ fonts: ## crates/render/fonts/glyphs.bin from the fonts' files
 sbom: ## what the program links, with versions, licences and checksums (CycloneDX), into target/sbom (needs cargo-cyclonedx; scripts/sbom.sh)
 	@sh scripts/sbom.sh
 
-.PHONY: prose reference
+.PHONY: prose reference schemas
 reference: ## write the generated pages of docs/ anew: flags, columns, keys, exit codes, messages
 	@TWOFOLD_UPDATE=1 $(CARGO) test --locked --quiet --test it -- reference:: paper_format::
+
+schemas: ## papers' folders and the report against their schemas by a full validator (downloads one)
+	@sh scripts/schemas.sh
 
 prose: ## spelling (typos; skipped without Python) and subjects of commits; the rules of pages are tests (tests/it/prose.rs)
 	@sh scripts/spelling.sh

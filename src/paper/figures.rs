@@ -63,11 +63,18 @@ pub fn reference(id: &str) -> Option<&'static str> {
     FILES.iter().find(|f| f.0 == file).map(|f| f.1).or_else(|| twofold_jeffrey_2013::reference(id))
 }
 
+/// The references of the paper's folder beside `expected`, if that is a checkout's `figures`.
+fn beside(expected: &Path) -> Option<PathBuf> {
+    let expected = expected.canonicalize().ok()?;
+    let checkout = expected.parent().filter(|_| expected.ends_with("figures"))?;
+    Some(checkout.join(FOLDER).join("expected")).filter(|own| own.exists())
+}
+
 /// Reference of a figure in `expected` (a checkout's `figures`, or a folder of the same form):
 /// NAME/expected.json there, or in the paper's folder if it is one of its own.
 pub fn reference_file(expected: &Path, id: &str) -> PathBuf {
-    let own = expected.join("..").join(FOLDER).join(format!("expected/{id}.json"));
-    if own.exists() { own } else { expected.join(id).join("expected.json") }
+    let own = beside(expected).map(|own| own.join(format!("{id}.json")));
+    own.filter(|own| own.exists()).unwrap_or_else(|| expected.join(id).join("expected.json"))
 }
 
 /// The references and pictures in `expected`, each reference as NAME/expected.json.
@@ -77,8 +84,7 @@ pub fn reference_file(expected: &Path, id: &str) -> PathBuf {
 pub fn references_in(expected: &Path) -> Result<Vec<FileBytes>, FileError> {
     let mut files =
         read_tree(expected, &|path| path.ends_with(".json") || path.ends_with(".png"))?.files;
-    let own = expected.join("..").join(FOLDER).join("expected");
-    if own.exists() {
+    if let Some(own) = beside(expected) {
         for FileBytes { path, bytes } in
             read_tree(&own, &|path| path.starts_with("fig") && path.ends_with(".json"))?.files
         {
@@ -94,6 +100,25 @@ pub fn references_in(expected: &Path) -> Result<Vec<FileBytes>, FileError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn only_a_checkouts_figures_have_a_paper_beside_them() {
+        let folder = tempfile::tempdir().unwrap();
+        let own = folder.path().join(FOLDER).join("expected");
+        std::fs::create_dir_all(&own).unwrap();
+        std::fs::write(own.join("fig7.json"), "{}").unwrap();
+        for (name, beside) in [("figures", true), ("out", false)] {
+            let expected = folder.path().join(name);
+            std::fs::create_dir(&expected).unwrap();
+            let file = reference_file(&expected, "fig7");
+            assert_eq!(
+                file.ends_with("papers/jeffrey-2013/expected/fig7.json"),
+                beside,
+                "{file:?}"
+            );
+            assert_eq!(references_in(&expected).unwrap().len(), usize::from(beside));
+        }
+    }
 
     /// The folder on disk is the one that is embedded, file by file.
     #[test]

@@ -125,8 +125,8 @@ mod tests {
         }
     }
 
-    struct Run<'a>(SVector<f64, 1>, &'a DriveOptions);
-    impl WithStepper<1> for Run<'_> {
+    struct FastRun<'a>(SVector<f64, 1>, &'a DriveOptions);
+    impl WithStepper<1> for FastRun<'_> {
         type Answer = Result<Summary<1>, Failure>;
         fn with<M: Stepper<1>>(self, mut stepper: M) -> Self::Answer {
             drive(&Fast, self.0, self.1, &mut stepper, &mut Ignore, &())
@@ -135,7 +135,7 @@ mod tests {
 
     fn rows(question: &WorkPrecisionQuestion) -> Result<Vec<WorkPrecisionRow>, DimensionError> {
         work_precision(question, |method, tolerance, start, options| {
-            method.with_stepper(tolerance, Run(start, options))
+            method.with_stepper(tolerance, FastRun(start, options))
         })
     }
 

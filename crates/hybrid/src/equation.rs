@@ -18,7 +18,7 @@ use twofold_system::expression::{Function, General};
 use crate::data::Table;
 use crate::definition::{Definition, When, asks};
 use crate::model::{Model, ModelError};
-use crate::value::{power, smooth};
+use crate::value::{evaluate, power, smooth};
 
 /// A switching function.
 #[derive(Clone, Debug, PartialEq)]
@@ -109,6 +109,15 @@ pub enum EquationError {
             such as {0} > 0"
     )]
     NoCondition(String),
+    /// The ends of a `clip` are exchanged, by the values of parameters.
+    #[error(
+        "the lower end of {0} is {1} here, above its upper end {2}: write clip(x, low, high), or \
+            give the parameters other values"
+    )]
+    Clip(String, f64, f64),
+    /// A `mod` by a parameter that is zero.
+    #[error("{0} is by 0 here, and has no value: give the parameter another value")]
+    Mod(String),
 }
 
 /// The same function with the other sign, as it would be written.
@@ -169,9 +178,34 @@ impl Equation {
         for e in &conditions {
             equation.find(e, true)?;
         }
+        let sets = equation.definition.events.iter().flat_map(|event| &event.set);
+        for e in
+            fields.iter().chain(&terms).chain(&watched).chain(&conditions).chain(sets.map(|s| &s.1))
+        {
+            equation.has_meaning(e)?;
+        }
         equation.resets =
             equation.definition.events.iter().map(|event| equation.reset(&event.set)).collect();
         Ok(equation)
+    }
+
+    /// Refuses functions to which the values of parameters give no meaning. (Numbers are refused
+    /// where the file is read.)
+    fn has_meaning(&self, e: &Expression) -> Result<(), EquationError> {
+        let number = |e: &Expression| evaluate(e, &|name| self.values.get(name).copied());
+        match e {
+            Expression::Apply(General::Clip, list) => {
+                let (low, high) = (number(&list[1]), number(&list[2]));
+                if low > high {
+                    return Err(EquationError::Clip(e.to_string(), low, high));
+                }
+            }
+            Expression::Apply(General::Mod, list) if number(&list[1]) == 0.0 => {
+                return Err(EquationError::Mod(e.to_string()));
+            }
+            _ => {}
+        }
+        e.parts().into_iter().try_for_each(|part| self.has_meaning(part))
     }
 
     /// Whether an expression is one of states, time and parameters, which no switching function

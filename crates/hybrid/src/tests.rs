@@ -545,6 +545,23 @@ fn errors_point_into_the_file() {
 }
 
 /// x' = -sqrt(x) (Torricelli): (1 - t/2)^2, and from t = 2 on zero for ever.
+/// By the values of parameters as by numbers in the file, in fields, terms and resets.
+#[test]
+fn ends_of_a_clip_are_not_exchanged() {
+    let clipped = "states = ['x']\nstart = [3]\nf = ['-clip(x, 0, p)']\n[parameters]\np = 1";
+    let of = |text: &str, p: f64| run(&model(text).with("p", p).unwrap(), 1.0).1;
+    near(of(clipped, 1.0).unwrap().x[0], 2.0, 1e-12);
+    let set = "states = ['x']\nstart = [3]\nf = ['1']\n[[event]]\nat = 0.5\n\
+        set = { x = 'mod(x, p)' }\n[parameters]\np = 2";
+    near(of(set, 2.0).unwrap().x[0], 2.0, 1e-12);
+    for (text, p, words) in
+        [(clipped, -1.0, "clip(x, 0, p) is 0 here, above its upper end -1"), (set, 0.0, "is by 0")]
+    {
+        let error = of(text, p).unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    }
+}
+
 #[test]
 fn a_tank_runs_empty() {
     let follow_by = |text: &str, t_end, method| {
