@@ -562,6 +562,44 @@ fn ends_of_a_clip_are_not_exchanged() {
     }
 }
 
+/// The speeds on both sides of the surface vanish together where sliding ends, and the mixture there
+/// is 0/0; and a mixture that cancels to rounding takes no steps.
+#[test]
+fn sliding_is_followed_to_where_both_speeds_vanish() {
+    let vanishing = model("states = ['x', 'y']\nstart = [0, -1]\nf = ['y*sign(x)', '1']");
+    let cancelling = model("states = ['x', 'y']\nstart = [0, -1]\nf = ['if(x > 0, y, 2)', '1']");
+    let stopped = "states = ['x', 'y']\nstart = [0.3, 0]\nf = ['-sign(x)*max(1 - y, 0)', '1']\n\
+        [[event]]\nwhen = 'y - 1'\nstop = true";
+    let reset = "states = ['x']\nstart = [0.3]\nf = ['-sign(x)*(1 - t)']\n[[event]]\nat = 1\n\
+        set = { x = 'x + 1' }";
+    for method in [Method::Dopri5, Method::Radau5, Method::Taylor] {
+        let options = |every, t_end| Options {
+            method,
+            t_end,
+            exit: Exit::Plus,
+            record: Record::Times { every },
+            ..Options::default()
+        };
+        let mut rows = Vec::new();
+        let outcome = follow(&vanishing, &options(0.1, 3.0), &mut |point| {
+            rows.push((point.t, point.x.to_vec()));
+            true
+        });
+        near(outcome.unwrap().x[0], 2.0, 1e-9);
+        for (t, x) in rows {
+            let y = t - 1.0;
+            near(x[0], if y < 0.0 { 0.0 } else { 0.5 * y * y }, 1e-9);
+            near(x[1], y, 1e-9);
+        }
+        let end = |model: &Model, t_end| follow(model, &options(0.1, t_end), &mut |_| true);
+        near(end(&cancelling, 1.2).unwrap().x[0], 0.02, 1e-9);
+        // Events at that moment come first.
+        let stopped = end(&model(stopped), 3.0).unwrap();
+        assert!(matches!(stopped.ending, Ending::Stopped(_)) && (stopped.t - 1.0).abs() < 1e-9);
+        near(end(&model(reset), 3.0).unwrap().x[0], 3.0, 1e-9);
+    }
+}
+
 #[test]
 fn a_tank_runs_empty() {
     let follow_by = |text: &str, t_end, method| {

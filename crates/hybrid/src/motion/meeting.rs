@@ -14,7 +14,7 @@ impl Follower<'_> {
         let mut fired = due.to_vec();
         let mut passed = Vec::new();
         let mut crossed = Vec::new();
-        let (mut leave, mut opened) = (Vec::new(), Vec::new());
+        let (mut leave, mut opened, mut ceases) = (Vec::new(), Vec::new(), false);
         let held = self.held.clone();
         for sought in met {
             match *sought {
@@ -40,22 +40,24 @@ impl Follower<'_> {
                     if self.comes_to_rest(self.t) {
                         return Ok(None);
                     }
-                    let zero = self.sliding.clone();
-                    match self.options.exit {
-                        _ if zero.len() > 1 => {
-                            return Err(self.ceases_to_be_the_only_motion());
-                        }
-                        Exit::Undecided => {
-                            return Err(self.undecided(
-                                &zero,
-                                "sliding ceases to attract: it may go on, or leave at any time to \
-                                    either side",
-                            ));
-                        }
-                        rule => zero.iter().for_each(|g| leave.push((*g, rule == Exit::Plus))),
-                    }
+                    ceases = true;
                 }
                 Sought::Release(place) => opened.push(self.contacts[place]),
+            }
+        }
+        // Events that happen at this moment come first.
+        if ceases && fired.is_empty() {
+            let slid = self.sliding.clone();
+            match self.options.exit {
+                _ if slid.len() > 1 => return Err(self.ceases_to_be_the_only_motion()),
+                Exit::Undecided => {
+                    return Err(self.undecided(
+                        &slid,
+                        "sliding ceases to attract: it may go on, or leave at any time to either \
+                            side",
+                    ));
+                }
+                rule => slid.iter().for_each(|g| leave.push((*g, rule == Exit::Plus))),
             }
         }
         for contact in opened {

@@ -200,6 +200,7 @@ impl Follower<'_> {
             if self.separate.is_some() {
                 let jumps;
                 (weights, jumps, _) = self.separate_weights(t, x, &field0);
+                self.complete(t, x, &mut weights);
                 // Each attracts by itself: the one that is nearest to doing so no more counts.
                 determinant = jumps.iter().map(|j| -j).fold(f64::INFINITY, f64::min);
             } else if !self.corners.is_empty() {
@@ -212,6 +213,7 @@ impl Follower<'_> {
                 let k = a.len();
                 let b: Vec<f64> = a.iter().map(|v| -v).collect();
                 weights = solve_any(&matrix, &b, 0.0).unwrap_or_else(|| vec![f64::NAN; k]);
+                self.complete(t, x, &mut weights);
                 // Attracting where minus the matrix has a positive determinant, which a single
                 // surface's jump of speed is, and where fields do not turn away.
                 let holds =

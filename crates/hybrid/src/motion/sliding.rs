@@ -192,7 +192,8 @@ impl Follower<'_> {
         self.variables[n] = t;
         self.compiled.field.evaluate(&self.variables, out);
         if self.separate.is_some() {
-            let (weights, _, field1) = self.separate_weights(t, x, out);
+            let (mut weights, _, field1) = self.separate_weights(t, x, out);
+            self.complete(t, x, &mut weights);
             for (i, owner) in self.separate.iter().flatten().enumerate() {
                 if let Some(place) = owner {
                     out[i] = sum([out[i], weights[*place] * (field1[i] - out[i])].into_iter());
@@ -204,7 +205,8 @@ impl Follower<'_> {
                 out[i] = sum(found.weights.iter().zip(&fields).map(|(w, f)| w * f[i]));
             }
         } else if !self.sliding.is_empty() {
-            let weights = self.weights(t, x, out);
+            let mut weights = self.weights(t, x, out);
+            self.complete(t, x, &mut weights);
             let others: Vec<Vec<f64>> =
                 (0..weights.len()).map(|place| self.positive_field(place, t, x)).collect();
             for i in 0..n {
@@ -232,15 +234,17 @@ impl Follower<'_> {
 
     /// Bounds the rounding errors of speeds where a state has become small, beside which they may
     /// count: those of the field's own terms, and those that reach it by the other states in a
-    /// step as long as the present one. False if no state is small.
+    /// step as long as the present one. False if no state is small, nor a speed a mixture.
     pub(super) fn note_noise(&mut self, step: &Step) -> bool {
         let small = |(lately, size): (&f64, &f64)| *lately < SMALL * size;
-        if self.options.atol.is_some() || !self.lately.iter().zip(&self.size).any(small) {
+        let mixed = !self.sliding.is_empty() || !self.contacts.is_empty();
+        if self.options.atol.is_some() || !(mixed || self.lately.iter().zip(&self.size).any(small))
+        {
             self.noise.fill(0.0);
             return false;
         }
         let n = self.n;
-        let mixture = if self.sliding.is_empty() && self.contacts.is_empty() {
+        let mixture = if !mixed {
             vec![0.0; n]
         } else {
             let mut low = vec![0.0; n];
@@ -393,6 +397,37 @@ impl Follower<'_> {
         let mut slopes = vec![Dual::constant(0.0); n];
         compiled.field.evaluate(&duals, &mut slopes);
         slopes.iter().map(|d| d.partials[0]).collect()
+    }
+
+    /// Gives weights that are none, where the speeds on both sides of a surface vanish together,
+    /// their limit on the way from the step's beginning.
+    pub(super) fn complete(&mut self, t: f64, x: &[f64], weights: &mut [f64]) {
+        const BACK: f64 = 1e-5;
+        if weights.iter().all(|w| w.is_finite()) || t == self.t {
+            return;
+        }
+        let mut before = |share: f64| {
+            let there: Vec<f64> =
+                x.iter().zip(&self.x).map(|(x, x0)| x + share * (x0 - x)).collect();
+            let t = t + share * (self.t - t);
+            let mut low = vec![0.0; self.n];
+            self.variables[..self.n].copy_from_slice(&there);
+            self.variables[self.n] = t;
+            self.compiled.field.evaluate(&self.variables, &mut low);
+            if self.separate.is_some() {
+                self.separate_weights(t, &there, &low).0
+            } else {
+                self.weights(t, &there, &low)
+            }
+        };
+        let (near, far) = (before(BACK), before(2.0 * BACK));
+        for (weight, (near, far)) in weights.iter_mut().zip(near.iter().zip(far)) {
+            if !weight.is_finite() {
+                *weight = 2.0 * near - far;
+            }
+        }
+        self.variables[..self.n].copy_from_slice(x);
+        self.variables[self.n] = t;
     }
 
     /// Weights of the positive sides in sliding; not-a-number where there are none.
