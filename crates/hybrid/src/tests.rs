@@ -600,6 +600,44 @@ fn sliding_is_followed_to_where_both_speeds_vanish() {
     }
 }
 
+/// What jumps exactly to the number that it is compared with is compared with that number, and a
+/// whole number that only jumps is its own whole part.
+#[test]
+fn comparisons_see_what_jumps_to_equality() {
+    let third = 1.0 / 3.0;
+    for (f, want) in [
+        ("if(floor(3*t) >= 1, 1, 0)", 3.0 - third),
+        ("if(floor(3*(t - 1)) < 1, 1, 0)", 1.0 + third),
+        ("heaviside(floor(3*(t - 1)) - 1)", 2.0 - third),
+        ("if(floor(3 - 3*t) <= 1, 1, 0)", 3.0 - third),
+        ("if(mod(floor(3*(t - 1)), 3) >= 2, 1, 0)", 1.0),
+        ("if(if(t > 1, 1, 0) + if(t > 2, 1, 0) >= 1, 1, 0)", 2.0),
+        ("if(sign(t - 1) >= 1, 1, 0)", 2.0),
+        ("sign(t - 1)*sign(sign(t - 1) - 1)", 1.0),
+        ("mod(floor(2*t), 3)", 0.5 * (0.0 + 1.0 + 2.0 + 0.0 + 1.0 + 2.0)),
+        ("floor(floor(3*t)/2)", third * (1.0 + 1.0 + 2.0 + 2.0 + 3.0 + 3.0 + 4.0)),
+        // At rest at the bound after the jump, and away from it again.
+        ("if(2*floor(t) - floor(2*t) >= 0, 1, 0)", 1.5),
+    ] {
+        for method in [Method::Dopri5, Method::Radau5, Method::Taylor] {
+            let model = model(&format!("states = ['x']\nstart = [0]\nf = ['{f}']"));
+            let options = Options { t_end: 3.0, method, ..Options::default() };
+            let outcome = follow(&model, &options, &mut |_| true);
+            let x = outcome.unwrap_or_else(|e| panic!("{f}: {e}")).x[0];
+            assert!((x - want).abs() < 1e-9, "{f} by {method:?}: {x} for {want}");
+        }
+    }
+    for (when, t) in [("floor(x) >= 2", 2.0), ("sign(x - 1) >= 1", 1.0)] {
+        let counts = model(&format!(
+            "states = ['n', 'x']\nstart = [0, 0]\nf = ['0', '1']\n[[event]]\nwhen = '{when}'\n\
+                set = {{ n = 'n + 1' }}"
+        ));
+        let (events, outcome) = run(&counts, 2.9);
+        assert_eq!(outcome.unwrap().x[0], 1.0, "{when}");
+        near(events[0].0, t, 1e-9);
+    }
+}
+
 #[test]
 fn a_tank_runs_empty() {
     let follow_by = |text: &str, t_end, method| {

@@ -147,12 +147,16 @@ impl Follower<'_> {
                     compiled.watched.evaluate(&variables, &mut values);
                 }
                 let (value, present) = (values[place], config.sides[*guard]);
+                let size = self.magnitude(&self.equation.guards[*guard].expression);
                 let side = if self.equation.guards[*guard].whole {
                     value.floor()
-                } else if value.abs()
-                    > 1e-9 * self.magnitude(&self.equation.guards[*guard].expression)
-                {
+                } else if value.abs() > 1e-9 * size {
                     value.signum()
+                } else if value.abs() <= 1e-14 * size
+                    && !(0..=n).any(|variable| compiled.depends(n + place, variable))
+                {
+                    // It has jumped to zero, and only another jump moves it.
+                    0.0
                 } else {
                     present
                 };
@@ -270,7 +274,8 @@ impl Follower<'_> {
         some
     }
 
-    /// Whether a function is zero, and a short time of motion in this configuration later still.
+    /// Whether a function is zero, or of a whole part a whole number, and a short time of motion in
+    /// this configuration later still.
     fn is_zero_a_little_later(&mut self, config: &Configuration, guard: usize) -> bool {
         const BRIEF: f64 = 0.01;
         let compiled = self.equation.compiled_with(config, &[guard]);
@@ -288,13 +293,15 @@ impl Follower<'_> {
         let left = self.options.t_end - self.t;
         let brief = BRIEF * moves.map(|(f, size)| size / f.abs()).fold(left, f64::min);
         let later = a_little_later(&mut field, self.t, &self.x, brief);
-        let small = 1e-14 * self.magnitude(&self.equation.guards[guard].expression);
+        let zero = if self.equation.guards[guard].whole { self.boundary(guard) } else { 0.0 };
+        let size = self.magnitude(&self.equation.guards[guard].expression);
+        let small = 1e-14 * size.max(zero.abs());
         let mut is_zero = |t: f64, x: &[f64]| {
             variables[..x.len()].copy_from_slice(x);
             variables[x.len()] = t;
             let mut values = vec![0.0; compiled.outputs];
             compiled.watched.evaluate(&variables, &mut values);
-            values[place].abs() <= small
+            (values[place] - zero).abs() <= small
         };
         is_zero(self.t, &self.x) && is_zero(self.t + brief, &later)
     }
@@ -376,6 +383,11 @@ impl Follower<'_> {
                 if !self.equation.chooses(zero[j]) && !(0..k).any(other) {
                     continue;
                 }
+                // A function that jumps with the side.
+                for i in (0..k).filter(|i| *i != j) {
+                    coupled[i * k + j] |=
+                        place0[i].is_some_and(|p| compiled.depends(self.n + p, side));
+                }
                 if patterns.is_empty() {
                     patterns = sides();
                 }
@@ -422,8 +434,21 @@ impl Follower<'_> {
                     cache.insert(plus.clone(), made);
                 }
                 let (config, place, rates, asked) = &cache[&plus];
-                let rests: Vec<bool> =
-                    set.iter().map(|i| follower.equation.rests(zero[*i], config)).collect();
+                let rest = |i: &usize| {
+                    let guard = zero[*i];
+                    // A whole number that nothing moves is its own whole part.
+                    let whole = || {
+                        follower.equation.guards[guard].whole
+                            && config.sides[guard] == highs[*i]
+                            && place[*i].is_some_and(|p| rates.stands_still(p))
+                    };
+                    if whole() {
+                        follower.is_zero_a_little_later(config, guard)
+                    } else {
+                        follower.equation.rests(guard, config)
+                    }
+                };
+                let rests: Vec<bool> = set.iter().map(rest).collect();
                 let first: Vec<f64> =
                     set.iter().map(|i| place[*i].map_or(f64::NAN, |p| rates.first[p])).collect();
                 let direction: Vec<f64> =
@@ -441,6 +466,10 @@ impl Follower<'_> {
                 let (high, _, d1, ..) = at(self, vec![true]);
                 if at(self, vec![false]).5[0] && d1[0] == 0.0 {
                     ways[set[0]] = Way::Minus;
+                    continue;
+                }
+                if at(self, vec![true]).5[0] {
+                    ways[set[0]] = Way::Plus;
                     continue;
                 }
                 if same(&low, &high) {
@@ -481,7 +510,7 @@ impl Follower<'_> {
                 }
                 let goes = |i: usize, d: f64| match assignment[i] {
                     _ if jumped[set[i]].is_some() => true,
-                    Way::Plus => d > 0.0,
+                    Way::Plus => d > 0.0 || d == 0.0 && rests[i],
                     // A function that is not asked there and stays zero changes nothing.
                     Way::Minus => d < 0.0 || d == 0.0 && (!asked[i] || rests[i]),
                     Way::Stay => true,
