@@ -853,6 +853,7 @@ impl<'a> Follower<'a> {
                 self.after(before)?;
                 continue;
             }
+            self.open_pulled();
             step.t = self.t;
             step.x.copy_from_slice(&self.x);
             self.rhs(step.t, &step.x, &mut room);

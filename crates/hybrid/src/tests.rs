@@ -638,6 +638,22 @@ fn comparisons_see_what_jumps_to_equality() {
     }
 }
 
+/// A ball that has come to rest at t = 4.24 is lifted from t = 8 on, by a force that jumps there.
+#[test]
+fn contacts_open_where_a_force_jumps() {
+    let ball = "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-1 + FORCE']\n[[event]]\n\
+        when = 'x'\ndirection = 'down'\nset = { v = '-0.5*v' }\nafter_zeno = 'stick'";
+    for force in ["if(t > 8, 1.5, 0)", "1.5*floor(t/8)", "0.75 + 0.75*sign(t - 8)"] {
+        for method in [Method::Dopri5, Method::Radau5, Method::Taylor] {
+            let options = Options { t_end: 10.0, method, ..Options::default() };
+            let outcome =
+                follow(&model(&ball.replace("FORCE", force)), &options, &mut |_| true).unwrap();
+            near(outcome.x[0], 1.0, 1e-9);
+            near(outcome.x[1], 1.0, 1e-9);
+        }
+    }
+}
+
 #[test]
 fn a_tank_runs_empty() {
     let follow_by = |text: &str, t_end, method| {

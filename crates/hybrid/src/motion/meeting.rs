@@ -60,12 +60,7 @@ impl Follower<'_> {
                 rule => slid.iter().for_each(|g| leave.push((*g, rule == Exit::Plus))),
             }
         }
-        for contact in opened {
-            self.contacts.retain(|c| c.watched != contact.watched);
-            self.watch_side[contact.watched] = contact.above;
-            self.fresh_watch[contact.watched] = true;
-            self.trains[contact.event] = Train::default();
-        }
+        self.open(opened);
         self.left.fill(0.0);
         self.left_watch.fill(0.0);
         if !leave.is_empty() {
@@ -146,6 +141,34 @@ impl Follower<'_> {
         }
         fired.sort_unstable();
         self.happen(definition, &fired, &zero, observe)
+    }
+
+    /// Ends contacts.
+    fn open(&mut self, contacts: Vec<Contact>) {
+        for contact in contacts {
+            self.contacts.retain(|c| c.watched != contact.watched);
+            self.watch_side[contact.watched] = contact.above;
+            self.fresh_watch[contact.watched] = true;
+            self.trains[contact.event] = Train::default();
+        }
+    }
+
+    /// Ends contacts at which a force that has jumped pulls.
+    pub(super) fn open_pulled(&mut self) {
+        const PULLS: f64 = 1e-12;
+        if self.contacts.is_empty() {
+            return;
+        }
+        let list: Vec<(Sought, f64)> =
+            (0..self.contacts.len()).map(|place| (Sought::Release(place), 1.0)).collect();
+        let (t, x, mut pushes, mut field) = (self.t, self.x.clone(), Vec::new(), vec![0.0; self.n]);
+        self.measure(&list, t, &x, &mut pushes);
+        self.compiled.field.evaluate(&self.variables, &mut field);
+        let largest = field.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
+        let pulled =
+            self.contacts.iter().zip(&pushes).filter(|(_, push)| **push < -PULLS * largest);
+        let pulled: Vec<Contact> = pulled.map(|(contact, _)| *contact).collect();
+        self.open(pulled);
     }
 
     /// Whether a mixture by order ends although no surface is left: a fast surface ceases to
