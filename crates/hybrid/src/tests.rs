@@ -638,6 +638,16 @@ fn comparisons_see_what_jumps_to_equality() {
     }
 }
 
+/// x and z know nothing of each other.
+#[test]
+fn whole_parts_fall_while_another_surface_is_slid_upon() {
+    let apart = "states = ['x', 'z']\nstart = [0, 0.7]\nf = ['floor(-t)', '-max(-0.5, sign(z))']";
+    for method in [Method::Dopri5, Method::Radau5, Method::Taylor] {
+        let options = Options { t_end: 4.0, method, max_steps: 1000, ..Options::default() };
+        near(follow(&model(apart), &options, &mut |_| true).unwrap().x[0], -10.0, 1e-9);
+    }
+}
+
 /// A ball that has come to rest at t = 4.24 is lifted from t = 8 on, by a force that jumps there.
 #[test]
 fn contacts_open_where_a_force_jumps() {

@@ -148,14 +148,21 @@ impl Follower<'_> {
                 }
                 let (value, present) = (values[place], config.sides[*guard]);
                 let size = self.magnitude(&self.equation.guards[*guard].expression);
+                // Where only jumps move it, it has jumped to where it is now.
+                let only_jumps = || !(0..=n).any(|variable| compiled.depends(n + place, variable));
+                let near = value.round();
                 let side = if self.equation.guards[*guard].whole {
-                    value.floor()
+                    let at_boundary = (value - near).abs() <= 1e-9 * size.max(near.abs());
+                    if at_boundary && only_jumps() {
+                        near
+                    } else if at_boundary && (present == near || present == near - 1.0) {
+                        present
+                    } else {
+                        value.floor()
+                    }
                 } else if value.abs() > 1e-9 * size {
                     value.signum()
-                } else if value.abs() <= 1e-14 * size
-                    && !(0..=n).any(|variable| compiled.depends(n + place, variable))
-                {
-                    // It has jumped to zero, and only another jump moves it.
+                } else if value.abs() <= 1e-14 * size && only_jumps() {
                     0.0
                 } else {
                     present
