@@ -171,8 +171,15 @@ pub fn looked_at(flags: &RunFlags, period: Option<f64>) -> Result<Option<General
         }
         (Some(period), _) if period.is_finite() && period > 0.0 => {
             // A whole number of periods, so that the next run can begin at the same phase.
-            options.t_end =
-                options.t_start + ((options.t_end - options.t_start) / period).ceil() * period;
+            let (whole, length) = (1.0 + 1e-12, options.t_end - options.t_start);
+            let periods = (length / period * whole).floor();
+            if periods < 1.0 {
+                return Err(usage(format!(
+                    "--period {period}: the run is shorter; give a later --t-end, or a shorter \
+                        period"
+                )));
+            }
+            options.t_end = options.t_start + periods * period;
             options.record = Record::Times { every: period };
         }
         (Some(period), _) => {

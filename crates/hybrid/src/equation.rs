@@ -172,6 +172,9 @@ impl Equation {
             equation.definition.modes.iter().flat_map(|m| m.field.clone()).collect();
         let terms: Vec<Expression> =
             equation.definition.terms.iter().map(|(_, e)| e.clone()).collect();
+        if equation.definition.document().h.is_some() {
+            equation.register_h();
+        }
         for e in fields.iter().chain(&terms).chain(&watched) {
             equation.find(e, false)?;
         }
@@ -345,6 +348,20 @@ impl Equation {
 
     fn register(&mut self, expression: Expression, whole: bool, chooses: bool) {
         let (expression, _) = if whole { (expression, false) } else { self.bare(&expression) };
+        self.enter(expression, whole, chooses);
+    }
+
+    /// The switching function h of a system with plus and minus, which keeps its sign: plus is
+    /// where it is positive.
+    fn register_h(&mut self) {
+        let field = self.definition.modes.first().and_then(|mode| mode.field.first());
+        let Some(Expression::Apply(General::If, list)) = field else { return };
+        let Expression::Greater(h, _) = &list[0] else { return };
+        let (bare, flipped) = self.bare(h);
+        self.enter(if flipped { mirrored(&bare) } else { bare }, false, true);
+    }
+
+    fn enter(&mut self, expression: Expression, whole: bool, chooses: bool) {
         let key = |e: &Expression| format!("{}{e}", if whole { "whole " } else { "" });
         if let Some((i, _)) = self.by_text.get(&key(&expression)) {
             self.guards[*i].chooses |= chooses;

@@ -638,6 +638,22 @@ fn comparisons_see_what_jumps_to_equality() {
     }
 }
 
+/// However h is written, plus is where it is positive.
+#[test]
+fn a_side_is_that_of_h_as_it_is_written() {
+    for h in ["-x", "-2*x", "-(x)", "0 - x", "x/(-3)"] {
+        let text = format!(
+            "states = ['x', 'y']\nstart = [0, -1]\nh = '{h}'\nplus = ['-y', '1']\n\
+                minus = ['y', '1']"
+        );
+        for (exit, want) in [(Exit::Plus, -2.0), (Exit::Minus, 2.0)] {
+            let options = Options { t_end: 3.0, exit, ..Options::default() };
+            let end = follow(&model(&text), &options, &mut |_| true).unwrap();
+            near(end.x[0], want, 1e-9);
+        }
+    }
+}
+
 /// x and z know nothing of each other.
 #[test]
 fn whole_parts_fall_while_another_surface_is_slid_upon() {

@@ -47,7 +47,8 @@ pub struct Arguments {
     /// Count crossings in which the plane's coordinate falls, not rises.
     #[arg(long, help_heading = "Orbit")]
     downward: bool,
-    /// Crossings per turn [default: as many as the settled motion shows].
+    /// Crossings, or periods, per turn [default: as many crossings as the settled motion shows; of
+    /// general systems 1].
     #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = "Orbit")]
     returns: Option<usize>,
     /// Time in which the motion settles before the search; 0: none [default: 200].
@@ -190,7 +191,9 @@ impl Arguments {
                     "--section says where an orbit closes; leave one of the two out",
                 ));
             }
-            (Some(period), _) if period.is_finite() && period > 0.0 => Return::Period(period),
+            (Some(period), _) if period.is_finite() && period > 0.0 => {
+                Return::Period(period * self.returns.unwrap_or(1) as f64)
+            }
             (Some(period), _) => {
                 return Err(CliError::Usage(format!("--period is {period}: give a time above 0")));
             }
@@ -210,6 +213,9 @@ impl Arguments {
                 )));
             }
         };
+        if self.returns == Some(0) {
+            return Err(CliError::Usage("--returns is 0: give 1 or more".into()));
+        }
         let settle = self.settle.unwrap_or(200.0);
         if !(settle.is_finite() && settle >= 0.0) {
             return Err(CliError::Usage(format!("--settle is {settle}: give a time 0 or more")));
