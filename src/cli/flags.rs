@@ -267,6 +267,10 @@ impl RunFlags {
     fn switch(&self) -> Switch {
         self.switch.unwrap_or_default()
     }
+    /// Whether the switch is the smoothed one.
+    pub fn is_smoothed(&self) -> bool {
+        self.switch() == Switch::Smoothed
+    }
     fn filippov(&self) -> bool {
         self.switch() == Switch::Filippov
     }
@@ -635,6 +639,13 @@ impl RunFlags {
                 plain(coordinate)
             }
         };
+        // The width of a general system's smoothed switch is its parameter.
+        let of_many = || {
+            let model = self.model_of_many_states().ok().flatten();
+            let own = self.described_system().ok();
+            model.is_some() && own.is_some_and(|s| s.parameter("eps").is_none())
+        };
+        let width = || self.eps_is_replaced(axes).or_else(|| named("eps").filter(|_| of_many()));
         let table: [(&'static str, bool, Option<String>); 19] = [
             ("--set", !self.set.is_empty(), set()),
             ("--reading", self.reading.is_some(), both()),
@@ -642,7 +653,7 @@ impl RunFlags {
             ("--beta", self.beta.is_some(), named("beta")),
             ("--v-plus", self.v_plus.is_some(), named("v_plus")),
             ("--v-minus", self.v_minus.is_some(), named("v_minus")),
-            ("--eps", self.eps.is_some(), self.eps_is_replaced(axes)),
+            ("--eps", self.eps.is_some(), width()),
             ("--sigma", self.sigma.is_some(), of(Coordinate::Sigma)),
             ("--eps-prime", self.eps_prime.is_some(), of(Coordinate::EpsPrime)),
             ("--start", self.start.is_some(), all_started()),

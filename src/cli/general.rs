@@ -49,11 +49,18 @@ pub fn run_of(flags: &RunFlags) -> Result<Option<GeneralRun>, CliError> {
         },
     };
     let recording = ["--chord", "--every"];
+    let chooses = ["--exit", "--intersection"];
+    let smoothed = of_many_states && flags.is_smoothed();
     let works = |f: &&str| {
-        WORK.contains(f) || recording.contains(f) || (of_many_states && SWITCH.contains(f))
+        (WORK.contains(f) && !(smoothed && chooses.contains(f)))
+            || recording.contains(f)
+            || (of_many_states && SWITCH.contains(f))
     };
     if let Some(flag) = flags.given().into_iter().find(|f| !works(f)) {
         let why = match flag {
+            _ if smoothed && chooses.contains(&flag) => {
+                "it belongs to the discontinuous system; leave it out, or use --switch filippov"
+            }
             _ if of_many_states => {
                 "it belongs to systems of up to four states, or to those with one switching \
                     surface; leave it out"

@@ -1047,8 +1047,16 @@ fn systems_of_many_states_are_general_ones() {
         (&["--switch", "relay", "--band", "0.1"][..], "only systems of up to four states"),
         (&["--switch", "filippov", "--eps", "0.1"], "--eps has no effect"),
         (&["--kick-every", "1"], "belongs to systems of up to four states"),
+        (&["--exit", "at-once:plus"], "belongs to the discontinuous system"),
         (&["--method", "lsoda"], "general systems are followed by dopri5"),
     ] {
         refused(at, &[&["run"][..], &of, flags].concat(), 2, &[expected]);
     }
+    let over = ["scan", "--eps", "0.1", "--over", "params.eps=0.1,0.2", "--section", "y=0"];
+    refused(at, &[&over[..], &of].concat(), 2, &["params.eps"]);
+    let named = "states = ['a', 'b', 'c', 'd', 'min']\nh = 'a'\nplus = ['1', '1', '1', '1', '1']\n\
+        minus = ['1', '1', '1', '1', '1']\nstart = [1, 1, 1, 1, 1]\n";
+    fs::write(at.join("named.toml"), named).unwrap();
+    let of = ["run", "--system", "named.toml"];
+    refused(at, &of, 2, &["`min` has a meaning of its own", "of more than 4 states"]);
 }

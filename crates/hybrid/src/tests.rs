@@ -562,8 +562,8 @@ fn ends_of_a_clip_are_not_exchanged() {
     }
 }
 
-/// The speeds on both sides of the surface vanish together where sliding ends, and the mixture there
-/// is 0/0; and a mixture that cancels to rounding takes no steps.
+/// The speeds on both sides of the surface vanish together where sliding ends, and the mixture is
+/// 0/0 there; and a mixture that cancels to rounding takes no steps.
 #[test]
 fn sliding_is_followed_to_where_both_speeds_vanish() {
     let vanishing = model("states = ['x', 'y']\nstart = [0, -1]\nf = ['y*sign(x)', '1']");
@@ -600,8 +600,8 @@ fn sliding_is_followed_to_where_both_speeds_vanish() {
     }
 }
 
-/// What jumps exactly to the number that it is compared with is compared with that number, and a
-/// whole number that only jumps is its own whole part.
+/// A function that jumps exactly to the number that it is compared with is compared with that
+/// number, and a whole number that only jumps is its own whole part.
 #[test]
 fn comparisons_see_what_jumps_to_equality() {
     let third = 1.0 / 3.0;

@@ -81,8 +81,13 @@ pub fn model_with(system: &System, switch: SwitchSpec) -> Result<Model, JobError
         }
     }
     let text = Value::Object(file).to_string();
-    let definition =
-        Definition::from_json(&text, name).map_err(|e| HybridError::Bad(e.to_string()))?;
+    let definition = Definition::from_json(&text, name).map_err(|e| {
+        let help = e.help.map(|help| format!("; {help}")).unwrap_or_default();
+        refused(format!(
+            "{name}: {}{help} (of more than {MOST_STATES} states it is read as a general system)",
+            e.message
+        ))
+    })?;
     Ok(Model::new(definition))
 }
 
