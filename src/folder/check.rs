@@ -484,7 +484,7 @@ impl Claim {
             }
             let [low, high] = wilson(hits, rule.starts, 0.95);
             found += &format!(
-                "; so in {hits} of {} runs ({:.0} to {:.0} %)",
+                "; the claim holds in {hits} of {} runs ({:.0} to {:.0} %)",
                 rule.starts,
                 100.0 * low,
                 100.0 * high
@@ -620,22 +620,30 @@ impl Read {
                     None => answer.tables.first().ok_or("the answer has no table")?,
                 };
                 let values = crate::paper::plots::column(table, column)?;
-                let sum = || values.iter().sum::<f64>() / values.len() as f64;
-                let (low, high) = values
+                // Blank cells are no numbers.
+                let numbers: Vec<f64> = values.iter().copied().filter(|v| !v.is_nan()).collect();
+                let (low, high) = numbers
                     .iter()
                     .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
-                if values.is_empty() && *take != Take::Count {
-                    return Err(format!("column \"{column}\" has no rows"));
-                }
-                Ok(match take {
+                let taken = match take {
+                    Take::Count => values.len() as f64,
+                    _ if values.is_empty() => {
+                        return Err(format!("column \"{column}\" has no rows"));
+                    }
+                    _ if numbers.is_empty() => {
+                        return Err(format!("column \"{column}\" is blank in every row"));
+                    }
                     Take::Last => values[values.len() - 1],
                     Take::First => values[0],
                     Take::Max => high,
                     Take::Min => low,
-                    Take::Mean => sum(),
+                    Take::Mean => numbers.iter().sum::<f64>() / numbers.len() as f64,
                     Take::Span => high - low,
-                    Take::Count => values.len() as f64,
-                })
+                };
+                if taken.is_nan() {
+                    return Err(format!("column \"{column}\" is blank in that row"));
+                }
+                Ok(taken)
             }
         }
     }
@@ -681,7 +689,7 @@ impl Check {
                 Ok((holds, format!("{}, {word} {}", short(value), short(than))))
             }
             Check::Period { is, within } => {
-                let found = period(&section(first)?, *within);
+                let found = period(&section(first, None)?.0, *within);
                 let said = found.map_or("no period up to 64".to_owned(), |n| format!("period {n}"));
                 Ok((found == Some(*is as usize), said))
             }
@@ -693,9 +701,10 @@ impl Check {
                 ))
             }
             Check::Attractors { same, within } => {
-                let a = section(first).map_err(|e| format!("`of`: {e}"))?;
-                let b =
-                    section(answers.last().unwrap_or(first)).map_err(|e| format!("`and`: {e}"))?;
+                // Both by crossings in one direction, that of the first.
+                let (a, direction) = section(first, None).map_err(|e| format!("`of`: {e}"))?;
+                let (b, _) = section(answers.last().unwrap_or(first), direction)
+                    .map_err(|e| format!("`and`: {e}"))?;
                 let distance = apart(&a, &b)?;
                 let alike = distance <= *within;
                 let word = if alike { "the same attractor" } else { "different attractors" };
@@ -750,14 +759,20 @@ fn largest_exponent(answer: &Answer) -> Result<(f64, f64), String> {
         let first = all.first().ok_or("there is no exponent")?;
         return Ok((first.value.unwrap_or(f64::NEG_INFINITY), first.half_width));
     }
-    let value: f64 = answer.fact("exponent").map_err(|e| no(&e))?;
+    // Of the largest alone, with its error and duration, or a number.
+    let exponent: Value = answer.fact("exponent").map_err(|e| no(&e))?;
+    let value = exponent.get("value").unwrap_or(&exponent).as_f64();
+    let value = value.ok_or_else(|| no(&format!("it is {exponent}")))?;
     let half: f64 = answer.fact("half_width").map_err(|e| no(&e))?;
     Ok((value, half))
 }
 
-/// The later half of a section's crossings, by rows, one direction of crossing alone if the section
-/// knows it.
-fn section(answer: &Answer) -> Result<Vec<Vec<f64>>, String> {
+/// The later half of a section's crossings, by rows, and their direction: `direction`, or that of
+/// the first of all if the section knows it.
+fn section<'a>(
+    answer: &'a Answer,
+    direction: Option<&'a str>,
+) -> Result<(Vec<Vec<f64>>, Option<&'a str>), String> {
     let table = answer
         .table("section")
         .ok_or("the run has no section; give section, such as section = \"y=0\"")?;
@@ -768,13 +783,13 @@ fn section(answer: &Answer) -> Result<Vec<Vec<f64>>, String> {
     let half = 0.5 * (first + last);
     let columns: Vec<&[f64]> = states(table);
     let directions: Vec<&str> = table.words("direction").collect();
-    let wanted = directions.first().copied();
+    let wanted = direction.or(directions.first().copied());
     let rows = (0..t.len()).filter(|i| t[*i] > half && directions.get(*i).copied() == wanted);
     let found: Vec<Vec<f64>> = rows.map(|i| columns.iter().map(|c| c[i]).collect()).collect();
     if found.is_empty() {
         Err("the section was never crossed in the later half".into())
     } else {
-        Ok(found)
+        Ok((found, wanted))
     }
 }
 
@@ -782,6 +797,9 @@ fn states(table: &Table) -> Vec<&[f64]> {
     let names = table.columns.iter().map(|c| c.name.as_str()).filter(|n| *n != "t");
     names.map(|n| table.numbers(n)).filter(|v| v.len() == table.len()).collect()
 }
+
+/// Points that lie within this part of their size are one.
+const ONE_POINT: f64 = 1e-6;
 
 /// The largest extent of points along a state.
 fn extent(points: &[Vec<f64>]) -> f64 {
@@ -794,8 +812,8 @@ fn extent(points: &[Vec<f64>]) -> f64 {
     let (span, size) = (0..points[0].len())
         .map(along)
         .fold((0.0, 0.0), |(a, b), (c, d)| (f64::max(a, c), f64::max(b, d)));
-    // One point: its own size.
-    if span > 1e-9 * size { span } else { size.max(f64::MIN_POSITIVE) }
+    // One point, to the errors of a run: its own size.
+    if span > ONE_POINT * size { span } else { size.max(f64::MIN_POSITIVE) }
 }
 
 fn distance(a: &[f64], b: &[f64]) -> f64 {
@@ -879,5 +897,41 @@ mod tests {
             [Take::Last, Take::First, Take::Max, Take::Min, Take::Mean, Take::Span, Take::Count]
                 .map(column);
         assert_eq!(found, [2.0, 3.0, 3.0, 1.0, 2.0, 2.0, 3.0]);
+    }
+
+    #[test]
+    fn blank_cells_are_no_numbers() {
+        let read = |cells: &[f64], take| {
+            let mut table = Table::new("path", vec![crate::job::Column::numbers("p")]);
+            cells.iter().for_each(|v| table.push(vec![crate::job::Entry::Number(*v)]));
+            Read::Column { table: None, column: "p".into(), take }
+                .of(&Answer::of_tables(vec![table]))
+        };
+        for take in [Take::Last, Take::First, Take::Max, Take::Min, Take::Mean, Take::Span] {
+            assert!(read(&[f64::NAN; 2], take).unwrap_err().contains("blank in every row"));
+        }
+        assert_eq!(read(&[1.0, f64::NAN, 3.0], Take::Mean), Ok(2.0));
+        assert_eq!(read(&[1.0, f64::NAN, 3.0], Take::Last), Ok(3.0));
+        assert!(read(&[1.0, f64::NAN], Take::Last).unwrap_err().contains("blank in that row"));
+    }
+
+    /// Crossings that differ by the errors of a run are one point.
+    #[test]
+    fn errors_of_a_run_are_no_extent() {
+        let noisy = |seed: usize| -> Vec<Vec<f64>> {
+            (0..30).map(|i| vec![1.0, 0.3 + 1e-8 * ((i * 7 + seed) % 5) as f64]).collect()
+        };
+        assert_eq!(period(&noisy(0), 1e-3), Some(1));
+        assert!(apart(&noisy(0), &noisy(3)).unwrap() < 1e-6);
+    }
+
+    #[test]
+    fn the_largest_exponent_alone_is_read_too() {
+        let alone = Answer::of_tables(Vec::new())
+            .with_fact("exponent", &serde_json::json!({ "value": 0.3, "duration": 9.0 }))
+            .with_fact("half_width", &0.1);
+        assert_eq!(largest_exponent(&alone), Ok((0.3, 0.1)));
+        let none = Answer::of_tables(Vec::new()).with_fact("exponent", &"none");
+        assert!(largest_exponent(&none).is_err());
     }
 }

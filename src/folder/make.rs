@@ -174,6 +174,9 @@ impl Folder {
                 }
             }
         }
+        findings.extend(
+            self.figures_gone()?.into_iter().map(|name| Finding { name, state: State::Gone }),
+        );
         let before = self.outcomes()?;
         for Scored { claim, verdict } in &made.claims {
             let old = before.verdicts.iter().find(|v| v.claim == claim.id);
@@ -201,6 +204,26 @@ impl Folder {
             }
         }
         Ok(findings)
+    }
+
+    /// Figures of which a manifest is expected, and of which the folder has no file.
+    fn figures_gone(&self) -> Result<Vec<String>, CliError> {
+        let expected = self.expected();
+        if !expected.exists() {
+            return Ok(Vec::new());
+        }
+        let wanted = |path: &str| path.ends_with(".json") && path != "claims.json";
+        let mut gone = Vec::new();
+        for file in record::read_tree(&expected, &wanted)?.files {
+            let name = file.path.trim_end_matches(".json").to_owned();
+            // Another file was not written by this program.
+            let text = String::from_utf8_lossy(&file.bytes);
+            let own = Manifest::parse(&text, &name).is_ok_and(|m| m.figure == name);
+            if own && !self.figures.iter().any(|f| f.id == name) {
+                gone.push(name);
+            }
+        }
+        Ok(gone)
     }
 
     /// Makes the current results the expectation, and records the reason. Returns the changes;
@@ -245,6 +268,9 @@ impl Folder {
                 &self.expected().join(format!("{}.json", figure.id)),
                 &manifest.to_json(),
             )?;
+        }
+        for name in self.figures_gone()? {
+            record::files::remove(&self.expected().join(format!("{name}.json")))?;
         }
         let mut json =
             serde_json::to_vec_pretty(&made.outcomes()).expect("verdicts are plain data");

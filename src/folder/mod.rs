@@ -39,7 +39,7 @@ use crate::paper::{Camera, Figure, FigurePanel, Picture, Reading, Repeats, View}
 use crate::record::FileError;
 use crate::record::files::read_text;
 use crate::record::manifest::is_plain_name;
-use crate::record::read_tree;
+use crate::record::{first_link, read_tree};
 use crate::system::Diagnostic;
 use crate::system::diagnostic::nearest;
 
@@ -398,6 +398,12 @@ impl Folder {
     /// # Errors
     /// The first problem, with its file, place and remedy.
     pub fn read(root: &Path) -> Result<Self, FolderError> {
+        if let Some(link) = first_link(root)? {
+            return Err(FolderError::Missing(format!(
+                "{}: a link, which may lead out of the paper's folder; put the file itself there",
+                link.display()
+            )));
+        }
         Self::read_from(root, Files::Disk(root.to_owned()))
     }
 

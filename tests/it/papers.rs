@@ -385,10 +385,36 @@ fn a_system_behind_a_link_is_refused() {
     fs::rename(root.join("systems/relay.toml"), &outside).unwrap();
     std::os::unix::fs::symlink(&outside, root.join("systems/relay.toml")).unwrap();
     let (code, _, error) = paper(&["make", "--quiet"], &root);
-    assert!(code == 2 && error.contains("does not lie in this folder"), "{error}");
+    assert!(code == 2 && error.contains("a link, which may lead out"), "{error}");
 }
 
 /// Words of a paper reach its page as text.
+/// A figure whose file was taken away is missed, and a link in `out` is not written through.
+#[test]
+fn what_is_expected_and_gone_is_missed_and_links_are_refused() {
+    let place = small();
+    let root = place.path().join("p");
+    fs::copy(root.join("figures/fig1.toml"), root.join("figures/fig2.toml")).unwrap();
+    assert_eq!(paper(&["bless", "--reason", "first", "--quiet"], &root).0, 0);
+    fs::remove_file(root.join("figures/fig2.toml")).unwrap();
+    let (code, out, _) = paper(&["check", "--quiet"], &root);
+    assert!(code == 1 && out.contains("fig2: GONE"), "{out}");
+    let (code, out, _) = paper(&["bless", "--reason", "gone", "--quiet"], &root);
+    assert!(code == 0 && out.contains("fig2 (gone)"), "{out}");
+    assert!(!root.join("expected/fig2.json").exists());
+    assert_eq!(paper(&["check", "--quiet"], &root).0, 0);
+    #[cfg(unix)]
+    {
+        let foreign = place.path().join("foreign");
+        fs::write(&foreign, "kept").unwrap();
+        fs::remove_file(root.join("out/fig1/fig1.svg")).unwrap();
+        std::os::unix::fs::symlink(&foreign, root.join("out/fig1/fig1.svg")).unwrap();
+        let (code, _, said) = paper(&["make", "--quiet"], &root);
+        assert!(code == 2 && said.contains("out/fig1/fig1.svg: a link"), "{said}");
+        assert_eq!(fs::read_to_string(foreign).unwrap(), "kept");
+    }
+}
+
 #[test]
 fn hostile_words_are_shown_as_they_are() {
     let place = small();

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
@@ -53,6 +53,40 @@ pub fn read_tree(folder: &Path, wanted: &dyn Fn(&str) -> bool) -> Result<Tree, F
     let read = |path: String, file: &Path| Ok(FileBytes { bytes: files::read(file)?, path });
     let (files, dangling) = visit_tree(folder, wanted, &read)?;
     Ok(Tree { files, dangling })
+}
+
+/// The first symbolic link in `folder`, at any depth; none if there is no such folder. Git's own
+/// folder is passed over.
+///
+/// # Errors
+/// If a folder in it cannot be read.
+pub fn first_link(folder: &Path) -> Result<Option<PathBuf>, FileError> {
+    let cannot = |path: &Path, source: io::Error| FileError {
+        action: "read",
+        path: path.to_owned(),
+        source,
+    };
+    let mut open = vec![folder.to_owned()];
+    while let Some(folder) = open.pop() {
+        if !folder.is_dir() {
+            continue;
+        }
+        let entries: Result<Vec<_>, _> =
+            fs::read_dir(&folder).and_then(Iterator::collect).map_err(|e| cannot(&folder, e));
+        let mut entries: Vec<fs::DirEntry> = entries?;
+        entries.sort_by_key(fs::DirEntry::path);
+        for entry in entries.into_iter().filter(|e| e.file_name() != ".git") {
+            let path = entry.path();
+            let kind = entry.file_type().map_err(|e| cannot(&path, e))?;
+            if kind.is_symlink() {
+                return Ok(Some(path));
+            }
+            if kind.is_dir() {
+                open.push(path);
+            }
+        }
+    }
+    Ok(None)
 }
 
 /// Calls `visit` for every file that [`read_tree`] reads, several in parallel, with its path inside

@@ -241,8 +241,8 @@ impl Coordinate {
             other => {
                 return Err(format!(
                     "{other} belongs to systems with h, plus and minus in up to four states; of a \
-                        general system vary params.NAME, start.NAME, shift.NAME, rtol, atol, tolerance, max-step, \
-                        t-end or method"
+                        general system vary params.NAME, start.NAME, shift.NAME, rtol, atol, \
+                        tolerance, max-step, t-end or method"
                 ));
             }
         }
