@@ -819,15 +819,31 @@ impl Folder {
         }
         let text =
             self.files.text(file)?.ok_or_else(|| wrong(format!("there is no file `{file}`")))?;
-        let rows =
-            text.lines().map(str::trim).filter(|l| !l.is_empty() && !l.starts_with('#')).skip(1);
-        let mut found = Vec::new();
-        for row in rows {
-            let mut numbers = row.split(',').map(|n| n.trim().parse::<f64>());
+        let mut rows = text
+            .lines()
+            .enumerate()
+            .map(|(i, line)| (i + 1, line.trim()))
+            .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
+        let pair = |row: &str| {
+            let mut numbers = row.split(',').map(|n| n.trim().trim_matches('"').parse::<f64>());
             match (numbers.next(), numbers.next()) {
-                (Some(Ok(x)), Some(Ok(y))) if x.is_finite() && y.is_finite() => found.push([x, y]),
-                _ => return Err(wrong(format!("{file}: `{row}` is not two numbers"))),
+                (Some(Ok(x)), Some(Ok(y))) if x.is_finite() && y.is_finite() => Some([x, y]),
+                _ => None,
             }
+        };
+        if rows.next().is_some_and(|(_, row)| pair(row).is_some()) {
+            let why = "its first line is two numbers: give a line of column names before it";
+            return Err(wrong(format!("{file}: {why}")));
+        }
+        let mut found = Vec::new();
+        for (line, row) in rows {
+            let point = pair(row);
+            found.push(point.ok_or_else(|| {
+                wrong(format!("{file}, line {line}: `{row}` is not two numbers"))
+            })?);
+        }
+        if found.is_empty() {
+            return Err(wrong(format!("{file} has no points below its column names")));
         }
         Ok(Points { name: name.clone(), points: found })
     }

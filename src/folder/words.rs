@@ -104,10 +104,13 @@ fn texts(key: &str, value: &Value) -> Result<Vec<String>, String> {
     }
 }
 
-/// A later word replaces an earlier one; parameters (`set`) add up.
+/// A later word replaces an earlier one; parameters (`set`) add up, each with its last value.
 fn add(flags: &mut Vec<Flag>, flag: Flag) {
     match flags.iter_mut().find(|f| f.name == flag.name) {
         Some(old) if REPEATED.contains(&flag.name.as_str()) => {
+            let name = |text: &str| text.split('=').next().unwrap_or_default().trim().to_owned();
+            let again = |old: &str| flag.values.iter().any(|new| name(new) == name(old));
+            old.values.retain(|value| !again(value));
             old.values.extend(flag.values);
             old.place = flag.place;
         }

@@ -389,6 +389,34 @@ fn a_system_behind_a_link_is_refused() {
 }
 
 /// Words of a paper reach its page as text.
+/// A later place gives a parameter another value; a file of points has names above them.
+#[test]
+fn a_panel_sets_a_parameter_again_and_points_have_a_header() {
+    let place = small();
+    let root = place.path().join("p");
+    let folder = || twofold::folder::Folder::read(&root);
+    // Panel b sets it to 0.1.
+    change(&root, "paper.toml", "rtol = 1e-9", "rtol = 1e-9\nset = { w = 0.3 }");
+    assert_eq!(folder().err().map(|e| e.to_string()), None);
+    let again = fs::read_to_string(root.join("figures/fig1.toml")).unwrap();
+    fs::create_dir(root.join("data")).unwrap();
+    let points = "\npoints = { name = \"paper\", file = \"data/p.csv\" }\n";
+    fs::write(root.join("figures/fig1.toml"), again + points).unwrap();
+    for (text, wanted) in [
+        ("t,x\n3,0.05\n", None),
+        ("3,0.05\n6,0.1\n", Some("its first line is two numbers")),
+        ("t,x\n3,0.05\n6,?\n", Some("line 3: `6,?` is not two numbers")),
+        ("t,x\n", Some("has no points")),
+    ] {
+        fs::write(root.join("data/p.csv"), text).unwrap();
+        let said = folder().err().map(|e| e.to_string());
+        match wanted {
+            None => assert_eq!(said, None),
+            Some(words) => assert!(said.as_ref().is_some_and(|s| s.contains(words)), "{said:?}"),
+        }
+    }
+}
+
 /// A figure whose file was taken away is missed, and a link in `out` is not written through.
 #[test]
 fn what_is_expected_and_gone_is_missed_and_links_are_refused() {

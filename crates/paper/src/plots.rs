@@ -190,6 +190,9 @@ impl Plot {
         if let (Some(points), Some(Content::Plane(plane))) =
             (&self.points, sheet.panels.first_mut().map(|p| &mut p.content))
         {
+            // A number of the paper that lies far from ours is seen.
+            plane.x.reach(points.points.iter().map(|p| p[0]));
+            plane.y.reach(points.points.iter().map(|p| p[1]));
             *plane = std::mem::replace(
                 plane,
                 PlanePanel::new(Axis::linear("", 0.0, 1.0), Axis::linear("", 0.0, 1.0)),

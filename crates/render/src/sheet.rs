@@ -205,6 +205,20 @@ impl Axis {
         Self::linear(title, lower - margin, upper + margin)
     }
 
+    /// Makes the axis reach these finite values, too, with a margin beyond those outside.
+    pub fn reach(&mut self, values: impl IntoIterator<Item = f64>) {
+        let shown = |v: &f64| v.is_finite() && (*v > 0.0 || !self.logarithmic);
+        let values = values.into_iter().filter(shown).chain([self.lower, self.upper]);
+        let (lower, upper) = range_of(values);
+        let margin = 0.04 * (upper - lower);
+        if lower < self.lower {
+            self.lower = if self.logarithmic { lower / 1.6 } else { lower - margin };
+        }
+        if upper > self.upper {
+            self.upper = if self.logarithmic { upper * 1.6 } else { upper + margin };
+        }
+    }
+
     /// A logarithmic axis that covers all positive finite `values`, with a margin.
     pub fn log_covering(title: impl Into<String>, values: impl IntoIterator<Item = f64>) -> Self {
         let (lower, upper) = range_of(values.into_iter().filter(|v| *v > 0.0));
