@@ -446,7 +446,7 @@ fn wrong_files_and_flags_are_refused() {
     for (axis, words) in [
         (
             "eps=1,2",
-            "eps belongs to systems with h, plus and minus; of a general system vary params.NAME",
+            "eps belongs to systems with h, plus and minus in up to four states; of a general",
         ),
         ("params.q=1,2", "no parameter `q`"),
         ("start.z=1,2", "no state z; it has x, v"),

@@ -664,6 +664,50 @@ fn whole_parts_fall_while_another_surface_is_slid_upon() {
     }
 }
 
+/// An event ends at its mode, and with it the contact; and a body that is struck into the surface
+/// that it rests on leaves it by the event's law.
+#[test]
+fn contacts_end_with_their_mode_and_by_a_blow() {
+    let ball = "states = ['x', 'v']\nstart = [1, 0]\n[modes.closed]\nf = ['v', '-1']\n\
+        [modes.open]\nf = ['v', '-1']\n[[event]]\nfrom = 'closed'\nwhen = 'x'\n\
+        direction = 'down'\nset = { v = '-0.5*v' }\nafter_zeno = 'stick'\n[[event]]\nat = 5\n";
+    for method in [Method::Dopri5, Method::Radau5, Method::Taylor] {
+        let end = |change: &str, t_end| {
+            let options = Options { t_end, method, ..Options::default() };
+            follow(&model(&format!("{ball}{change}")), &options, &mut |_| true).unwrap().x
+        };
+        near(end("mode = 'open'", 6.0)[0], -0.5, 1e-9);
+        near(end("set = { v = -1 }", 5.5)[0], 0.125, 1e-9);
+        near(end("set = { v = 1 }", 5.5)[0], 0.375, 1e-9);
+    }
+}
+
+/// Integrators with limits, and forces that vanish: the speeds on both sides of what is slid upon
+/// vanish, and what is met at that moment decides.
+#[test]
+fn sliding_ends_where_another_function_decides() {
+    let limited = "if((i >= 1 and 2*cos(t) > 0) or (i <= -1 and 2*cos(t) < 0), 0, 2*cos(t))";
+    let rectified = "if(i > 0, sin(t) - 0.2*i, max(sin(t), 0))";
+    // i' = sin(tau) - i/5 from zero.
+    let tau = 7.0 - 2.0 * std::f64::consts::PI;
+    let charged = (0.2 * tau.sin() - tau.cos() + (-0.2 * tau).exp()) / 1.04;
+    for (f, start, want, by_all) in [
+        ("if(i > 0, t - 1, max(t - 1, 0))", 0.3, 18.0, true),
+        ("-sign(i)*max(1 - t, 0)", 0.3, 0.0, true),
+        (limited, 0.3, 1.0, false),
+        (rectified, 0.0, charged, false),
+    ] {
+        let model = model(&format!("states = ['i']\nstart = [{start}]\nf = ['{f}']"));
+        for method in [Method::Dopri5, Method::Radau5, Method::Taylor] {
+            let options = Options { t_end: 7.0, method, ..Options::default() };
+            match follow(&model, &options, &mut |_| true) {
+                Ok(outcome) => near(outcome.x[0], want, 1e-8),
+                Err(error) => assert!(!by_all && method != Method::Dopri5, "{f}: {error}"),
+            }
+        }
+    }
+}
+
 /// A ball that has come to rest at t = 4.24 is lifted from t = 8 on, by a force that jumps there.
 #[test]
 fn contacts_open_where_a_force_jumps() {

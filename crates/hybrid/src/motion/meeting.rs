@@ -45,8 +45,8 @@ impl Follower<'_> {
                 Sought::Release(place) => opened.push(self.contacts[place]),
             }
         }
-        // Events that happen at this moment come first.
-        if ceases && fired.is_empty() {
+        // Events that happen at this moment come first, and others that are met decide, too.
+        if ceases && fired.is_empty() && crossed.is_empty() {
             let slid = self.sliding.clone();
             match self.options.exit {
                 _ if slid.len() > 1 => return Err(self.ceases_to_be_the_only_motion()),
@@ -103,7 +103,11 @@ impl Follower<'_> {
         if !crossed.is_empty() {
             self.outcome.switches += 1;
             let sides = self.config.sides.clone();
-            self.settle(&zero)?;
+            if ceases {
+                self.decide(&zero, &vec![false; self.slides.len()])?;
+            } else {
+                self.settle(&zero)?;
+            }
             let jumped =
                 |guard: &usize| !zero.contains(guard) && sides[*guard] != self.config.sides[*guard];
             if !self.sliding.is_empty() && self.compiled.active.iter().any(jumped) {
@@ -280,7 +284,7 @@ impl Follower<'_> {
             if mode.is_some() || !self.equation.guards.is_empty() {
                 self.settle_afresh(&zero)?;
             }
-            self.keep_contacts(&old);
+            let struck = self.keep_contacts(definition, &old);
             for i in 0..self.watch_side.len() {
                 if !self.contacts.iter().any(|c| c.watched == i) {
                     self.begin_watching(i, watched.contains(&i));
@@ -308,6 +312,7 @@ impl Follower<'_> {
                 }
             }
             newly = self.new_conditions(definition);
+            newly.extend(struck);
             let setting = fired.iter().rev().find(|i| !definition.events()[**i].set.is_empty());
             let name = &definition.events()[*setting.unwrap_or(&fired[fired.len() - 1])].name;
             if !quiet && !self.emit(self.t, Some(name), observe) {
@@ -386,14 +391,17 @@ impl Follower<'_> {
         }
     }
 
-    /// After a reset of the state `old`: contacts whose expressions it leaves alone rest on.
-    fn keep_contacts(&mut self, old: &[f64]) {
+    /// Keeps the contacts that a reset or a new mode leaves at rest. Returns the events of those
+    /// that a reset strikes into their surfaces, which happen at once.
+    fn keep_contacts(&mut self, definition: &crate::Definition, old: &[f64]) -> Vec<usize> {
         if self.contacts.is_empty() {
-            return;
+            return Vec::new();
         }
         let config = self.config.clone();
         let (compiled, rates) = self.rates(&config);
         let contacts = std::mem::take(&mut self.contacts);
+        let mode = self.config.mode;
+        let holds = |c: &Contact| definition.events()[c.event].from.is_none_or(|m| m == mode);
         let rests = |c: &Contact| {
             let e = &self.equation.watched[c.watched];
             let change =
@@ -402,8 +410,16 @@ impl Follower<'_> {
             change.abs() <= 1e-12 * self.magnitude(e)
                 && rates.first[place].abs() <= 1e-9 * rates.terms[place]
         };
-        let (kept, _): (Vec<Contact>, Vec<Contact>) = contacts.into_iter().partition(|c| rests(c));
+        let (kept, ended): (Vec<Contact>, Vec<Contact>) =
+            contacts.into_iter().partition(|c| holds(c) && rests(c));
+        let struck = |c: &&Contact| {
+            let e = &self.equation.watched[c.watched];
+            let on = self.equation.value(e, self.t, &self.x).abs() <= 1e-12 * self.magnitude(e);
+            holds(c) && on && rates.first[compiled.active.len() + c.watched] * c.above < 0.0
+        };
+        let struck = ended.iter().filter(struck).map(|c| c.event).collect();
         self.contacts = kept;
+        struck
     }
 
     /// Puts motion at rest on an event's surface from `t` on; false if the set state does not move

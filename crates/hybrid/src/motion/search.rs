@@ -642,10 +642,17 @@ impl Follower<'_> {
             self.x.iter_mut().zip(&gradient).for_each(|(x, g)| *x -= off * g / size);
         }
         self.outcome.switches += 1;
-        let mut zero = self.sliding.clone();
+        let (before, slid) = (self.config.clone(), self.sliding.clone());
+        let mut zero = slid.clone();
         zero.push(guard);
         self.settle(&zero)?;
-        Ok(true)
+        let x = self.x.clone();
+        self.rhs(self.t, &x, &mut field);
+        if !self.sliding.is_empty() && field.iter().any(|v| !v.is_finite()) {
+            // The speeds on both sides of what was slid upon vanish there, too.
+            self.decide(&zero, &vec![false; self.slides.len()])?;
+        }
+        Ok(self.t > t || self.config != before || self.sliding != slid)
     }
 
     /// A motion that comes to where a root's argument is zero in finite time, and makes it stay so
