@@ -475,11 +475,18 @@ impl Claim {
             answers.iter().map(|a| a.hash().as_str().to_owned()).collect();
         let mut odds = None;
         if let Some(rule) = &self.odds {
-            let mut hits = 0;
+            let (mut hits, mut failed) = (0, 0);
             for questions in self.repeated(folder).map_err(|e| JobError::Other(e.to_string()))? {
-                let answers = ask(&questions)?;
-                hits += u64::from(self.check.of(&answers).map_err(JobError::Other)?.0);
-                hashes.extend(answers.iter().map(|a| a.hash().as_str().to_owned()));
+                let judged = ask(&questions).and_then(|answers| {
+                    hashes.extend(answers.iter().map(|a| a.hash().as_str().to_owned()));
+                    self.check.of(&answers).map_err(JobError::Other)
+                });
+                match judged {
+                    Ok((holds, _)) => hits += u64::from(holds),
+                    Err(JobError::Interrupted) => return Err(JobError::Interrupted),
+                    // It does not hold of a run that cannot be scored.
+                    Err(_) => failed += 1,
+                }
                 executor.forget();
             }
             let [low, high] = wilson(hits, rule.starts, 0.95);
@@ -489,6 +496,9 @@ impl Claim {
                 100.0 * low,
                 100.0 * high
             );
+            if failed > 0 {
+                found += &format!(", {failed} of them cannot be scored and count as against it");
+            }
             if let Some(least) = rule.at_least {
                 agrees = low >= least;
             }

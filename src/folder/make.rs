@@ -188,6 +188,9 @@ impl Folder {
                         if now.rule_after_data { ", changed when the data were known" } else { "" };
                     State::Differs { what: format!("rule{known}") }
                 }
+                (Ok(now), Some(old)) if now.decided != old.decided => {
+                    State::Differs { what: "rule's date".into() }
+                }
                 (Ok(now), Some(old)) if now.agrees != old.agrees => {
                     State::Differs { what: format!("outcome: {}", now.found) }
                 }

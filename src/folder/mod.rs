@@ -364,7 +364,12 @@ impl Files {
         let mut names = Vec::new();
         for path in paths {
             let name = path.trim_end_matches(".toml").to_owned();
-            if !is_plain_name(&name) {
+            // The claims' expectations have this name.
+            if name == "claims" {
+                let why = format!("{part}/claims.toml: this name is the claims'; give another");
+                return Err(FolderError::Missing(why));
+            }
+            if !is_plain_name(&name) || name.contains('.') {
                 let why = format!(
                     "{part}/{}: no plain name; use letters, digits, - and _",
                     path.escape_debug()

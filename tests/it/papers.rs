@@ -98,6 +98,10 @@ fn a_rule_that_changes_after_its_data_is_said_to() {
     let place = small();
     let root = place.path().join("p");
     assert_eq!(paper(&["bless", "--reason", "first", "--quiet"], &root).0, 0);
+    change(&root, "claims.toml", "decided = 2026-11-26", "decided = 2001-01-01");
+    let (code, out, _) = paper(&["check", "--quiet"], &root);
+    assert!(code == 1 && out.contains("DIFFERS in its rule's date"), "{out}");
+    change(&root, "claims.toml", "decided = 2001-01-01", "decided = 2026-11-26");
     change(&root, "claims.toml", "within = 1e-6", "within = 1e-3");
     let (code, out, _) = paper(&["check", "--quiet"], &root);
     assert!(
@@ -196,6 +200,23 @@ fn a_check_has_odds_from_other_starts() {
     // deviations.
     assert!((7..=37).contains(&hits) && found["odds"][1] == 40, "{found}");
     assert_eq!(found["outcome"], "differs", "{found}");
+}
+
+/// From some starts the motion rests and has no period: the claim does not hold of them.
+#[test]
+fn a_start_that_cannot_be_scored_counts_against_a_claim() {
+    let place = small();
+    let root = place.path().join("p");
+    let odds = "within = 1e-6\nodds = { starts = 20, spread = 1 }";
+    change(&root, "claims.toml", "within = 1e-6", odds);
+    let (code, out, said) = paper(&["make", "--quiet", "--json"], &root);
+    assert_eq!(code, 0, "{said}");
+    let out: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let found = out["claims"].as_array().unwrap().iter().find(|c| c["claim"] == "period").unwrap();
+    let (hits, words) = (found["odds"][0].as_u64().unwrap(), found["found"].as_str().unwrap());
+    assert!(hits > 0 && hits < 20 && found["odds"][1] == 20, "{found}");
+    let against = format!("{} of them cannot be scored and count as against it", 20 - hits);
+    assert!(words.contains(&format!("holds in {hits} of 20")) && words.ends_with(&against));
 }
 
 /// The papers that ship give the pictures and outcomes that are kept with them.
