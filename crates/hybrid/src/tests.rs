@@ -722,6 +722,14 @@ fn contacts_open_where_a_force_jumps() {
             near(outcome.x[1], 1.0, 1e-9);
         }
     }
+    // The floor falls away from t = 6 on, faster than the ball.
+    let floor = "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-1']\n[[event]]\n\
+        when = 'x + 0.75*max(t - 6, 0)^2'\ndirection = 'down'\nset = { v = '-1.5*max(t - 6, 0) \
+        - 0.5*(v + 1.5*max(t - 6, 0))' }\nafter_zeno = 'stick'";
+    for method in [Method::Dopri5, Method::Radau5, Method::Taylor] {
+        let options = Options { t_end: 9.0, method, max_steps: 20_000, ..Options::default() };
+        near(follow(&model(floor), &options, &mut |_| true).unwrap().x[0], -4.5, 1e-9);
+    }
 }
 
 #[test]
