@@ -556,6 +556,8 @@ impl Folder {
                 let why = format!("there are two panels `{}`", label.get_ref());
                 return Err(FolderError::at(origin, label.span(), why, None));
             }
+            let others = figure.panel.iter().map(|p| p.get_ref().label.get_ref());
+            one_file(origin, label, "panel", others)?;
             panel.r#in.keys().try_for_each(|name| known(origin, name, readings))?;
             let Some(draw) = panel.draw.as_ref().or(figure.draw.as_ref()) else {
                 let help = "give draw, such as \"series\", in the panel or for the whole figure"
@@ -900,6 +902,7 @@ fn readings(origin: &Origin, about: &About) -> Result<Vec<Given>, FolderError> {
     let mut all = Vec::new();
     for (name, reading) in &about.readings {
         plain(origin, name, "reading")?;
+        one_file(origin, name, "reading", about.readings.keys().map(Spanned::get_ref))?;
         let mut words = vec![reading.run.clone()];
         let mut seen = vec![name.get_ref().as_str()];
         let mut at = reading;
@@ -928,6 +931,23 @@ fn readings(origin: &Origin, about: &About) -> Result<Vec<Given>, FolderError> {
         all.push(Given { name: name.get_ref().clone(), about: reading.about.clone(), words });
     }
     Ok(all)
+}
+
+/// Refuses a name that is another one's with an ending: their data would have files of one name,
+/// NAME-TABLE.csv.
+fn one_file<'a>(
+    origin: &Origin,
+    name: &Spanned<String>,
+    of: &str,
+    mut others: impl Iterator<Item = &'a String>,
+) -> Result<(), FolderError> {
+    let begins = |other: &&String| {
+        name.get_ref().strip_prefix(other.as_str()).is_some_and(|end| end.starts_with('-'))
+    };
+    let Some(other) = others.find(begins) else { return Ok(()) };
+    let why = format!("{of} `{}` begins with {of} `{other}` and -", name.get_ref());
+    let help = "their data would have files of one name; give it another".to_owned();
+    Err(FolderError::at(origin, name.span(), why, Some(help)))
 }
 
 /// Whether panels can stand in one picture of these kinds.

@@ -252,7 +252,7 @@ fn papers_that_ship_are_reproduced() {
 fn what_is_wrong_in_a_folder_is_said_with_its_place() {
     let reading = "[readings.a]\nabout = \"\"\nextends = \"b\"\n[readings.b]\nabout \
         = \"\"\nextends = \"a\"\n[run]";
-    let cases: [(&str, &str, &str, &[&str]); 25] = [
+    let cases: [(&str, &str, &str, &[&str]); 26] = [
         (
             "paper.toml",
             "rtol = 1e-9",
@@ -321,6 +321,12 @@ fn what_is_wrong_in_a_folder_is_said_with_its_place() {
             "systems/relay.toml",
             "systems/reley.toml",
             &["there is no system `systems/reley.toml`"],
+        ),
+        (
+            "figures/fig1.toml",
+            "label = \"b\"",
+            "label = \"a-events\"",
+            &["panel `a-events` begins with panel `a` and -", "files of one name"],
         ),
         (
             "claims.toml",
