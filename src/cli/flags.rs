@@ -958,6 +958,15 @@ impl RunFlags {
             Ok(system) if system.dimension() > MOST_STATES && self.spec.is_none() => system,
             _ => return Ok(None),
         };
+        for (flag, value) in [("--eps", self.eps), ("--sigma", self.sigma)] {
+            let least = if flag == "--eps" { 0.0 } else { f64::NEG_INFINITY };
+            if let Some(value) = value.filter(|v| !(v.is_finite() && *v > least)) {
+                let above = if flag == "--eps" { " above zero" } else { "" };
+                return Err(CliError::Usage(format!(
+                    "{flag} is {value}: give a finite number{above}"
+                )));
+            }
+        }
         let of_switch = |e: &&Effect| SWITCH.contains(&e.flag) && (e.given)(self);
         if let Some(idle) = EFFECTS.iter().filter(of_switch).find(|e| !(e.works)(self, Use::Any)) {
             return Err(CliError::no_effect(idle.flag, idle.why));

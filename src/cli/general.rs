@@ -62,8 +62,7 @@ pub fn run_of(flags: &RunFlags) -> Result<Option<GeneralRun>, CliError> {
                 "it belongs to the discontinuous system; leave it out, or use --switch filippov"
             }
             _ if of_many_states => {
-                "it belongs to systems of up to four states, or to those with one switching \
-                    surface; leave it out"
+                "it belongs to systems of up to four states, and this one has more; leave it out"
             }
             "--switch" => {
                 "a general system is followed exactly, from switch to switch; leave it out, or \
@@ -193,6 +192,11 @@ pub fn looked_at(flags: &RunFlags, period: Option<f64>) -> Result<Option<General
             return Err(usage(format!("--period is {period}: give a time above 0")));
         }
         (None, Record::Section(_)) => {}
+        // As of systems with h and fewer states.
+        (None, _) if flags.model_of_many_states()?.is_some() => {
+            let second = format!("{}=0", run.model.coordinates()[1]);
+            options.record = Record::Section(section(&second, &run.model)?);
+        }
         (None, _) => options.record = Record::Times { every: f64::INFINITY },
     }
     Ok(Some(run))

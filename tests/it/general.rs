@@ -1046,12 +1046,18 @@ fn systems_of_many_states_are_general_ones() {
     for (flags, expected) in [
         (&["--switch", "relay", "--band", "0.1"][..], "only systems of up to four states"),
         (&["--switch", "filippov", "--eps", "0.1"], "--eps has no effect"),
-        (&["--kick-every", "1"], "belongs to systems of up to four states"),
+        (&["--kick-every", "1"], "belongs to systems of up to four states, and this one has more"),
         (&["--exit", "at-once:plus"], "belongs to the discontinuous system"),
+        (&["--eps", "nan"], "--eps is NaN: give a finite number above zero"),
         (&["--method", "lsoda"], "general systems are followed by dopri5"),
     ] {
         refused(at, &[&["run"][..], &of, flags].concat(), 2, &[expected]);
     }
+    // Judged by the crossings of the second state's zero.
+    let sweep = ["sweep", "--quiet", "--over", "params.eps=0.1", "--t-end", "9", "--out", "s.csv"];
+    good(at, &[&sweep[..], &of].concat());
+    let text = fs::read_to_string(at.join("s.csv")).unwrap();
+    assert!(!text.contains("moving"), "{text}");
     let over = ["scan", "--eps", "0.1", "--over", "params.eps=0.1,0.2", "--section", "y=0"];
     refused(at, &[&over[..], &of].concat(), 2, &["params.eps"]);
     let named = "states = ['a', 'b', 'c', 'd', 'min']\nh = 'a'\nplus = ['1', '1', '1', '1', '1']\n\
