@@ -808,21 +808,29 @@ fn states(table: &Table) -> Vec<&[f64]> {
     names.map(|n| table.numbers(n)).filter(|v| v.len() == table.len()).collect()
 }
 
-/// Points that lie within this part of their size are one.
+/// Points that lie within this part of their size are one, to the errors of a run.
 const ONE_POINT: f64 = 1e-6;
 
-/// The largest extent of points along a state.
-fn extent(points: &[Vec<f64>]) -> f64 {
+/// The same to rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// The largest extent of points along a state, and the largest size of a state.
+fn span_and_size(points: &[Vec<f64>]) -> (f64, f64) {
     let along = |i: usize| {
         let (low, high) = points
             .iter()
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(p[i]), b.max(p[i])));
         (high - low, high.abs().max(low.abs()))
     };
-    let (span, size) = (0..points[0].len())
+    (0..points[0].len())
         .map(along)
-        .fold((0.0, 0.0), |(a, b), (c, d)| (f64::max(a, c), f64::max(b, d)));
-    // One point, to the errors of a run: its own size.
+        .fold((0.0, 0.0), |(a, b), (c, d)| (f64::max(a, c), f64::max(b, d)))
+}
+
+/// The length by which distances of points are measured.
+fn extent(points: &[Vec<f64>]) -> f64 {
+    let (span, size) = span_and_size(points);
+    // One point: its own size.
     if span > ONE_POINT * size { span } else { size.max(f64::MIN_POSITIVE) }
 }
 
@@ -832,10 +840,17 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
 
 /// After how many points a section repeats itself, if it does.
 fn period(points: &[Vec<f64>], within: f64) -> Option<usize> {
-    let near = within * extent(points);
+    let (span, size) = span_and_size(points);
     // At least three times around.
-    (1..=LONGEST.min(points.len() / 3))
-        .find(|n| points.iter().zip(&points[*n..]).all(|(a, b)| distance(a, b) <= near))
+    let repeats = |near: f64| {
+        (1..=LONGEST.min(points.len() / 3))
+            .find(|n| points.iter().zip(&points[*n..]).all(|(a, b)| distance(a, b) <= near))
+    };
+    if span <= ROUNDING * size {
+        return repeats(within * size);
+    }
+    // A small orbit that is resolved has its period; of a run's errors alone none repeats.
+    repeats(within * span).or_else(|| repeats(within * size).filter(|_| span <= ONE_POINT * size))
 }
 
 /// Hausdorff's distance of two sets of points, relative to their extent.
@@ -928,11 +943,16 @@ mod tests {
     /// Crossings that differ by the errors of a run are one point.
     #[test]
     fn errors_of_a_run_are_no_extent() {
-        let noisy = |seed: usize| -> Vec<Vec<f64>> {
-            (0..30).map(|i| vec![1.0, 0.3 + 1e-8 * ((i * 7 + seed) % 5) as f64]).collect()
+        let points = |noise: &dyn Fn(f64) -> f64| -> Vec<Vec<f64>> {
+            (0..30).map(|i| vec![1.0, 0.3 + noise(f64::from(i))]).collect()
         };
-        assert_eq!(period(&noisy(0), 1e-3), Some(1));
-        assert!(apart(&noisy(0), &noisy(3)).unwrap() < 1e-6);
+        let errors = points(&|i| 1e-8 * (i * i).sin());
+        assert_eq!(period(&errors, 1e-3), Some(1));
+        assert!(apart(&errors, &points(&|i| 1e-8 * (3.0 * i * i).cos())).unwrap() < 1e-6);
+        // Rounding that repeats is none, a small orbit that repeats is one.
+        assert_eq!(period(&points(&|i| 1e-16 * (i % 2.0)), 1e-3), Some(1));
+        assert_eq!(period(&points(&|i| 1e-7 * (i % 2.0)), 1e-3), Some(2));
+        assert_eq!(period(&points(&|i| 1e-5 * (i * i).sin()), 1e-3), None);
     }
 
     #[test]

@@ -340,7 +340,17 @@ impl Files {
         match self {
             Files::Disk(root) => {
                 let file = root.join(path);
-                Ok(if file.exists() { Some(read_text(&file)?) } else { None })
+                let (Ok(whole), Ok(found)) = (root.canonicalize(), file.canonicalize()) else {
+                    return Ok(None);
+                };
+                if !found.starts_with(whole) {
+                    return Err(FolderError::Missing(format!(
+                        "{}: a link that leads out of the paper's folder; put the file itself \
+                            there",
+                        file.display()
+                    )));
+                }
+                Ok(Some(read_text(&file)?))
             }
             Files::Embedded(all) => Ok(all.iter().find(|f| f.0 == path).map(|f| f.1.to_owned())),
         }
@@ -403,11 +413,14 @@ impl Folder {
     /// # Errors
     /// The first problem, with its file, place and remedy.
     pub fn read(root: &Path) -> Result<Self, FolderError> {
-        if let Some(link) = first_link(root)? {
-            return Err(FolderError::Missing(format!(
-                "{}: a link, which may lead out of the paper's folder; put the file itself there",
-                link.display()
-            )));
+        // Files there are written, and would be through a link.
+        for part in ["out", "expected"] {
+            if let Some(link) = first_link(&root.join(part))? {
+                return Err(FolderError::Missing(format!(
+                    "{}: a link, through which a foreign file could be written; remove it",
+                    link.display()
+                )));
+            }
         }
         Self::read_from(root, Files::Disk(root.to_owned()))
     }

@@ -412,7 +412,7 @@ fn a_system_behind_a_link_is_refused() {
     fs::rename(root.join("systems/relay.toml"), &outside).unwrap();
     std::os::unix::fs::symlink(&outside, root.join("systems/relay.toml")).unwrap();
     let (code, _, error) = paper(&["make", "--quiet"], &root);
-    assert!(code == 2 && error.contains("a link, which may lead out"), "{error}");
+    assert!(code == 2 && error.contains("does not lie in this folder"), "{error}");
 }
 
 /// Words of a paper reach its page as text.
@@ -466,7 +466,20 @@ fn what_is_expected_and_gone_is_missed_and_links_are_refused() {
         std::os::unix::fs::symlink(&foreign, root.join("out/fig1/fig1.svg")).unwrap();
         let (code, _, said) = paper(&["make", "--quiet"], &root);
         assert!(code == 2 && said.contains("out/fig1/fig1.svg: a link"), "{said}");
-        assert_eq!(fs::read_to_string(foreign).unwrap(), "kept");
+        assert_eq!(fs::read_to_string(&foreign).unwrap(), "kept");
+        fs::remove_dir_all(root.join("out")).unwrap();
+        fs::create_dir(place.path().join("elsewhere")).unwrap();
+        std::os::unix::fs::symlink(place.path().join("elsewhere"), root.join("out")).unwrap();
+        assert_eq!(paper(&["make", "--quiet"], &root).0, 2);
+        fs::remove_file(root.join("out")).unwrap();
+        // An environment of Python beside the paper's files is full of links.
+        fs::create_dir(root.join("venv")).unwrap();
+        std::os::unix::fs::symlink("/usr/bin/env", root.join("venv/python")).unwrap();
+        assert_eq!(paper(&["make", "--quiet"], &root).0, 0);
+        fs::rename(root.join("claims.toml"), &foreign).unwrap();
+        std::os::unix::fs::symlink(&foreign, root.join("claims.toml")).unwrap();
+        let (code, _, said) = paper(&["make", "--quiet"], &root);
+        assert!(code == 2 && said.contains("leads out of the paper's folder"), "{said}");
     }
 }
 

@@ -74,8 +74,8 @@ pub fn model_with(system: &System, switch: SwitchSpec) -> Result<Model, JobError
         }
         SwitchSpec::Hysteretic { .. } | SwitchSpec::Delayed { .. } | SwitchSpec::Relay { .. } => {
             return Err(refused(
-                "a switch with a state or a past of its own has up to four states; write it as \
-                    f, with a state or modes for the switch"
+                "a switch with a state or a past of its own is followed in up to four states; \
+                    write the system as f, with a state or modes for the switch"
                     .into(),
             ));
         }

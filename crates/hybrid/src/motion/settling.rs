@@ -249,9 +249,9 @@ impl Follower<'_> {
         let mut some = false;
         let stays = |follower: &mut Self, config: &Configuration, guard: usize| {
             let (compiled, rates) = follower.rates_with(config, &[guard]);
-            compiled.place(guard).is_some_and(|p| {
-                rates.stands_still(p) && follower.is_zero_a_little_later(config, guard)
-            })
+            compiled
+                .place(guard)
+                .is_some_and(|p| rates.stands_still(p) && follower.stays_a_little(config, guard))
         };
         for _ in 0..zero.len() {
             let mut changed = false;
@@ -283,7 +283,7 @@ impl Follower<'_> {
 
     /// Whether a function is zero, or of a whole part a whole number, and a short time of motion in
     /// this configuration later still.
-    fn is_zero_a_little_later(&mut self, config: &Configuration, guard: usize) -> bool {
+    fn stays_a_little(&mut self, config: &Configuration, guard: usize) -> bool {
         const BRIEF: f64 = 0.01;
         let compiled = self.equation.compiled_with(config, &[guard]);
         let Some(place) = compiled.place(guard) else { return false };
@@ -450,7 +450,7 @@ impl Follower<'_> {
                             && place[*i].is_some_and(|p| rates.stands_still(p))
                     };
                     if whole() {
-                        follower.is_zero_a_little_later(config, guard)
+                        follower.stays_a_little(config, guard)
                     } else {
                         follower.equation.rests(guard, config)
                     }

@@ -402,6 +402,7 @@ impl Follower<'_> {
     /// Gives weights that are none, where the speeds on both sides of a surface vanish together,
     /// their limit on the way from the step's beginning.
     pub(super) fn complete(&mut self, t: f64, x: &[f64], weights: &mut [f64]) {
+        // So far back that what vanishes is no rounding, and two places give the limit by a line.
         const BACK: f64 = 1e-5;
         if weights.iter().all(|w| w.is_finite()) || t == self.t {
             return;

@@ -55,8 +55,7 @@ pub fn read_tree(folder: &Path, wanted: &dyn Fn(&str) -> bool) -> Result<Tree, F
     Ok(Tree { files, dangling })
 }
 
-/// The first symbolic link in `folder`, at any depth; none if there is no such folder. Git's own
-/// folder is passed over.
+/// The first symbolic link in `folder`, at any depth, or itself; none if there is no such folder.
 ///
 /// # Errors
 /// If a folder in it cannot be read.
@@ -66,6 +65,9 @@ pub fn first_link(folder: &Path) -> Result<Option<PathBuf>, FileError> {
         path: path.to_owned(),
         source,
     };
+    if folder.is_symlink() {
+        return Ok(Some(folder.to_owned()));
+    }
     let mut open = vec![folder.to_owned()];
     while let Some(folder) = open.pop() {
         if !folder.is_dir() {
@@ -75,7 +77,7 @@ pub fn first_link(folder: &Path) -> Result<Option<PathBuf>, FileError> {
             fs::read_dir(&folder).and_then(Iterator::collect).map_err(|e| cannot(&folder, e));
         let mut entries: Vec<fs::DirEntry> = entries?;
         entries.sort_by_key(fs::DirEntry::path);
-        for entry in entries.into_iter().filter(|e| e.file_name() != ".git") {
+        for entry in entries {
             let path = entry.path();
             let kind = entry.file_type().map_err(|e| cannot(&path, e))?;
             if kind.is_symlink() {
