@@ -627,6 +627,17 @@ fn comparisons_see_what_jumps_to_equality() {
             assert!((x - want).abs() < 1e-9, "{f} by {method:?}: {x} for {want}");
         }
     }
+    // The steps of a table: 0, 1, 2, 1, or from 1 on.
+    let steps = "states = ['x']\nstart = [0]\nf = ['if(u >= 2, 1, 0) + if(u >= 1, 10, 0)']\n\
+        [tables.u]\nfile = 'u.csv'\ntime = 't'\ncolumn = 'u'\ninterpolation = 'previous'";
+    for (first, want) in [(0, 41.0), (1, 51.0)] {
+        let rows = format!("t,u\n0,{first}\n1,1\n2,2\n3,1\n10,1\n");
+        let table = model(steps).with_table("u", &rows).unwrap();
+        for method in [Method::Dopri5, Method::Radau5, Method::Taylor] {
+            let options = Options { t_end: 5.0, method, ..Options::default() };
+            near(follow(&table, &options, &mut |_| true).unwrap().x[0], want, 1e-9);
+        }
+    }
     for (when, t) in [("floor(x) >= 2", 2.0), ("sign(x - 1) >= 1", 1.0)] {
         let counts = model(&format!(
             "states = ['n', 'x']\nstart = [0, 0]\nf = ['0', '1']\n[[event]]\nwhen = '{when}'\n\

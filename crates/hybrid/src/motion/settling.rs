@@ -313,7 +313,19 @@ impl Follower<'_> {
         is_zero(self.t, &self.x) && is_zero(self.t + brief, &later)
     }
 
-    /// The same, where what is slid upon is decided, too, but for the guards in `kept`.
+    /// Whether a function that is zero, or of a whole part a whole number, came there by the step
+    /// of a table, and only another step moves it.
+    fn rests_by_a_table(&mut self, config: &Configuration, guard: usize) -> bool {
+        let (compiled, rates) = self.rates_with(config, &[guard]);
+        let tables = self.n + 1 + config.sides.len()..self.equation.variables();
+        compiled.place(guard).is_some_and(|place| {
+            let reads = |variable: usize| compiled.depends(self.n + place, variable);
+            rates.stands_still(place) && tables.clone().any(reads)
+        }) && self.stays_a_little(config, guard)
+    }
+
+    /// As [`Follower::settle`], where what is slid upon is decided, too, but for the guards in
+    /// `kept`.
     pub(super) fn decide(&mut self, zero: &[usize], kept: &[bool]) -> Result<(), HybridError> {
         self.rests = false;
         // Only what the equations ask here; what they do not ask keeps its side until it is asked.
@@ -975,7 +987,14 @@ impl Follower<'_> {
                 let small = 1e-12 * self.magnitude(&g.expression);
                 let off =
                     if g.whole { (values[i] - values[i].round()).abs() } else { values[i].abs() };
-                if side != config.sides[guard] && off > small && side.is_finite() {
+                let side = if off > small {
+                    side
+                } else if self.rests_by_a_table(&config, guard) {
+                    if self.equation.guards[guard].whole { values[i].round() } else { 0.0 }
+                } else {
+                    continue;
+                };
+                if side != config.sides[guard] && side.is_finite() {
                     config.sides[guard] = side;
                     jumped = true;
                 }
