@@ -36,7 +36,8 @@ use crate::roots::{
 };
 use crate::selection::{
     Intersection, MOST_TOGETHER, Mixture, Way, attraction, groups, hold, leads_away, mixture,
-    nearest_of_hull, possibilities, turn, turn_of_position, velocities_differ,
+    near_solution, nearest_of_hull, position_hold, possibilities, turn, turn_of_position,
+    velocities_differ,
 };
 use crate::step::Step;
 
@@ -419,6 +420,8 @@ struct Follower<'a> {
     /// Surfaces slid upon that know nothing of each other: the one that each state's derivative
     /// depends on.
     separate: Option<Vec<Option<usize>>>,
+    /// Whether some of the functions slid upon stay at zero where the others do.
+    dependent: bool,
     contacts: Vec<Contact>,
     /// Whether the motion has come to a point that it does not leave.
     rests: bool,
@@ -733,6 +736,7 @@ impl<'a> Follower<'a> {
             corners: Vec::new(),
             order,
             separate: None,
+            dependent: false,
             contacts: Vec::new(),
             rests: false,
             noisy: false,

@@ -6,7 +6,7 @@
 //! an assignment in which every function does what it is said to do. One possibility is the motion;
 //! several are a motion that is not decided.
 
-use twofold_num::linear::solve_any;
+use twofold_num::linear::{eigenvalues, solve_any};
 use twofold_system::Expression;
 
 /// Motion of a switching function from zero.
@@ -153,7 +153,6 @@ fn bilinear(rates: &[Vec<f64>], k: usize) -> Option<Vec<f64>> {
 /// negative and keep all functions at zero: the conditions of Karush, Kuhn and Tucker for every set
 /// of fields that take part.
 fn shortest(fields: &[Vec<f64>], rates: &[Vec<f64>], k: usize) -> Option<Vec<f64>> {
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let mut best: Option<(f64, Vec<f64>)> = None;
     for set in 1_usize..1 << fields.len() {
         let part: Vec<usize> = (0..fields.len()).filter(|v| set >> v & 1 == 1).collect();
@@ -195,7 +194,6 @@ fn shortest(fields: &[Vec<f64>], rates: &[Vec<f64>], k: usize) -> Option<Vec<f64
 /// the two vectors that gain most by it (Wolfe 1970; Mitchell, Demyanov & Malozemov 1974).
 pub(crate) fn nearest_of_hull(vectors: &[Vec<f64>]) -> Vec<f64> {
     const MOST_MOVES: usize = 5000;
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let mut weights = vec![1.0 / vectors.len() as f64; vectors.len()];
     let mut nearest = vec![0.0; vectors[0].len()];
     let mix = |weights: &[f64], nearest: &mut Vec<f64>| {
@@ -274,11 +272,28 @@ pub(crate) fn leads_away(growth: f64) -> bool {
     growth > MOST_GROWTH
 }
 
+/// Positive where motion stays at a point at which function 0 has no rate in any field, and its
+/// accelerations come from function 1, a position and its speed: no field leads away, and turns do
+/// not grow.
+pub(crate) fn position_hold(accelerations: &[f64; 4], rates: &[f64; 4]) -> f64 {
+    let sense = (accelerations[3] * rates[3]).signum();
+    if !accelerations.iter().zip(rates).all(|(a, r)| a * r * sense > 0.0) {
+        return -1.0;
+    }
+    let largest = accelerations.iter().fold(0.0_f64, |most, a| most.max(a.abs()));
+    // A field in which position and speed have the same sign must take the speed back.
+    let held = (0..4)
+        .filter(|field| side(*field, 0) * sense * side(*field, 1) > 0.0)
+        .map(|field| -side(field, 0) * accelerations[field] / largest);
+    let turns = turn_of_position(accelerations, rates).map(|growth| MOST_GROWTH - growth);
+    held.chain(turns).fold(f64::INFINITY, f64::min)
+}
+
 /// Positive where s' = a + M w, with w of each function 0 on its negative and 1 on its positive
 /// side, does not turn away from s = 0: the least of the groups of functions that depend on each
 /// other. `a` and M are such that s' = 0 for weights between. Two functions are decided by their
-/// [`turn`]; more attract if C M + M^T C is negative definite for a diagonal C > 0 (then the sum of
-/// c (|s| - s u), with u the signs that the weights stand for, falls always).
+/// [`turn`]; more attract if C M + M^T C is negative semidefinite for a diagonal C > 0 (then the
+/// sum of c (|s| - s u), with u the signs that the weights stand for, never grows from zero).
 pub(crate) fn attraction(a: &[f64], matrix: &[f64]) -> f64 {
     let k = a.len();
     let of_group = |group: &Vec<usize>| match group.as_slice() {
@@ -301,30 +316,35 @@ pub(crate) fn attraction(a: &[f64], matrix: &[f64]) -> f64 {
     groups(k, |i, j| matrix[i * k + j] != 0.0).iter().map(of_group).fold(f64::INFINITY, f64::min)
 }
 
-/// Whether C M + M^T C is negative definite for a diagonal matrix C > 0. C is separated from all
-/// vectors that speak against the last one, one more each time.
+/// Whether C M + M^T C is negative semidefinite for a diagonal matrix C > 0. C is separated from
+/// all vectors that speak against the last one, one more each time.
 fn is_diagonally_stable(m: &[f64], k: usize) -> bool {
     const MOST_CUTS: usize = 60;
     let mut against: Vec<Vec<f64>> =
         (0..k).map(|i| (0..k).map(|j| if i == j { 1.0 } else { 0.0 }).collect()).collect();
-    let mut c = vec![1.0; k];
+    // Where M has a null vector C is known: it takes that one to M^T's.
+    let transposed: Vec<f64> = (0..k * k).map(|p| m[p % k * k + p / k]).collect();
+    let known = null_vector(m, k).zip(null_vector(&transposed, k)).map(|(z, y)| {
+        let sign = dot(&y, &z).signum();
+        y.iter().zip(z).map(|(y, z)| sign * y / z).collect::<Vec<f64>>()
+    });
+    let mut c = known.filter(|c| c.iter().all(|c| *c > 0.0)).unwrap_or_else(|| vec![1.0; k]);
     for _ in 0..MOST_CUTS {
         let form: Vec<f64> =
             (0..k * k).map(|p| c[p / k] * m[p] + c[p % k] * m[p % k * k + p / k]).collect();
         let size = form.iter().fold(0.0_f64, |sum, v| sum + v.abs());
+        let Some(all) = eigenvalues(&form, k) else { return false };
+        if all.iter().all(|[value, _]| *value <= 1e-12 * size) {
+            return true;
+        }
         // The direction of its largest eigenvalue, by powers of what has none below zero.
         let mut x: Vec<f64> = (0..k).map(|i| 1.0 + 0.1 * i as f64).collect();
-        let mut largest = f64::INFINITY;
         for _ in 0..400 {
             let image: Vec<f64> = (0..k)
                 .map(|i| size * x[i] + (0..k).map(|j| form[i * k + j] * x[j]).sum::<f64>())
                 .collect();
             let length = image.iter().map(|v| v * v).sum::<f64>().sqrt();
             x = image.iter().map(|v| v / length).collect();
-            largest = length - size;
-        }
-        if largest < -1e-9 * size {
-            return true;
         }
         let gain = |i: usize| -x[i] * (0..k).map(|j| m[i * k + j] * x[j]).sum::<f64>();
         let cut: Vec<f64> = (0..k).map(gain).collect();
@@ -342,7 +362,6 @@ fn is_diagonally_stable(m: &[f64], k: usize) -> bool {
 /// the fields is no sum of a constant and multiples of the functions' rates.
 pub(crate) fn velocities_differ(fields: &[Vec<f64>], rates: &[Vec<f64>]) -> bool {
     let count = fields.len();
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let most = |row: &[f64]| row.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
     let mut basis: Vec<Vec<f64>> = Vec::new();
     let rest = |basis: &[Vec<f64>], mut row: Vec<f64>| {
@@ -369,6 +388,85 @@ pub(crate) fn velocities_differ(fields: &[Vec<f64>], rates: &[Vec<f64>]) -> bool
         let size = most(&row);
         most(&rest(&basis, row)) > 1e-9 * size
     })
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Rows shorter than this part of their length are sums of others.
+const NOT_NEW: f64 = 1e-9;
+
+/// What is new in a row of numbers beside an orthonormal basis, and its length; none if it is a sum
+/// of them to rounding.
+fn new_part(basis: &[Vec<f64>], row: &[f64]) -> Option<(Vec<f64>, f64)> {
+    let mut new = row.to_vec();
+    for q in basis.iter().chain(basis) {
+        let share = dot(&new, q);
+        new.iter_mut().zip(q).for_each(|(v, q)| *v -= share * q);
+    }
+    let length = dot(&new, &new).sqrt();
+    (length > NOT_NEW * dot(row, row).sqrt()).then(|| {
+        new.iter_mut().for_each(|v| *v /= length);
+        (new, length)
+    })
+}
+
+/// The solution of a x = b near to `about` in all components, where some equations may follow from
+/// others, and the number of those that do not. None if one contradicts the others. Where all but
+/// one are independent in a group that depend on each other it is the one whose largest distance
+/// is least, elsewhere the one of least squares.
+pub(crate) fn near_solution(a: &[f64], b: &[f64], about: f64) -> Option<(Vec<f64>, usize)> {
+    let k = b.len();
+    let length = |v: &[f64]| dot(v, v).sqrt();
+    let (mut all, mut rank) = (vec![about; k], 0);
+    for group in groups(k, |i, j| a[i * k + j] != 0.0) {
+        let rows: Vec<Vec<f64>> =
+            group.iter().map(|i| group.iter().map(|j| a[i * k + j]).collect()).collect();
+        let mut off = vec![0.0; group.len()];
+        let mut basis: Vec<Vec<f64>> = Vec::new();
+        for (row, i) in rows.iter().zip(&group) {
+            let missing = b[*i] - about * row.iter().sum::<f64>() - dot(row, &off);
+            let size = length(row) * (about.abs() + length(&off)) + b[*i].abs();
+            if let Some((new, length)) = new_part(&basis, row) {
+                // Along what is new in it the equations before stay solved.
+                off.iter_mut().zip(&new).for_each(|(x, q)| *x += missing / length * q);
+                basis.push(new);
+            } else if length(row) > 0.0 && missing.abs() > NOT_NEW * size {
+                return None;
+            }
+        }
+        rank += basis.len();
+        if let Some(free) = null_vector(&rows.concat(), group.len()) {
+            let moved =
+                |by: f64| off.iter().zip(&free).map(|(x, z)| x + by * z).collect::<Vec<f64>>();
+            let largest = |x: &[f64]| x.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+            // Where it is least two components are equally large.
+            let pairs = (0..off.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
+            let ways = pairs.flat_map(|(i, j)| {
+                [1.0, -1.0].map(|sign| -(off[i] + sign * off[j]) / (free[i] + sign * free[j]))
+            });
+            let best = ways
+                .filter(|by| by.is_finite())
+                .map(moved)
+                .min_by(|a, b| largest(a).total_cmp(&largest(b)));
+            off = best.unwrap_or(off);
+        }
+        group.iter().zip(off).for_each(|(i, off)| all[*i] += off);
+    }
+    all.iter().all(|x| x.is_finite()).then_some((all, rank))
+}
+
+/// The vector that a matrix of `k` rows maps to zero, if there is one and no other.
+fn null_vector(a: &[f64], k: usize) -> Option<Vec<f64>> {
+    let mut basis = Vec::new();
+    for row in a.chunks(k) {
+        basis.extend(new_part(&basis, row).map(|(new, _)| new));
+    }
+    let unit = |i: usize| (0..k).map(|j| if i == j { 1.0 } else { 0.0 }).collect::<Vec<f64>>();
+    let left = (0..k).filter_map(|i| new_part(&basis, &unit(i)));
+    let (longest, _) = left.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    (basis.len() + 1 == k).then_some(longest)
 }
 
 /// All assignments of ways to `k` functions that are consistent; `consistent` says whether one is.

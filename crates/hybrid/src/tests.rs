@@ -2732,3 +2732,80 @@ fn rounding_at_a_rest_takes_no_steps() {
         }
     }
 }
+
+/// The end of a run by a method, or its error's words.
+fn end_of(text: &str, t_end: f64, method: Method) -> Result<Vec<f64>, String> {
+    let options = Options { t_end, method, ..Options::default() };
+    follow(&model(text), &options, &mut |_| true).map(|o| o.x).map_err(|e| e.to_string())
+}
+
+#[test]
+fn second_order_sliding_goes_on_under_a_disturbance() {
+    // Twisting (Levant 1993): a position and its speed come to zero together and stay there while
+    // r1 - r2 exceeds the disturbance; beyond r1 + r2 they are driven off.
+    let twisting = |disturbance: &str| {
+        format!(
+            "states = [\"x\", \"v\", \"z\"]\nstart = [1, 0, 0]\n\
+                f = [\"v\", \"-2*sign(x) - sign(v) + {disturbance}\", \"x + v + 1\"]"
+        )
+    };
+    for method in [Method::Dopri5, Method::Radau5] {
+        let end = end_of(&twisting("0.3*sin(t)"), 20.0, method).unwrap();
+        let later = end_of(&twisting("0.3*sin(t)"), 25.0, method).unwrap();
+        assert_eq!((end[0], end[1]), (0.0, 0.0), "{method:?}");
+        assert!((later[2] - end[2] - 5.0).abs() < 1e-9, "{method:?} {later:?}");
+        // 0.2 t = 3 at t = 15: from there v' = 0.2 t - 3 and v = 0.1 (t - 15)^2.
+        let end = end_of(&twisting("0.2*t"), 20.0, method).unwrap();
+        assert!((end[1] - 2.5).abs() < 1e-9, "{method:?} {end:?}");
+        assert!((end[0] - 12.5 / 3.0).abs() < 1e-9, "{method:?} {end:?}");
+    }
+    // Both axes at once, each with a disturbance of its own.
+    let both = "states = [\"x\", \"v\", \"y\", \"w\"]\nstart = [1, 0, 0.5, 1]\n\
+        f = [\"v\", \"-2*sign(x) - sign(v) + 0.3*sin(t)\", \"w\", \
+            \"-3*sign(y) - sign(w) + 0.5*cos(t)\"]";
+    assert_eq!(end_of(both, 20.0, Method::Dopri5).unwrap(), [0.0; 4]);
+    // Turns that grow may begin at any time; where another state follows one of the signs alone,
+    // mixtures that stay have different velocities.
+    let grows = "states = [\"x\", \"v\", \"z\"]\nstart = [0, 0, 0]\n\
+        f = [\"v\", \"-2*sign(x) + sign(v)\", \"1\"]";
+    let words = end_of(grows, 1.0, Method::Dopri5).unwrap_err();
+    assert!(words.contains("turn away by infinitely many switches"), "{words}");
+    let open = "states = [\"x\", \"v\", \"z\"]\nstart = [1, 0, 0]\n\
+        f = [\"v\", \"-2*sign(x) - sign(v) + 0.3*sin(t)\", \"sign(x)\"]";
+    let words = end_of(open, 10.0, Method::Dopri5).unwrap_err();
+    assert!(words.contains("mixtures of the fields have different"), "{words}");
+    // A gain that falls to nothing: turns are equal at t = 10, and longer afterwards.
+    let fades = "states = [\"x\", \"v\", \"z\"]\nstart = [1, 0, 0]\n\
+        f = [\"v\", \"-2*sign(x) - (1 - 0.1*t)*sign(v)\", \"1\"]";
+    assert_eq!(end_of(fades, 9.9, Method::Dopri5).unwrap()[..2], [0.0; 2]);
+    assert!(end_of(fades, 10.1, Method::Dopri5).unwrap_err().contains("t = 10.0000000"));
+}
+
+#[test]
+fn surfaces_that_depend_on_each_other_are_slid_upon_under_a_drift() {
+    // Agents that move towards each other by signs, with gains (Cortes 2006): they meet, and their
+    // mean goes on with the mean of their drifts.
+    let agents = |k: f64, l: f64, m: f64, drift: &str| {
+        format!(
+            "states = [\"a\", \"b\", \"c\"]\nstart = [1, 0, 3]\nf = [\
+                \"{k}*sign(b - a) + {l}*sign(c - a) + {drift}\", \
+                \"{k}*sign(a - b) + {m}*sign(c - b) + 0.2*sin(t)\", \
+                \"{l}*sign(a - c) + {m}*sign(b - c)\"]"
+        )
+    };
+    for method in [Method::Dopri5, Method::Radau5] {
+        for gains in [[1.0, 1.0, 1.0], [0.7, 1.3, 0.37]] {
+            let [k, l, m] = gains;
+            let end = end_of(&agents(k, l, m, "0.3"), 20.0, method).unwrap();
+            let mean = (4.0 + 0.3 * 20.0 + 0.2 * (1.0 - 20_f64.cos())) / 3.0;
+            assert!(end.iter().all(|x| (x - mean).abs() < 1e-8), "{method:?} {end:?} {mean}");
+        }
+        // A drift of more than 3 takes one of them away: 0.2 t from t = 15 on.
+        let text = agents(1.0, 1.0, 1.0, "0.2*t").replace("0.2*sin(t)", "0");
+        let end = end_of(&text, 18.0, method).unwrap();
+        let met = 4.0 / 3.0 + 7.5;
+        for (x, want) in end.iter().zip([met + 3.9, met + 3.0, met + 3.0]) {
+            assert!((x - want).abs() < 1e-8, "{method:?} {end:?}");
+        }
+    }
+}

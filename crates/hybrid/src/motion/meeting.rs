@@ -49,6 +49,8 @@ impl Follower<'_> {
         if ceases && fired.is_empty() && crossed.is_empty() {
             let slid = self.sliding.clone();
             match self.options.exit {
+                // The fields may lead away in one way.
+                _ if self.dependent => crossed.extend(&slid),
                 _ if slid.len() > 1 => return Err(self.ceases_to_be_the_only_motion()),
                 Exit::Undecided => {
                     return Err(self.undecided(
@@ -104,7 +106,11 @@ impl Follower<'_> {
             self.outcome.switches += 1;
             let sides = self.config.sides.clone();
             if ceases {
+                let slid = self.sliding.clone();
                 self.decide(&zero, &vec![false; self.slides.len()])?;
+                if self.dependent && self.sliding == slid {
+                    return Err(self.ceases_to_be_the_only_motion());
+                }
             } else {
                 self.settle(&zero)?;
             }
@@ -540,7 +546,7 @@ impl Follower<'_> {
         let dot = |a: &[(usize, f64)], v: &[f64]| {
             a.iter().map(|(state, slope)| slope * v[*state]).sum::<f64>()
         };
-        let mut dense = vec![0.0; self.n];
+        let (mut dense, dependent) = (vec![0.0; self.n], self.dependent);
         let mut onto = |v: &mut [f64], off: &[f64]| {
             for part in parts.iter().filter(|part| !part.is_empty()) {
                 let mut gram = Vec::with_capacity(part.len() * part.len());
@@ -550,8 +556,12 @@ impl Follower<'_> {
                     rows[*i].iter().for_each(|(state, _)| dense[*state] = 0.0);
                 }
                 let off: Vec<f64> = part.iter().map(|i| off[*i]).collect();
-                for (i, weight) in part.iter().zip(solve_any(&gram, &off, 0.0).unwrap_or_default())
-                {
+                let weights = if dependent {
+                    near_solution(&gram, &off, 0.0).map(|(weights, _)| weights)
+                } else {
+                    solve_any(&gram, &off, 0.0)
+                };
+                for (i, weight) in part.iter().zip(weights.unwrap_or_default()) {
                     rows[*i].iter().for_each(|(state, slope)| v[*state] -= weight * slope);
                 }
             }

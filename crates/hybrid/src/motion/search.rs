@@ -60,7 +60,7 @@ impl Follower<'_> {
             }
         }
         self.ranges = ranges;
-        for place in 0..self.sliding.len() {
+        for place in 0..if self.dependent { 0 } else { self.sliding.len() } {
             list.push((Sought::Leave { place, plus: false }, 1.0));
             list.push((Sought::Leave { place, plus: true }, 1.0));
         }
@@ -211,14 +211,17 @@ impl Follower<'_> {
             } else {
                 let (a, matrix) = self.sliding_equations(t, x, &field0);
                 let k = a.len();
-                let b: Vec<f64> = a.iter().map(|v| -v).collect();
-                weights = solve_any(&matrix, &b, 0.0).unwrap_or_else(|| vec![f64::NAN; k]);
+                weights = self.solved(&a, &matrix);
                 self.complete(t, x, &mut weights);
                 // Attracting where minus the matrix has a positive determinant, which a single
                 // surface's jump of speed is, and where fields do not turn away.
-                let holds =
-                    if self.may_turn_away() { attraction(&a, &matrix) } else { f64::INFINITY };
-                determinant = determinant_of_negative(matrix, k);
+                let holds = match self.may_turn_away() {
+                    _ if self.dependent => self.dependent_hold(t, x, &a, &matrix, &weights),
+                    false => f64::INFINITY,
+                    true => attraction(&a, &matrix),
+                };
+                determinant =
+                    if self.dependent { holds } else { determinant_of_negative(matrix, k) };
                 if holds < determinant {
                     determinant = holds;
                 }

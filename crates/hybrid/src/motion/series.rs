@@ -89,7 +89,7 @@ impl Follower<'_> {
     pub(super) fn expand(&mut self, step: &mut Step) -> Result<(), HybridError> {
         let n = self.n;
         let stuck = |why: String| HybridError::Stuck { t: step.t, x: step.x.clone(), why };
-        if !self.corners.is_empty() {
+        if !self.corners.is_empty() || self.dependent {
             return Err(stuck(
                 "the motion follows a mixture of more fields than their surfaces \
                 decide, which is chosen at every point anew and has no Taylor series: follow it by \

@@ -12,6 +12,11 @@ const MOST_CORNERS: usize = 3;
 /// Functions that meet of which all sides are tried to see which depend on each other.
 const MOST_TRIED: usize = 4;
 
+/// Reasons why motion on several surfaces is not decided.
+const TURNS_AWAY: &str = "it may stay, or turn away by infinitely many switches at any time";
+const SEVERAL_VELOCITIES: &str =
+    "sliding on all of them, where mixtures of the fields have different velocities";
+
 /// A configuration, the places of the guards that are zero, what they do there, and which of them
 /// its equations ask.
 type Vertex = (Configuration, Vec<Option<usize>>, Rates, Vec<bool>);
@@ -284,9 +289,32 @@ impl Follower<'_> {
     /// Whether a function is zero, or of a whole part a whole number, and a short time of motion in
     /// this configuration later still.
     fn stays_a_little(&mut self, config: &Configuration, guard: usize) -> bool {
-        const BRIEF: f64 = 0.01;
+        let zero = if self.equation.guards[guard].whole { self.boundary(guard) } else { 0.0 };
+        let size = self.magnitude(&self.equation.guards[guard].expression);
+        let small = 1e-14 * size.max(zero.abs());
+        self.values_ahead(config, guard, [0.0, 0.01])
+            .is_some_and(|values| values.iter().all(|value| (value - zero).abs() <= small))
+    }
+
+    /// The side to which a function of third order or more leaves zero in a configuration: it grows
+    /// by more than a square. 0 if it stays.
+    fn side_ahead_in(&mut self, config: &Configuration, guard: usize) -> f64 {
+        match self.values_ahead(config, guard, [0.005, 0.01]) {
+            Some([near, far]) if near * far > 0.0 && far.abs() > 5.0 * near.abs() => far.signum(),
+            _ => 0.0,
+        }
+    }
+
+    /// The values of a function after these parts of the time that a state takes to move by its
+    /// size in this configuration.
+    fn values_ahead(
+        &mut self,
+        config: &Configuration,
+        guard: usize,
+        parts: [f64; 2],
+    ) -> Option<[f64; 2]> {
         let compiled = self.equation.compiled_with(config, &[guard]);
-        let Some(place) = compiled.place(guard) else { return false };
+        let place = compiled.place(guard)?;
         let mut variables = self.load(config);
         let mut field = |t: f64, x: &[f64]| {
             variables[..x.len()].copy_from_slice(x);
@@ -298,19 +326,18 @@ impl Follower<'_> {
         let now = field(self.t, &self.x);
         let moves = now.iter().zip(&self.size).filter(|(f, size)| **f != 0.0 && **size != 0.0);
         let left = self.options.t_end - self.t;
-        let brief = BRIEF * moves.map(|(f, size)| size / f.abs()).fold(left, f64::min);
-        let later = a_little_later(&mut field, self.t, &self.x, brief);
-        let zero = if self.equation.guards[guard].whole { self.boundary(guard) } else { 0.0 };
-        let size = self.magnitude(&self.equation.guards[guard].expression);
-        let small = 1e-14 * size.max(zero.abs());
-        let mut is_zero = |t: f64, x: &[f64]| {
-            variables[..x.len()].copy_from_slice(x);
+        let whole = moves.map(|(f, size)| size / f.abs()).fold(left, f64::min);
+        let states = parts.map(|part| {
+            let brief = part * whole;
+            (self.t + brief, a_little_later(&mut field, self.t, &self.x, brief))
+        });
+        Some(states.map(|(t, x)| {
+            variables[..x.len()].copy_from_slice(&x);
             variables[x.len()] = t;
             let mut values = vec![0.0; compiled.outputs];
             compiled.watched.evaluate(&variables, &mut values);
-            (values[place] - zero).abs() <= small
-        };
-        is_zero(self.t, &self.x) && is_zero(self.t + brief, &later)
+            values[place]
+        }))
     }
 
     /// Whether a function that is zero, or of a whole part a whole number, came there by the step
@@ -430,6 +457,8 @@ impl Follower<'_> {
             groups(k, |i, j| coupled[i * k + j])
         };
         let mut ways = vec![Way::Plus; k];
+        // A rule chooses among velocities although the fields are sums of what each side adds.
+        let mut by_rule = false;
         for set in &sets {
             if set.iter().all(|i| kept[zero[*i]]) {
                 set.iter().for_each(|i| ways[*i] = Way::Stay);
@@ -453,6 +482,18 @@ impl Follower<'_> {
                     cache.insert(plus.clone(), made);
                 }
                 let (config, place, rates, asked) = &cache[&plus];
+                let direction: Vec<f64> = set
+                    .iter()
+                    .zip(set.iter().map(|i| place[*i].map_or(0.0, |p| rates.direction(p))))
+                    .map(|(i, direction)| {
+                        let whole = follower.equation.guards[zero[*i]].whole;
+                        if direction == 0.0 && set.len() > 1 && !whole {
+                            follower.side_ahead_in(config, zero[*i])
+                        } else {
+                            direction
+                        }
+                    })
+                    .collect();
                 let rest = |i: &usize| {
                     let guard = zero[*i];
                     // A whole number that nothing moves is its own whole part.
@@ -470,8 +511,6 @@ impl Follower<'_> {
                 let rests: Vec<bool> = set.iter().map(rest).collect();
                 let first: Vec<f64> =
                     set.iter().map(|i| place[*i].map_or(f64::NAN, |p| rates.first[p])).collect();
-                let direction: Vec<f64> =
-                    set.iter().map(|i| place[*i].map_or(0.0, |p| rates.direction(p))).collect();
                 let asked: Vec<bool> = set.iter().map(|i| asked[*i]).collect();
                 let first_or_zero: Vec<f64> = set
                     .iter()
@@ -499,7 +538,7 @@ impl Follower<'_> {
                     continue;
                 }
             }
-            let mut may_turn_away = false;
+            let mut open = None;
             let found = possibilities(set.len(), |assignment| {
                 let slides: Vec<usize> =
                     (0..set.len()).filter(|i| assignment[*i] == Way::Stay).collect();
@@ -545,7 +584,12 @@ impl Follower<'_> {
                     }
                 }
                 let b: Vec<f64> = slides.iter().map(|s| -base[*s]).collect();
-                let weights = solve_any(&matrix, &b, 0.0);
+                // Surfaces of which some stay at zero where the others do.
+                let nearest = (m > 1).then(|| near_solution(&matrix, &b, 0.5)).flatten();
+                let (weights, dependent) = match nearest {
+                    Some((weights, rank)) if rank < m => (Some(weights), true),
+                    _ => (solve_any(&matrix, &b, 0.0), false),
+                };
                 if m == 1 {
                     // On both sides towards or away from the surface, to second order; or along it
                     // on one side and towards it on the other.
@@ -566,26 +610,50 @@ impl Follower<'_> {
                         speeds.push(rates);
                         clear.push(slides.iter().map(|s| first_or_zero[*s]).collect::<Vec<_>>());
                     }
-                    let holds = || match clear.as_slice() {
+                    let guards: Vec<usize> = slides.iter().map(|s| zero[set[*s]]).collect();
+                    let own: Vec<Vec<f64>> = speeds
+                        .iter()
+                        .map(|rates| slides.iter().map(|s| rates[*s]).collect())
+                        .collect();
+                    let holds = match clear.as_slice() {
+                        _ if chosen => 1.0,
+                        [a, b, ..] if dependent && m == 2 => {
+                            let still = |i: &usize| clear.iter().all(|rates| rates[*i] == 0.0);
+                            let (Some(position), [a, b]) =
+                                ((0..2).find(still), [guards[0], guards[1]])
+                            else {
+                                return false;
+                            };
+                            let (base, t, x) = (vertex(self, &on).0, self.t, self.x.clone());
+                            let hold = self.position_hold(&base, (t, &x), [a, b], position);
+                            // A field may lead away where none turns.
+                            if hold <= 0.0 && !self.turns_away(&x, [a, b]) {
+                                return false;
+                            }
+                            hold
+                        }
                         [a, b, c, d] => hold(&[a, b, c, d].map(|rates| [rates[0], rates[1]])),
                         _ => attraction(
                             &slides.iter().map(|s| base[*s]).collect::<Vec<_>>(),
                             &matrix,
                         ),
                     };
-                    if !chosen && !(holds() > 0.0) {
+                    if !(holds > 0.0) {
                         // Where fields turn around two surfaces a mixture stays on both.
                         let stays = |w: &Vec<f64>| w.iter().all(|w| *w > 0.0 && *w < 1.0);
-                        may_turn_away |= m == 2 || weights.as_ref().is_some_and(stays);
+                        if m == 2 || !dependent && weights.as_ref().is_some_and(stays) {
+                            open = Some(TURNS_AWAY);
+                        }
                         return false;
                     }
+                    let several = dependent && velocities_differ(&fields, &own);
+                    if several && !chosen {
+                        open = Some(SEVERAL_VELOCITIES);
+                        return false;
+                    }
+                    by_rule |= several;
                     // If all mixtures have one velocity, there is nothing to choose.
-                    if mixtures_differ(&fields) {
-                        let guards: Vec<usize> = slides.iter().map(|s| zero[set[*s]]).collect();
-                        let own: Vec<Vec<f64>> = speeds
-                            .iter()
-                            .map(|rates| slides.iter().map(|s| rates[*s]).collect())
-                            .collect();
+                    if several || mixtures_differ(&fields) {
                         let order = self.order_of(&guards);
                         let Some(found) = mixture(&rule, &order, &fields, &own) else {
                             return false;
@@ -615,9 +683,8 @@ impl Follower<'_> {
                     goes(i, if rate.abs() <= 1e-13 * size { 0.0 } else { rate })
                 })
             });
-            if may_turn_away {
+            if let Some(ways) = open {
                 let names: Vec<usize> = set.iter().map(|i| zero[*i]).collect();
-                let ways = "it may stay, or turn away by infinitely many switches at any time";
                 return Err(self.undecided(&names, ways));
             }
             let chosen = match found.as_slice() {
@@ -694,7 +761,7 @@ impl Follower<'_> {
                     .for_each(|(sum, (one, base))| *sum += one - base);
             }
             let size = corner.iter().chain(&base).fold(0.0_f64, |most, v| most.max(v.abs()));
-            differ = sum.iter().zip(&corner).any(|(p, c)| (p - c).abs() > 1e-9 * size);
+            differ = by_rule || sum.iter().zip(&corner).any(|(p, c)| (p - c).abs() > 1e-9 * size);
             let undecided = self.options.intersection == Intersection::Undecided;
             let mut several = || {
                 if stay.len() > MOST_CORNERS {
@@ -715,9 +782,7 @@ impl Follower<'_> {
             };
             if differ && undecided && several() {
                 let names: Vec<usize> = stay.iter().map(|i| zero[*i]).collect();
-                let ways = "sliding on all of them, where mixtures of the fields have different \
-                    velocities";
-                return Err(self.undecided(&names, ways));
+                return Err(self.undecided(&names, SEVERAL_VELOCITIES));
             }
         }
         let mut config = self.config.clone();
@@ -748,6 +813,12 @@ impl Follower<'_> {
             );
             self.decide(&rest, &none)?;
             return self.follow_jumps(&rest);
+        }
+        if self.dependent && self.tangents.is_some() {
+            return Err(self.no_tangents(
+                "the motion slides on surfaces that depend on each other, where neighbours have \
+                    no common linear motion",
+            ));
         }
         if differ {
             if self.sliding.len() > MOST_CORNERS {
@@ -840,15 +911,49 @@ impl Follower<'_> {
     /// it, to first order or as a position and its speed do, and each turn is longer than the one
     /// before.
     pub(super) fn turns_away(&mut self, x: &[f64], guards: [usize; 2]) -> bool {
-        let before = std::mem::replace(&mut self.x, x.to_vec());
+        let base = self.config.clone();
+        let [first, second] = self.rates_around(&base, (self.t, x), guards);
+        let turn_at = |i: usize| {
+            let still = first.iter().all(|rates| rates[i] == 0.0);
+            still
+                .then(|| position_first(i, &first, &second))
+                .and_then(|(a, b)| turn_of_position(&a, &b))
+        };
+        let growth = turn(&first).or_else(|| turn_at(0)).or_else(|| turn_at(1));
+        growth.is_some_and(leads_away)
+    }
+
+    /// Positive where motion stays at a point where two functions are zero of which the one at
+    /// `position` is known to have no speed there.
+    pub(super) fn position_hold(
+        &mut self,
+        base: &Configuration,
+        at: (f64, &[f64]),
+        guards: [usize; 2],
+        position: usize,
+    ) -> f64 {
+        let [first, second] = self.rates_around(base, at, guards);
+        let (accelerations, rates) = position_first(position, &first, &second);
+        position_hold(&accelerations, &rates)
+    }
+
+    /// First and second derivatives of two functions along the four fields around a point.
+    fn rates_around(
+        &mut self,
+        base: &Configuration,
+        (t, x): (f64, &[f64]),
+        guards: [usize; 2],
+    ) -> [[[f64; 2]; 4]; 2] {
+        let before =
+            (std::mem::replace(&mut self.x, x.to_vec()), std::mem::replace(&mut self.t, t));
         let (mut first, mut second) = ([[f64::NAN; 2]; 4], [[f64::NAN; 2]; 4]);
         for field in 0..4 {
-            let mut config = self.config.clone();
+            let mut config = base.clone();
             for (i, guard) in guards.iter().enumerate() {
                 config.sides[*guard] =
                     if field >> i & 1 == 1 { self.high(*guard) } else { self.low(*guard) };
             }
-            let (compiled, rates) = self.rates(&config);
+            let (compiled, rates) = self.rates_of_second_order(&config);
             for (i, guard) in guards.iter().enumerate() {
                 if let Some(place) = compiled.place(*guard) {
                     first[field][i] = rates.first_or_zero(place);
@@ -856,17 +961,8 @@ impl Follower<'_> {
                 }
             }
         }
-        self.x = before;
-        let position = |i: usize| {
-            if !first.iter().all(|rates| rates[i] == 0.0) {
-                return None;
-            }
-            // Fields are numbered by the side of the position first.
-            let order = if i == 0 { [0, 1, 2, 3] } else { [0, 2, 1, 3] };
-            turn_of_position(&order.map(|f| second[f][i]), &order.map(|f| first[f][1 - i]))
-        };
-        let growth = turn(&first).or_else(|| position(0)).or_else(|| position(1));
-        growth.is_some_and(leads_away)
+        (self.x, self.t) = before;
+        [first, second]
     }
 
     /// A function that stays zero while the motion slides on another's zero has no side that the
@@ -1189,6 +1285,13 @@ impl Follower<'_> {
         }
         new
     }
+}
+
+/// Accelerations of function `i` of two and rates of the other one in the four fields, numbered by
+/// the side of function `i` first.
+fn position_first(i: usize, first: &[[f64; 2]; 4], second: &[[f64; 2]; 4]) -> ([f64; 4], [f64; 4]) {
+    let order = if i == 0 { [0, 1, 2, 3] } else { [0, 2, 1, 3] };
+    (order.map(|f| second[f][i]), order.map(|f| first[f][1 - i]))
 }
 
 /// Whether a vector that is not zero is a sum of multiples of others, to rounding.

@@ -13,6 +13,9 @@ const SMALL: f64 = 1e-3;
 /// Rounding errors reach a speed through so many other states in a step, as in a chain of
 /// integrators.
 const PASSES: usize = 3;
+/// Motion leaves surfaces that depend on each other so little later than it could stay: then it is
+/// no rounding which field leads away, and the state changes by the square of it.
+const LITTLE: f64 = 1e-9;
 
 impl Follower<'_> {
     pub(super) fn load(&self, config: &Configuration) -> Vec<f64> {
@@ -44,6 +47,7 @@ impl Follower<'_> {
         self.variables = self.load(&config);
         self.config = config;
         self.separate = self.separate();
+        self.dependent = false;
         self.base = Vec::new();
         self.corners = Vec::new();
         if self.separate.is_none() {
@@ -54,6 +58,14 @@ impl Follower<'_> {
                 self.follow_sides(&mut flipped, &sliding);
                 let variables = self.load(&flipped);
                 self.base.push((self.equation.compiled(&flipped), variables));
+            }
+            if self.sliding.len() > 1 {
+                let (t, x, mut low) = (self.t, self.x.clone(), vec![0.0; self.n]);
+                self.compiled.field.evaluate(&self.variables, &mut low);
+                let (a, matrix) = self.sliding_equations(t, &x, &low);
+                let b: Vec<f64> = a.iter().map(|v| -v).collect();
+                self.dependent =
+                    near_solution(&matrix, &b, 0.5).is_some_and(|(_, rank)| rank < b.len());
             }
         }
         self.hold_watched();
@@ -434,8 +446,54 @@ impl Follower<'_> {
     /// Weights of the positive sides in sliding; not-a-number where there are none.
     pub(super) fn weights(&mut self, t: f64, x: &[f64], field0: &[f64]) -> Vec<f64> {
         let (a, matrix) = self.sliding_equations(t, x, field0);
+        self.solved(&a, &matrix)
+    }
+
+    /// The weights w for which a + M w vanishes; not-a-number where there are none.
+    pub(super) fn solved(&self, a: &[f64], matrix: &[f64]) -> Vec<f64> {
         let b: Vec<f64> = a.iter().map(|v| -v).collect();
-        solve_any(&matrix, &b, 0.0).unwrap_or_else(|| vec![f64::NAN; b.len()])
+        let found = if self.dependent {
+            near_solution(matrix, &b, 0.5).map(|(weights, _)| weights)
+        } else {
+            solve_any(matrix, &b, 0.0)
+        };
+        found.unwrap_or_else(|| vec![f64::NAN; b.len()])
+    }
+
+    /// Positive where the motion stays on the surfaces slid upon, of which some stay at zero where
+    /// the others do: a position beside its speed as its turns decide, others where weights are
+    /// between 0 and 1 and as in [`attraction`].
+    pub(super) fn dependent_hold(
+        &mut self,
+        t: f64,
+        x: &[f64],
+        a: &[f64],
+        matrix: &[f64],
+        weights: &[f64],
+    ) -> f64 {
+        let (k, by_rule) = (a.len(), !self.may_turn_away());
+        let mut hold = f64::INFINITY;
+        for group in groups(k, |i, j| matrix[i * k + j] != 0.0) {
+            let still = |i: &usize| group.iter().all(|j| matrix[group[*i] * k + j] == 0.0);
+            let of_group = match group.as_slice() {
+                [i, j] if let Some(position) = (0..2).find(still).filter(|_| !by_rule) => {
+                    let (base, guards) =
+                        (self.config.clone(), [self.sliding[*i], self.sliding[*j]]);
+                    self.position_hold(&base, (t, x), guards, position)
+                }
+                some => {
+                    let row =
+                        |i: &usize| some.iter().map(|j| matrix[i * k + j]).collect::<Vec<_>>();
+                    let own: Vec<f64> = some.iter().map(|i| a[*i]).collect();
+                    let part: Vec<f64> = some.iter().flat_map(row).collect();
+                    let margin = |i: &usize| weights[*i].min(1.0 - weights[*i]);
+                    let attracts = if by_rule { 1.0 } else { attraction(&own, &part) };
+                    some.iter().map(margin).fold(attracts, f64::min)
+                }
+            };
+            hold = hold.min(of_group);
+        }
+        hold + LITTLE
     }
 
     /// The derivatives of the functions slid upon on all negative sides, and what each positive
@@ -537,6 +595,23 @@ impl Follower<'_> {
         config: &Configuration,
         also: &[usize],
     ) -> (Rc<Compiled>, Rates) {
+        self.rates_to_order(config, also, false)
+    }
+
+    /// The same, with second derivatives even where first ones are not zero.
+    pub(super) fn rates_of_second_order(
+        &mut self,
+        config: &Configuration,
+    ) -> (Rc<Compiled>, Rates) {
+        self.rates_to_order(config, &[], true)
+    }
+
+    fn rates_to_order(
+        &mut self,
+        config: &Configuration,
+        also: &[usize],
+        second_order: bool,
+    ) -> (Rc<Compiled>, Rates) {
         let compiled = self.equation.compiled_with(config, also);
         let variables = self.load(config);
         let n = self.n;
@@ -553,7 +628,7 @@ impl Follower<'_> {
         }
         // Second derivatives matter where first ones are zero; the present programs give them.
         let mut second = vec![0.0; outputs];
-        if (0..outputs).any(|i| !(slopes[i].abs() > 1e-11 * terms[i])) {
+        if second_order || (0..outputs).any(|i| !(slopes[i].abs() > 1e-11 * terms[i])) {
             let bends = Self::slopes_along(&compiled, &variables, &field);
             let kept = (
                 std::mem::replace(&mut self.variables, variables),

@@ -244,7 +244,8 @@ impl Follower<'_> {
                     compiled.place(*guard).map_or(f64::NAN, |p| in_time[p] - moved[p])
                 };
                 let off: Vec<f64> = self.sliding.iter().map(off).collect();
-                let Some(weights) = solve_any(&matrix, &off, 0.0) else {
+                let solved = (!self.dependent).then(|| solve_any(&matrix, &off, 0.0)).flatten();
+                let Some(weights) = solved else {
                     return Err(self.no_tangents("motion begins where sliding is not defined"));
                 };
                 for (weight, added) in weights.iter().zip(&added) {
