@@ -125,11 +125,14 @@ capture: ## go on with the study of the times of capture, the map of the paramet
 .PHONY: resolved
 D := figures/resolved
 RESOLVED := --t-end 2e5 $(READINGS) $(STARTS) --random 100 --rtol 1e-13 --atol 1e-13 --random-seed
-resolved: ## the census by methods that resolve the layer, by the rules in figures/resolved (an hour on one core; a stopped call goes on)
+DIGITS := --t-end 2e5 $(STARTS) --over interval=100 --method taylor-extended --rtol 1e-25 --atol 1e-25 --random-seed 2020
+resolved: ## the census by methods that resolve the layer, by the rules in figures/resolved (three hours on one core; a stopped call goes on)
 	@$(CARGO) build --release --locked --bin twofold
 	@$(SWEEP) $(RESOLVED) 2017 --method taylor $(INTERVALS) --out $(D)/taylor7.csv
 	@$(SWEEP) $(RESOLVED) 2018 --method taylor $(SIGMAS) --out $(D)/taylor8.csv
 	@$(SWEEP) $(RESOLVED) 2019 --method layered $(INTERVALS) --out $(D)/layered7.csv
+	@$(SWEEP) $(DIGITS) $(PRINTED) --random 100 --out $(D)/extended-printed.csv
+	@$(SWEEP) $(DIGITS) $(RECONSTRUCTED) --random 60 --out $(D)/extended-reconstructed.csv
 
 .PHONY: delay-data
 delay-data: ## the data of figures/delay: passages, and a hundred runs of each rule to compare (a quarter of an hour; a stopped call goes on)
