@@ -508,8 +508,8 @@ pub fn starts_on_an_event(model: &Model, options: &Options) -> Result<bool, Hybr
 }
 
 /// [`follow_watched`], and whether the motion at a finished run's end rests: whether it goes on for
-/// a time `longer` than that without moving by more than `within` of the largest size of a state.
-/// Equations that see the time do not rest.
+/// a time `longer` than that, and for two of the times between its events, without moving by more
+/// than `within` of the largest size of a state. Equations that see the time do not rest.
 ///
 /// # Errors
 /// As [`follow`].
@@ -521,18 +521,24 @@ pub fn follow_to_rest(
     longer: f64,
     within: f64,
 ) -> Result<(Outcome, bool), HybridError> {
-    let more = Options {
-        t_start: options.t_end,
-        t_end: options.t_end + longer,
-        record: Record::Times { every: f64::INFINITY },
-        ..options.clone()
-    };
     let mut follower = Follower::new(model, options)?;
     follower.reached = Some(reached);
     let (outcome, mut follower) = follower.run_whole(observe)?;
     if outcome.ending != Ending::Finished || follower.equation.depends_on_time() {
         return Ok((outcome, false));
     }
+    let between = |(event, train): (&crate::definition::Event, &Train)| match &event.when {
+        When::Every(period) => follower.equation.value(period, follower.t, &follower.x),
+        _ => train.times.last_chunk().map_or(0.0, |[a, b]| b - a),
+    };
+    let events = model.definition().events().iter().zip(&follower.trains);
+    let longest = events.map(between).fold(0.0, f64::max);
+    let more = Options {
+        t_start: options.t_end,
+        t_end: options.t_end + longer.max(2.0 * longest),
+        record: Record::Times { every: f64::INFINITY },
+        ..options.clone()
+    };
     follower.options = &more;
     let within = within * follower.size.iter().fold(0.0_f64, |most, s| most.max(*s));
     let stays = |x: &[f64]| x.iter().zip(&outcome.x).all(|(a, b)| (a - b).abs() <= within);

@@ -1,7 +1,7 @@
 //! Known results, each by formula or by an independent program.
 
 use crate::motion::Outcome;
-use crate::motion::{Exit, Method, Record};
+use crate::motion::{Exit, Method, Record, follow_to_rest};
 use crate::{Definition, Ending, HybridError, Model, Options, follow};
 
 fn model(text: &str) -> Model {
@@ -2737,6 +2737,22 @@ fn rounding_at_a_rest_takes_no_steps() {
 fn end_of(text: &str, t_end: f64, method: Method) -> Result<Vec<f64>, String> {
     let options = Options { t_end, method, ..Options::default() };
     follow(&model(text), &options, &mut |_| true).map(|o| o.x).map_err(|e| e.to_string())
+}
+
+#[test]
+fn what_only_events_move_rests_if_they_do_not_move_it() {
+    // The logistic map, once a unit of time: a fixed point at r = 2.8, a cycle of two at 3.2.
+    let rests = |r: f64, t_end: f64| {
+        let model = model(&format!(
+            "states = ['x']\nstart = [0.3]\nf = ['0']\n[[event]]\nname = 'map'\nevery = 1\n\
+                set = {{ x = '{r}*x*(1 - x)' }}"
+        ));
+        let options = Options { t_end, ..Options::default() };
+        let longer = 0.05 * t_end;
+        follow_to_rest(&model, &options, &mut |_| true, &|_| true, longer, 1e-6).unwrap().1
+    };
+    assert!(!rests(2.8, 5.0) && rests(2.8, 200.0));
+    assert!(!rests(3.2, 5.0) && !rests(3.2, 15.5) && !rests(3.2, 200.0));
 }
 
 #[test]
