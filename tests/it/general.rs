@@ -305,6 +305,38 @@ fn sections_say_their_direction_and_answers_their_switching_functions() {
 }
 
 /// By Taylor series: the same motion, to more digits.
+/// One system as an equation and as two fields: its rows on the surface that it slides upon are
+/// the same, one where it comes to the surface.
+#[test]
+fn a_section_on_the_surface_has_one_rule() {
+    let folder = tempfile::tempdir().unwrap();
+    let states = "states = [\"x\", \"y\"]\nstart = [1, 0]\n";
+    for (amplitude, rows) in [(0.5, 1), (1.5, 6)] {
+        let wave = format!("{amplitude}*sin(y)");
+        fs::write(
+            folder.path().join("general.toml"),
+            format!("{states}f = [\"-sign(x) + {wave}\", \"1\"]\n"),
+        )
+        .unwrap();
+        fs::write(
+            folder.path().join("sides.toml"),
+            format!(
+                "name = \"sides\"\n{states}h = \"x\"\nminus = [\"1 + {wave}\", \"1\"]\n\
+                    plus = [\"-1 + {wave}\", \"1\"]\n"
+            ),
+        )
+        .unwrap();
+        let to = ["--t-end", "20", "--section", "x=0", "--system"];
+        let one = run(folder.path(), &[&to[..], &["general.toml"]].concat());
+        let two = run(folder.path(), &[&to[..], &["sides.toml", "--switch", "filippov"]].concat());
+        assert_eq!(one.len(), rows);
+        assert!(one.words("direction").eq(two.words("direction")));
+        for (a, b) in one.numbers("t").iter().zip(two.numbers("t")) {
+            near(*a, *b, 1e-6); // of other tolerances
+        }
+    }
+}
+
 #[test]
 fn a_run_by_series_has_the_last_digits() {
     let folder = tempfile::tempdir().unwrap();

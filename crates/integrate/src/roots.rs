@@ -93,18 +93,23 @@ pub struct Crossing {
 /// - So a zero is no side: an orbit that starts on the surface has not passed it, and one that
 ///   touches it and turns back neither. A zero exactly at a step's end is decided by what follows,
 ///   and if it is a crossing it is reported once, at fraction 0 of the next step.
+/// - Where an orbit comes to the surface and stays on it for a step, as in sliding, it crosses
+///   there; where it leaves it for the side that it came from it crosses back, for the other side
+///   it does not cross again.
 /// - A jump between two steps (a kick) to the other side is no crossing; the new side counts from
 ///   there.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CrossingFinder {
-    /// The sign last seen, or zero before any.
+    /// The sign last seen, or zero before any, and while the orbit stays on the surface.
     side: f64,
+    /// The sign before it came to the surface and stayed; else zero.
+    stayed: f64,
 }
 
 impl CrossingFinder {
     /// A finder for an orbit that starts on the positive side (`true`) or on the negative side.
     pub fn starting(positive: bool) -> Self {
-        Self { side: if positive { 1.0 } else { -1.0 } }
+        Self { side: if positive { 1.0 } else { -1.0 }, stayed: 0.0 }
     }
 
     /// The crossings in `step`, in order, of a surface whose `g` need not be of a low degree in the
@@ -120,7 +125,9 @@ impl CrossingFinder {
         separated(&value, 0.0, 1.0, 0, &mut places);
         let (mut found, mut last) = (Vec::new(), (0.0, value(0.0)));
         if last.1 != 0.0 {
-            self.side = last.1.signum();
+            (self.side, self.stayed) = (last.1.signum(), 0.0);
+        } else if places.iter().all(|theta| value(*theta) == 0.0) {
+            return self.stay();
         }
         for theta in places {
             let point = (theta, value(theta));
@@ -141,7 +148,9 @@ impl CrossingFinder {
             return None;
         }
         let before = std::mem::replace(&mut self.side, point.1.signum());
-        (before != 0.0 && before != self.side).then(|| Crossing {
+        let stayed = std::mem::take(&mut self.stayed);
+        let crosses = if before != 0.0 { before != self.side } else { stayed == self.side };
+        crosses.then(|| Crossing {
             theta: if last.1 == 0.0 {
                 last.0
             } else {
@@ -164,6 +173,15 @@ impl CrossingFinder {
         self.of(step.interpolant.degree(), &|theta| g(&step.at(theta)))
     }
 
+    /// The crossing at the beginning of a step that stays on the surface.
+    fn stay(&mut self) -> Vec<Crossing> {
+        if self.side == 0.0 {
+            return Vec::new();
+        }
+        self.stayed = std::mem::take(&mut self.side);
+        vec![Crossing { theta: 0.0, upward: self.stayed < 0.0 }]
+    }
+
     /// [`CrossingFinder::in_step`] for a function of the fraction of the step, on an interpolant of
     /// this degree.
     fn of(&mut self, degree: usize, value: &dyn Fn(f64) -> f64) -> Vec<Crossing> {
@@ -175,7 +193,9 @@ impl CrossingFinder {
         let mut found = Vec::new();
         let mut before = sample(0);
         if before.1 != 0.0 {
-            self.side = before.1.signum();
+            (self.side, self.stayed) = (before.1.signum(), 0.0);
+        } else if (1..=n).all(|i| sample(i).1 == 0.0) {
+            return self.stay();
         }
         let mut last = before;
         let mut next = |point: (f64, f64)| {
@@ -248,13 +268,13 @@ impl CrossingFinder {
             // The margin is for the rounding of the interpolant and of the bound.
             let margin = 1e-12 * (h0.abs() + h1.abs() + value.abs() + reach);
             if h0.abs().min(h1.abs()) > reach + margin {
-                self.side = h0.signum();
+                (self.side, self.stayed) = (h0.signum(), 0.0);
                 return Vec::new();
             }
         } else if (h0 > 0.0 && h1 < 0.0 || h0 < 0.0 && h1 > 0.0)
             && step.interpolant.is_monotone(coordinate)
         {
-            self.side = h1.signum();
+            (self.side, self.stayed) = (h1.signum(), 0.0);
             let theta = brent(|theta| step.coordinate(theta, coordinate) - value, 0.0, 1.0, h0, h1);
             return vec![Crossing { theta, upward: h1 > 0.0 }];
         }
