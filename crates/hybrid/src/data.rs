@@ -1,6 +1,7 @@
 //! Data as functions of time: piecewise cubics.
 
 use serde::{Deserialize, Serialize};
+use twofold_num::Arithmetic;
 
 pub use crate::definition::BadTable;
 use crate::definition::{Interpolation, TableEntry};
@@ -116,8 +117,9 @@ impl Table {
     }
 
     /// The value at `t` on a piece.
-    pub fn value(&self, piece: usize, t: f64) -> f64 {
-        let (s, [a, b, c, d]) = (t - self.knots[piece], self.pieces[piece]);
+    pub fn value<S: Arithmetic>(&self, piece: usize, t: S) -> S {
+        let s = t - S::from_f64(self.knots[piece]);
+        let [a, b, c, d] = self.pieces[piece].map(S::from_f64);
         a + s * (b + s * (c + s * d))
     }
 }

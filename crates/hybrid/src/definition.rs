@@ -902,7 +902,7 @@ fn wrong_constants(e: &Expression, text: &str) -> Option<ExpressionError> {
         }
         e.parts().into_iter().for_each(|part| all(part, of, found));
     }
-    let number = |e: &Expression| evaluate(e, &|_| None);
+    let number = |e: &Expression| -> f64 { evaluate(e, &|_| None) };
     // Calls stand in the text in the order in which they are found.
     let calls = |name: &'static str, of: General| {
         let mut found = Vec::new();

@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::rc::Rc;
 
 use twofold_num::tape::{Program, Recorded};
-use twofold_num::{Arithmetic, Decimal, Dual, Elementary, Tape};
+use twofold_num::{Arithmetic, Decimal, Dual, Elementary, Scalar, Tape};
 use twofold_system::Expression;
 use twofold_system::expression::{Function, General};
 
@@ -512,20 +512,20 @@ impl Equation {
     }
 
     /// The value of an expression at a state, following conditions by the numbers themselves.
-    pub fn value(&self, e: &Expression, t: f64, x: &[f64]) -> f64 {
+    pub fn value<S: Scalar>(&self, e: &Expression, t: S, x: &[S]) -> S {
         self.value_with(e, t, x, &RefCell::new(Vec::new()))
     }
 
     /// The same; terms are evaluated once each.
-    fn value_with(
+    fn value_with<S: Scalar>(
         &self,
         e: &Expression,
-        t: f64,
-        x: &[f64],
-        known: &RefCell<Vec<Option<f64>>>,
-    ) -> f64 {
+        t: S,
+        x: &[S],
+        known: &RefCell<Vec<Option<S>>>,
+    ) -> S {
         let terms = &self.definition.terms;
-        let name = |name: &str| -> Option<f64> {
+        let name = |name: &str| -> Option<S> {
             if name == "t" {
                 return Some(t);
             }
@@ -533,7 +533,7 @@ impl Equation {
                 return Some(x[i]);
             }
             if let Some(value) = self.values.get(name) {
-                return Some(*value);
+                return Some(S::from_f64(*value));
             }
             if let Some(i) = terms.iter().position(|(n, _)| n == name) {
                 known.borrow_mut().resize(terms.len(), None);
@@ -543,7 +543,8 @@ impl Equation {
                 return Some(value);
             }
             let table = self.definition.tables.iter().position(|(n, _)| n == name)?;
-            Some(self.tables[table].value(self.tables[table].piece(t), t))
+            let table = &self.tables[table];
+            Some(table.value(table.piece(t.to_f64()), t))
         };
         crate::value::evaluate(e, &name)
     }

@@ -2739,6 +2739,29 @@ fn end_of(text: &str, t_end: f64, method: Method) -> Result<Vec<f64>, String> {
     follow(&model(text), &options, &mut |_| true).map(|o| o.x).map_err(|e| e.to_string())
 }
 
+/// Derivatives of resets whose expressions have kinks and jumps near, name terms, or see the time.
+#[test]
+fn resets_have_the_derivatives_of_the_side_that_they_are_on() {
+    let slope = |start: f64, set: &str, rest: &str| {
+        let model = model(&format!(
+            "states = ['x']\nstart = [{start}]\nf = ['0']\n{rest}\n[[event]]\nname = 'e'\nat = 0.5\n\
+                set = {{ x = '{set}' }}"
+        ));
+        let options = Options { t_end: 1.0, ..Options::default() };
+        crate::motion::sensitivity::sensitivities(&model, &options, &[]).unwrap().by_start[0][0]
+    };
+    for (start, set, want) in [
+        (0.49999, "mod(2*x, 1)", 2.0),
+        (0.50001, "min(2*x, 2 - 2*x)", -2.0),
+        (0.49999, "if(x < 0.5, 2*x, 2*(1 - x))", 2.0),
+        (0.49999, "x + 10*heaviside(x - 0.5)", 1.0),
+        (0.5, "atan2(x, 2) + floor(x)*x", 2.0 / 4.25),
+    ] {
+        near(slope(start, set, ""), want, 1e-12);
+    }
+    near(slope(0.25, "q + x*t", "[let]\nq = 'x^3'"), 3.0 * 0.0625 + 0.5, 1e-12);
+}
+
 #[test]
 fn what_only_events_move_rests_if_they_do_not_move_it() {
     // The logistic map, once a unit of time: a fixed point at r = 2.8, a cycle of two at 3.2.

@@ -1,43 +1,47 @@
 //! Values of expressions in numbers.
 
-use twofold_num::elementary;
+use twofold_num::{Scalar, elementary};
 use twofold_system::Expression;
 use twofold_system::expression::General;
 
-/// The value of an expression in `f64` with the value of each name; not-a-number where a name has
-/// none.
-pub fn evaluate(e: &Expression, name: &dyn Fn(&str) -> Option<f64>) -> f64 {
+/// The value of an expression with the value of each name; not-a-number where a name has none.
+/// Numbers with derivatives have those of the side that their values are on.
+pub fn evaluate<S: Scalar>(e: &Expression, name: &dyn Fn(&str) -> Option<S>) -> S {
     let at = |e: &Expression| evaluate(e, name);
-    let truth = |holds: bool| if holds { 1.0 } else { 0.0 };
+    let number = S::from_f64;
+    let truth = |holds: bool| number(if holds { 1.0 } else { 0.0 });
+    let holds = |e: &Expression| at(e).to_f64() != 0.0;
     match e {
-        Expression::Name(n) => name(n).unwrap_or(f64::NAN),
-        Expression::Number(n) => n.value(),
-        Expression::Pi => std::f64::consts::PI,
+        Expression::Name(n) => name(n).unwrap_or_else(|| number(f64::NAN)),
+        Expression::Number(n) => number(n.value()),
+        Expression::Pi => S::pi(),
         Expression::Neg(a) => -at(a),
         Expression::Add(a, b) => at(a) + at(b),
         Expression::Sub(a, b) => at(a) - at(b),
         Expression::Mul(a, b) => at(a) * at(b),
         Expression::Div(a, b) => at(a) / at(b),
-        Expression::Power(a, n) => twofold_num::Elementary::power(at(a), *n),
+        Expression::Power(a, n) => at(a).power(*n),
         Expression::Call(f, a) => f.apply(at(a)),
         Expression::RealPower(a, b) => real_power(at(a), at(b)),
         Expression::Greater(a, b) => truth(at(a) > at(b)),
-        Expression::And(a, b) => truth(at(a) != 0.0 && at(b) != 0.0),
-        Expression::Or(a, b) => truth(at(a) != 0.0 || at(b) != 0.0),
-        Expression::Not(a) => truth(at(a) == 0.0),
+        Expression::And(a, b) => truth(holds(a) && holds(b)),
+        Expression::Or(a, b) => truth(holds(a) || holds(b)),
+        Expression::Not(a) => truth(!holds(a)),
         Expression::Apply(f, list) => match f {
-            General::If => at(&list[if at(&list[0]) != 0.0 { 1 } else { 2 }]),
+            General::If => at(&list[if holds(&list[0]) { 1 } else { 2 }]),
             General::Min => {
-                list.iter().map(at).reduce(|a, b| if b < a { b } else { a }).unwrap_or(f64::NAN)
+                let least = list.iter().map(at).reduce(|a, b| if b < a { b } else { a });
+                least.unwrap_or_else(|| number(f64::NAN))
             }
             General::Max => {
-                list.iter().map(at).reduce(|a, b| if b > a { b } else { a }).unwrap_or(f64::NAN)
+                let greatest = list.iter().map(at).reduce(|a, b| if b > a { b } else { a });
+                greatest.unwrap_or_else(|| number(f64::NAN))
             }
-            General::Heaviside => truth(at(&list[0]) >= 0.0),
-            General::Floor => at(&list[0]).floor(),
+            General::Heaviside => truth(at(&list[0]).to_f64() >= 0.0),
+            General::Floor => number(at(&list[0]).to_f64().floor()),
             General::Mod => {
                 let (a, b) = (at(&list[0]), at(&list[1]));
-                a - b * (a / b).floor()
+                a - b * number((a / b).to_f64().floor())
             }
             General::Clip => {
                 let (x, low, high) = (at(&list[0]), at(&list[1]), at(&list[2]));
@@ -49,7 +53,15 @@ pub fn evaluate(e: &Expression, name: &dyn Fn(&str) -> Option<f64>) -> f64 {
                     x
                 }
             }
-            General::Atan2 => elementary::atan2(at(&list[0]), at(&list[1])),
+            General::Atan2 => {
+                let (y, x) = (at(&list[0]), at(&list[1]));
+                let (y0, x0) = (y.to_f64(), x.to_f64());
+                let value = number(elementary::atan2(y0, x0));
+                let square = x0 * x0 + y0 * y0;
+                // What is added has no value, and the derivative of the angle.
+                let turn = (y.scale(x0) - x.scale(y0)).scale(1.0 / square);
+                if square > 0.0 && turn.to_f64() == 0.0 { value + turn } else { value }
+            }
             General::Sinh
             | General::Cosh
             | General::Asin

@@ -224,7 +224,7 @@ impl Follower<'_> {
                 return Ok(Some(Ending::Interrupted));
             }
             if !event.set.is_empty() {
-                self.note_reset(*i, &event.set, &new);
+                self.note_reset(&event.set, &new);
             }
             match &self.equation.resets[*i] {
                 Some(program) => {

@@ -367,7 +367,7 @@ impl Follower<'_> {
 
     /// Notes the derivative of a reset, for tangent vectors, after those of this moment that were
     /// noted before.
-    pub(super) fn note_reset(&mut self, event: usize, set: &[(usize, Expression)], old: &[f64]) {
+    pub(super) fn note_reset(&mut self, set: &[(usize, Expression)], old: &[f64]) {
         if self.tangents.is_none() {
             return;
         }
@@ -375,48 +375,14 @@ impl Follower<'_> {
         let mut by_state = vec![0.0; n * n];
         (0..n).for_each(|i| by_state[i * n + i] = 1.0);
         let mut by_time = vec![0.0; n];
-        let program = self.equation.resets[event].as_ref();
-        if let Some(program) = program {
-            let mut v: Vec<D> = self.variables.iter().map(|v| D::constant(*v)).collect();
-            v[..n].iter_mut().zip(old).for_each(|(v, x)| *v = D::constant(*x));
-            v[n] = D::constant(self.t);
-            let mut values = vec![D::constant(0.0); set.len()];
-            for j in 0..=n {
-                v[j].partials = [1.0];
-                program.evaluate(&v, &mut values);
-                v[j].partials = [0.0];
-                for ((state, _), value) in set.iter().zip(&values) {
-                    let place =
-                        if j < n { &mut by_state[state * n + j] } else { &mut by_time[*state] };
-                    *place = value.partials[0];
-                }
+        let mut at: Vec<D> = old.iter().chain([&self.t]).map(|v| D::constant(*v)).collect();
+        for j in 0..=n {
+            at[j].partials = [1.0];
+            for (state, e) in set {
+                let slope = self.equation.value(e, at[n], &at[..n]).partials[0];
+                *if j < n { &mut by_state[state * n + j] } else { &mut by_time[*state] } = slope;
             }
-        }
-        let largest = self.size.iter().fold(0.0_f64, |most, s| most.max(*s));
-        for (state, e) in if program.is_some() { &[] } else { set } {
-            let value = |t: f64, x: &[f64]| self.equation.value(e, t, x);
-            let value_now = value(self.t, old).abs();
-            // Central differences with a step for each state's own size, by Richardson's
-            // extrapolation of two.
-            let slope = |f: &dyn Fn(f64) -> f64, h: f64| {
-                let d = |h: f64| (f(h) - f(-h)) / (2.0 * h);
-                (4.0 * d(0.5 * h) - d(h)) / 3.0
-            };
-            for j in 0..n {
-                let own = self.size[j].max(old[j].abs());
-                // Smaller steps would be rounding of the value.
-                let seen = own > 1e7 * f64::EPSILON * value_now;
-                let size = if seen { own } else { own.max(1e-3 * largest.max(value_now)) };
-                let h = 1e-4 * if size > 0.0 { size } else { 1.0 };
-                let at = |shift: f64| {
-                    let mut x = old.to_vec();
-                    x[j] += shift;
-                    value(self.t, &x)
-                };
-                by_state[state * n + j] = slope(&at, h);
-            }
-            let h = 1e-4 * (self.options.t_end - self.options.t_start).min(1.0);
-            by_time[*state] = slope(&|shift| value(self.t + shift, old), h);
+            at[j].partials = [0.0];
         }
         let Some(tangents) = &mut self.tangents else { return };
         if let Some((first, first_by_time)) = &tangents.reset {
