@@ -7,7 +7,26 @@ use std::path::{Path, PathBuf};
 use super::CliError;
 use super::exit::part_of;
 use crate::num::Short;
+use crate::num::elementary::log10;
 use crate::record;
+
+/// A value for people with two digits more than its error leaves, and at least `places` decimal
+/// places where that many mean something. An error that is not known counts as 10^-7 of it.
+pub fn with_digits(value: f64, error: f64, places: usize) -> String {
+    let size = value.abs().max(error);
+    if !size.is_finite() || size == 0.0 {
+        return format!("{value:.places$}");
+    }
+    let error = if error.is_nan() { 1e-7 * size } else { error.max(f64::EPSILON * size) };
+    // So many that rounding does not move the interval.
+    if (1e-3..1e6).contains(&size) {
+        let places = (2.0 - log10(error)).ceil().clamp(places as f64, 17.0) as usize;
+        format!("{value:.places$}")
+    } else {
+        let digits = (log10(size) - log10(error) + 3.0).floor().clamp(1.0, 17.0) as usize;
+        format!("{value:.digits$e}")
+    }
+}
 
 /// A state for people: "x = 0.2, y = 1".
 pub fn state_in_words(names: &[&str], state: &[f64]) -> String {

@@ -9,12 +9,11 @@ use crate::cli::ending;
 use crate::cli::flags::{RunFlags, Use};
 use crate::cli::general;
 use crate::cli::progress::Progress;
-use crate::cli::speak::{Delivery, deliver, try_delivery};
+use crate::cli::speak::{Delivery, deliver, try_delivery, with_digits};
 use crate::cli::{self, CliError};
 use crate::integrate::StepCap;
 use crate::job::general::{GeneralExponents, GeneralRun, MeanRate};
 use crate::job::{AnyQuestion, Executor, JobError, LargestExponent, Question, Stop, encode};
-use crate::num::elementary::log10;
 
 /// The largest Lyapunov exponent of the orbit from the start, with its 95 % interval: the mean rate
 /// at which a tangent vector grows. Of Filippov motion and of general systems all exponents.
@@ -172,10 +171,9 @@ pub fn run(arguments: &Arguments) -> Result<cli::Exit, CliError> {
                 Sign::Zero => "not distinguishable from zero",
             };
             let until = transient + found.duration;
-            // So many that rounding does not move the interval.
-            let digits = (2.0 - log10(half_width)).ceil().clamp(6.0, 17.0) as usize;
+            let value = with_digits(value, half_width, 6);
             format!(
-                "{value:.digits$} +- {half_width:.1e} per unit time ({meaning}; mean over t = \
+                "{value} +- {half_width:.1e} per unit time ({meaning}; mean over t = \
                     {transient} to {until}, 95 % interval)\n"
             )
             .into_bytes()
@@ -227,8 +225,8 @@ fn of_general(arguments: &Arguments, question: &GeneralExponents) -> Result<cli:
                 } else {
                     String::new()
                 };
-                text +=
-                    &format!("{value:.6} +- {half_width:.1e} per unit time ({meaning}{mean})\n");
+                let value = with_digits(value, *half_width, 6);
+                text += &format!("{value} +- {half_width:.1e} per unit time ({meaning}{mean})\n");
             }
             if found.len() < question.count {
                 let missing = question.count - found.len();

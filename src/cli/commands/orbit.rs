@@ -13,7 +13,9 @@ use crate::cli::exit::part_of;
 use crate::cli::flags::{RunFlags, Use};
 use crate::cli::general;
 use crate::cli::progress::Progress;
-use crate::cli::speak::{Delivery, deliver, is_standard_output, state_in_words, try_delivery};
+use crate::cli::speak::{
+    Delivery, deliver, is_standard_output, state_in_words, try_delivery, with_digits,
+};
 use crate::cli::{CliError, Exit};
 use crate::hybrid::motion::Record;
 use crate::hybrid::motion::tangent::Return;
@@ -316,7 +318,7 @@ fn of_general(arguments: &Arguments, question: &GeneralOrbit) -> Result<Exit, Cl
             };
             line("period", format!("{period}"));
             line("point", state_in_words(&names, &point));
-            line("multipliers", complex(&multipliers));
+            line("multipliers", complex(&multipliers, f64::NAN));
             let stability = match () {
                 () if (largest - 1.0).abs() < 1e-6 => {
                     "neutral: a multiplier is on the unit circle within its error"
@@ -426,7 +428,7 @@ fn text(question: &ClosedOrbit, answer: &Answer) -> Result<String, CliError> {
     line("period", format!("{period}"));
     line("point", state_in_words(&names, &point));
     let error: f64 = answer.fact("multiplier_error").map_err(fact)?;
-    line("multipliers", format!("{}, each +- {error:.1e}", complex(&multipliers)));
+    line("multipliers", format!("{}, each +- {error:.1e}", complex(&multipliers, error)));
     line(
         "stability",
         match (answer.fact::<Stability>("stability").map_err(fact)?, rate) {
@@ -481,12 +483,17 @@ fn branch_lines(along: &Along, answer: &Answer, line: &mut dyn FnMut(&str, Strin
     }
 }
 
-fn complex(numbers: &[[f64; 2]]) -> String {
+fn complex(numbers: &[[f64; 2]], error: f64) -> String {
     if numbers.is_empty() {
         return "none: with one state there is no direction off the orbit".into();
     }
     let said = |m: &[f64; 2]| {
-        if m[1] == 0.0 { format!("{:.9}", m[0]) } else { format!("{:.9} {:+.9} i", m[0], m[1]) }
+        let real = with_digits(m[0], error, 9);
+        let sign = if m[1] < 0.0 { '-' } else { '+' };
+        match with_digits(m[1].abs(), error, 9) {
+            _ if m[1] == 0.0 => real,
+            imaginary => format!("{real} {sign}{imaginary} i"),
+        }
     };
     numbers.iter().map(said).collect::<Vec<_>>().join(", ")
 }
@@ -506,8 +513,11 @@ fn at_rest(question: &ClosedOrbit, rest: &Rest) -> String {
         (RestStability::Repels, _) => "repels".into(),
         (RestStability::Neutral, _) => "neutral: linear terms do not decide".into(),
     };
-    let numbers =
-        if rest.eigenvalues.is_empty() { "none".into() } else { complex(&rest.eigenvalues) };
+    let numbers = if rest.eigenvalues.is_empty() {
+        "none".into()
+    } else {
+        complex(&rest.eigenvalues, f64::NAN)
+    };
     let end = match rest.stability {
         RestStability::Attracts => "The motion comes to rest: there is no closed orbit near.",
         RestStability::Repels | RestStability::Neutral => {
