@@ -640,6 +640,40 @@ fn a_sweep_says_what_runs_settle_on() {
     assert!(table.numbers("x").iter().all(|x| (x - 0.3).abs() < 1e-9 || (x - 0.8).abs() < 1e-9));
 }
 
+/// Periods of the logistic map and of the converter that ships, wherever the origin of a state
+/// lies: what is the same is measured by the swing.
+#[test]
+fn periods_do_not_depend_on_the_origin() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(
+        at.join("map.toml"),
+        "states = ['x']\nstart = [0.3]\nf = ['0']\n[parameters]\nr = 3\nc = 0\n[[event]]\nevery = \
+            1\nset = { x = 'c + r*(x - c)*(1 - (x - c))' }",
+    )
+    .unwrap();
+    let outcomes = |flags: &[&str]| -> Vec<String> {
+        let table = from_csv(&good(at, &[&["sweep", "--quiet"], flags].concat())).unwrap().1;
+        table.words("outcome").map(str::to_owned).collect()
+    };
+    for (c, start) in [("0", "0.3"), ("1e4", "10000.3")] {
+        let set = format!("c={c}");
+        let map = ["--system", "map.toml", "--period", "1", "--t-end", "3000", "--set", &set];
+        let over = ["--start", start, "--over", "params.r=2.8,3.2,3.5,3.55,3.565,3.845,3.57,3.9"];
+        let expected = ["rest", "period-2", "period-4", "period-8", "period-16", "period-6"];
+        // At 3.57 chaos in so narrow bands is not told from a long period.
+        assert_eq!(
+            outcomes(&[&map[..], &over].concat()),
+            [&expected[..], &["undecided", "irregular"]].concat(),
+            "{c}"
+        );
+    }
+    // Doubled at 24.5166 V.
+    let buck = ["--system", "buck", "--period", "400e-6", "--t-end", "1"];
+    let found = outcomes(&[&buck[..], &["--over", "params.input=24,24.6,25"]].concat());
+    assert_eq!(found, ["period-1", "period-2", "period-2"]);
+}
+
 /// Motion that is not decided, and the end of a domain: exit code 3, and the rows so far.
 #[test]
 fn runs_that_fail_keep_their_rows() {

@@ -509,7 +509,7 @@ pub fn starts_on_an_event(model: &Model, options: &Options) -> Result<bool, Hybr
 
 /// [`follow_watched`], and whether the motion at a finished run's end rests: whether it goes on for
 /// a time `longer` than that, and for two of the times between its events, without moving by more
-/// than `within` of the largest size of a state. Equations that see the time do not rest.
+/// than `within` says of the largest size of a state. Equations that see the time do not rest.
 ///
 /// # Errors
 /// As [`follow`].
@@ -519,7 +519,7 @@ pub fn follow_to_rest(
     observe: &mut dyn FnMut(&Point) -> bool,
     reached: &dyn Fn(f64) -> bool,
     longer: f64,
-    within: f64,
+    within: &dyn Fn(f64) -> f64,
 ) -> Result<(Outcome, bool), HybridError> {
     let mut follower = Follower::new(model, options)?;
     follower.reached = Some(reached);
@@ -540,7 +540,7 @@ pub fn follow_to_rest(
         ..options.clone()
     };
     follower.options = &more;
-    let within = within * follower.size.iter().fold(0.0_f64, |most, s| most.max(*s));
+    let within = within(follower.size.iter().fold(0.0_f64, |most, s| most.max(*s)));
     let stays = |x: &[f64]| x.iter().zip(&outcome.x).all(|(a, b)| (a - b).abs() <= within);
     // A motion that cannot go on is not at rest.
     let ending = follower.run(&mut |point| stays(point.x));

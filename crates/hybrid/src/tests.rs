@@ -2772,7 +2772,7 @@ fn what_only_events_move_rests_if_they_do_not_move_it() {
         ));
         let options = Options { t_end, ..Options::default() };
         let longer = 0.05 * t_end;
-        follow_to_rest(&model, &options, &mut |_| true, &|_| true, longer, 1e-6).unwrap().1
+        follow_to_rest(&model, &options, &mut |_| true, &|_| true, longer, &|s| 1e-6 * s).unwrap().1
     };
     assert!(!rests(2.8, 5.0) && rests(2.8, 200.0));
     assert!(!rests(3.2, 5.0) && !rests(3.2, 15.5) && !rests(3.2, 200.0));

@@ -1,11 +1,14 @@
 //! The outcome of one row of a sweep of a general system.
 
+use std::cell::RefCell;
+
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use twofold_analyse::attractor::{self, SectionPoint, Thresholds};
+use twofold_analyse::attractor::{self, Evidence, SectionPoint, Thresholds, Verdict};
 use twofold_hybrid::motion::{Method, Record, follow_to_rest};
 use twofold_hybrid::{Ending, Options};
 use twofold_integrate::Monitor;
+use twofold_num::elementary::sqrt;
 use twofold_system::Expression;
 
 use super::outcome::place_of;
@@ -16,9 +19,16 @@ use crate::question::{Ask, JobError, Question};
 use crate::table::{Column, Entry};
 
 /// A motion rests that stays where it is for this share of its run longer, within so much of the
-/// size of its states.
+/// size of its states, and of the swing of the points that were looked at in the run's later half.
 const LONGER: f64 = 0.05;
 const STILL: f64 = 1e-6;
+const STILL_OF_SWING: f64 = 1e-3;
+/// The longest period looked for.
+const LONGEST_PERIOD: usize = 64;
+/// Points are the same that lie within so much of their swing in the later half of the run, or
+/// within so many times the tolerance of the size of their states.
+const SAME_OF_SWING: f64 = 1e-5;
+const SAME_OF_TOLERANCE: f64 = 100.0;
 
 /// Outcome of a run of a general system. Fact: `ending` ([`GeneralEnding`]).
 #[derive(Clone, Debug, PartialEq)]
@@ -80,9 +90,11 @@ impl GeneralOutcome {
         let GeneralRun { model, options } = &self.0;
         let strobed = matches!(options.record, Record::Times { .. });
         let plane = plane(&self.0);
-        let mut section: Vec<SectionPoint> = Vec::new();
+        let looks = is_looked_at(options);
+        let section = RefCell::new(Vec::<SectionPoint>::new());
         let mut observe = |point: &twofold_hybrid::Point<'_>| {
             let u = plane.map(|i| i.map_or(0.0, |i| point.x[i]));
+            let mut section = section.borrow_mut();
             // Seen every period is the state after the events of that moment.
             if strobed
                 && point.event.is_some()
@@ -101,15 +113,22 @@ impl GeneralOutcome {
             true
         };
         let longer = LONGER * (options.t_end - options.t_start);
+        let shown_from = 0.5 * (options.t_start + options.t_end);
+        let least = SAME_OF_TOLERANCE * options.rtol.max(f64::EPSILON);
+        let within = |size: f64| {
+            let swing = Late::of(&section.borrow(), shown_from).swing;
+            let of_swing = if looks { STILL_OF_SWING * swing } else { f64::INFINITY };
+            (STILL * size).min(of_swing.max(least * size))
+        };
         let (found, rests) = follow_to_rest(
             model,
             options,
             &mut observe,
             &|t| monitor.reached(t).is_continue(),
             longer,
-            STILL,
+            &within,
         )?;
-        let looks = is_looked_at(options);
+        let section = section.into_inner();
         let crossings = if looks { section.len() as u64 } else { 0 };
         let bare = |word: &str| Outcome::bare(word, crossings, found.t, found.steps);
         let (mut place, mut event) = (Vec::new(), String::new());
@@ -130,11 +149,12 @@ impl GeneralOutcome {
             Ending::Finished if looks => {
                 let question = attractor::Question {
                     t_end: (!strobed).then_some(options.t_end),
-                    shown_from: 0.5 * (options.t_start + options.t_end),
+                    shown_from,
                     ..attractor::Question::default()
                 };
-                let evidence = attractor::classify(&section, &question, &Thresholds::default());
+                let (evidence, middle) = judged(&section, &question, least);
                 place = place_of(&evidence);
+                place.iter_mut().flatten().enumerate().for_each(|(i, u)| *u += middle[i % 2]);
                 Outcome { crossings, ..Outcome::judged(&evidence, found.t, found.steps) }
             }
             Ending::Finished => bare("moving"),
@@ -149,6 +169,68 @@ impl GeneralOutcome {
             switches: found.switches,
         })
     }
+}
+
+/// The points of the later half of a run.
+struct Late {
+    /// The middle of the box around them.
+    middle: [f64; 2],
+    /// Its diagonal.
+    swing: f64,
+    /// The largest of their components.
+    size: f64,
+}
+
+impl Late {
+    fn of(section: &[SectionPoint], from: f64) -> Self {
+        let (mut low, mut high, mut size) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2], 0.0_f64);
+        for p in section.iter().filter(|p| p.t >= from) {
+            for k in 0..2 {
+                (low[k], high[k]) = (low[k].min(p.u[k]), high[k].max(p.u[k]));
+                size = size.max(p.u[k].abs());
+            }
+        }
+        if !(low[0] <= high[0]) {
+            return Self { middle: [0.0; 2], swing: 0.0, size: 0.0 };
+        }
+        let [a, b] = [high[0] - low[0], high[1] - low[1]];
+        let middle = [0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])];
+        Self { middle, swing: sqrt(a * a + b * b), size }
+    }
+}
+
+/// The verdict on a section wherever the origin of its states lies: seen from the middle of its
+/// later half, where points are the same that the run does not tell apart. Points on a line are no
+/// closed curve. Also that middle.
+fn judged(
+    section: &[SectionPoint],
+    question: &attractor::Question<'_>,
+    least: f64,
+) -> (Evidence, [f64; 2]) {
+    let Late { mut middle, swing, size } = Late::of(section, question.shown_from);
+    let from = |middle: [f64; 2]| -> (Vec<SectionPoint>, f64) {
+        let u = |p: &SectionPoint| [p.u[0] - middle[0], p.u[1] - middle[1]];
+        let seen: Vec<SectionPoint> =
+            section.iter().map(|p| SectionPoint { u: u(p), ..*p }).collect();
+        let extent = seen.iter().flat_map(|p| p.u).fold(0.0_f64, |most, u| most.max(u.abs()));
+        (seen, extent)
+    };
+    let same = (SAME_OF_SWING * swing).max(least * size);
+    let (mut seen, mut extent) = from(middle);
+    if extent <= same {
+        // One point from the first on: it has the size of its states for an extent.
+        middle = [0.0; 2];
+        (seen, extent) = from(middle);
+    }
+    let thresholds =
+        Thresholds { dot: same / extent, longest_period: LONGEST_PERIOD, ..Thresholds::default() };
+    let mut evidence = attractor::classify(&seen, question, &thresholds);
+    if let Verdict::QuasiPeriodic(cycle) = &evidence.verdict
+        && cycle.rotation.is_none()
+    {
+        evidence.verdict = Verdict::Undecided { lyapunov: None };
+    }
+    (evidence, middle)
 }
 
 impl GeneralEnding {
