@@ -34,8 +34,7 @@ pub struct ByMethod {
 pub fn time(run: &CensusRun, end: f64) -> Time {
     match run.kind(end) {
         MotionKind::Irregular | MotionKind::Undecided => (end, false),
-        _ if run.captured_at.is_finite() => (run.captured_at, true),
-        _ => (0.0, true),
+        _ => run.captured().map_or((end, false), |t| (t, true)),
     }
 }
 

@@ -136,6 +136,12 @@ impl CensusRun {
             _ => MotionKind::OtherRegular,
         }
     }
+
+    /// When a closed orbit, or the far state, captured it. A ring is no closed orbit.
+    pub fn captured(&self) -> Option<f64> {
+        (self.captured_at.is_finite() && self.outcome != "quasi-periodic")
+            .then_some(self.captured_at)
+    }
 }
 
 /// The runs of a sweep's table in which every column of `chosen` has its value.
@@ -179,7 +185,7 @@ pub fn supporting(said: Said, runs: &[CensusRun], rules: &Rules) -> u64 {
 /// capture.
 pub fn captures(runs: &[CensusRun], of: impl Fn(&CensusRun) -> bool) -> Vec<[f64; 2]> {
     let mut times: Vec<f64> =
-        runs.iter().filter(|r| of(r) && r.captured_at.is_finite()).map(|r| r.captured_at).collect();
+        runs.iter().filter(|r| of(r)).filter_map(CensusRun::captured).collect();
     times.sort_by(f64::total_cmp);
     let n = runs.len().max(1) as f64;
     times.iter().enumerate().map(|(i, t)| [*t, (i + 1) as f64 / n]).collect()
