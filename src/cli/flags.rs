@@ -100,7 +100,8 @@ pub struct RunFlags {
     #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
     pub t_end: Option<f64>,
     /// Integration method [default: lsoda; dopri5 with --switch filippov, delayed or relay, and of
-    /// general systems and those of more than four states, which take dopri5, radau5 and taylor].
+    /// general systems and those of more than four states, which take dopri5, lsoda, radau5 and
+    /// taylor].
     #[arg(long, value_enum, help_heading = "Method")]
     pub method: Option<Method>,
     /// Relative tolerance [default: 10^-7.97727, NDSolve's; with taylor-extended 1e-32 or what

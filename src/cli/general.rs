@@ -208,18 +208,15 @@ fn method(named: Option<Named>) -> Result<Method, CliError> {
         None | Some(Named::Dopri5) => return Ok(Method::Dopri5),
         Some(Named::Radau5) => return Ok(Method::Radau5),
         Some(Named::Taylor) => return Ok(Method::Taylor),
-        Some(Named::Lsoda) => (
-            "lsoda",
-            "it builds up its order over many steps, and every switch or event begins anew",
-        ),
+        Some(Named::Lsoda) => return Ok(Method::Lsoda),
         Some(Named::TaylorExtended) => {
             ("taylor-extended", "switches and events are located in double precision")
         }
         Some(Named::Layered) => ("layered", "it belongs to a smoothed switch"),
     };
     Err(usage(format!(
-        "--method {name}: general systems are followed by dopri5, radau5 where they are stiff, or \
-            taylor for many digits; {why}"
+        "--method {name}: general systems are followed by dopri5, lsoda or radau5 where they are \
+            stiff, or taylor for many digits; {why}"
     )))
 }
 

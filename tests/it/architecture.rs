@@ -15,8 +15,8 @@ const CRATES: [(&str, &[&str], &[&str]); 14] = [
     // Shares nothing with what it checks.
     ("verify", &[], &["num-bigint"]),
     ("system", &["num"], &[]),
-    ("hybrid", &["num", "system"], &["csv"]),
     ("integrate", &["num", "system"], &[]),
+    ("hybrid", &["num", "system", "integrate"], &["csv"]),
     ("rigor", &["num", "system", "integrate"], &[]),
     ("analyse", &["num", "system", "integrate", "rigor"], &[]),
     ("instances", &["system", "integrate", "analyse"], &[]),

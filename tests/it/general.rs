@@ -443,11 +443,6 @@ fn wrong_files_and_flags_are_refused() {
     }
     ball(&["--print-spec"], 2, &["--print-spec has no effect"]);
     ball(
-        &["--method", "lsoda"],
-        2,
-        &["--method lsoda: general systems", "dopri5", "over many steps"],
-    );
-    ball(
         &["--method", "taylor-extended"],
         2,
         &["dopri5", "taylor for many digits", "double precision"],
@@ -1115,7 +1110,7 @@ fn systems_of_many_states_are_general_ones() {
         (&["--kick-every", "1"], "belongs to systems of up to four states, and this one has more"),
         (&["--exit", "at-once:plus"], "belongs to the discontinuous system"),
         (&["--eps", "nan"], "--eps is NaN: give a finite number above zero"),
-        (&["--method", "lsoda"], "general systems are followed by dopri5"),
+        (&["--method", "layered"], "general systems are followed by dopri5"),
     ] {
         refused(at, &[&["run"][..], &of, flags].concat(), 2, &[expected]);
     }

@@ -8,6 +8,7 @@
 mod clock;
 mod locate;
 mod meeting;
+mod multistep;
 mod search;
 pub mod sensitivity;
 mod series;
@@ -16,6 +17,7 @@ mod sliding;
 pub mod tangent;
 
 use clock::Clock;
+pub(crate) use multistep::Multistep;
 use search::active_value;
 pub(crate) use sliding::determinant_of_negative;
 
@@ -79,14 +81,18 @@ pub enum Method {
     Radau5,
     /// Taylor series of the motion, of an order that the tolerance decides: for many digits.
     Taylor,
+    /// Adams and BDF formulas of variable order, chosen automatically: for smooth stretches that
+    /// are long beside the time that the order takes to grow, stiff or not.
+    Lsoda,
 }
 
 impl Method {
+    /// All methods.
+    pub const ALL: [Method; 4] = [Method::Dopri5, Method::Radau5, Method::Taylor, Method::Lsoda];
+
     /// The one of this name.
     pub fn named(name: &str) -> Option<Self> {
-        [Method::Dopri5, Method::Radau5, Method::Taylor]
-            .into_iter()
-            .find(|method| method.name() == name)
+        Self::ALL.into_iter().find(|method| method.name() == name)
     }
 
     /// Its name.
@@ -95,6 +101,7 @@ impl Method {
             Method::Dopri5 => "dopri5",
             Method::Radau5 => "radau5",
             Method::Taylor => "taylor",
+            Method::Lsoda => "lsoda",
         }
     }
 }
@@ -373,7 +380,7 @@ impl Train {
 }
 
 /// A contact: motion rests on an event's surface.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Contact {
     event: usize,
     watched: usize,
@@ -876,11 +883,7 @@ impl<'a> Follower<'a> {
                 return Err(self.left_domain(step.t, &step.x));
             }
             if self.options.method == Method::Radau5 {
-                // Iterations without a slope that is infinite, as that of a root at zero, settle in
-                // short steps.
-                let mut jacobian = self.jacobian(step.t, &step.x);
-                jacobian.iter_mut().filter(|j| !j.is_finite()).for_each(|j| *j = 0.0);
-                step.jacobian = Some(jacobian);
+                step.jacobian = Some(self.finite_jacobian(step.t, &step.x));
             }
             if self.options.method == Method::Taylor {
                 if let Err(error) = self.expand(&mut step) {
@@ -892,6 +895,9 @@ impl<'a> Follower<'a> {
                 // If switches or events are frequent, a step is no longer than the time between
                 // them.
                 h = self.step_of_series(&step)?.min(if h > 0.0 { h } else { f64::INFINITY });
+            } else if self.options.method == Method::Lsoda {
+                self.take_up(&mut step);
+                h = if h > 0.0 { h } else { f64::INFINITY };
             } else if h == 0.0 {
                 h = self.first_step(&room);
             }
@@ -914,8 +920,8 @@ impl<'a> Follower<'a> {
             let stopped = to_stop && !rejected;
             let most = if rejected { 1.2 } else { 5.0 };
             let h_next = match self.options.method {
-                // The next step's series says it.
-                Method::Taylor => f64::INFINITY,
+                // The next step's series, or the history, says it.
+                Method::Taylor | Method::Lsoda => f64::INFINITY,
                 _ => {
                     wanted
                         * if error > 0.0 {
@@ -996,6 +1002,7 @@ impl<'a> Follower<'a> {
                 if !self.sliding.is_empty() || !self.contacts.is_empty() {
                     self.project();
                 }
+                self.keep(&mut step);
                 continue;
             }
             quiet = if progress { 0 } else { quiet + 1 };
@@ -1068,7 +1075,10 @@ impl<'a> Follower<'a> {
         list: &mut Vec<(Sought, f64)>,
     ) -> Option<Accepted> {
         let mut scale = std::mem::take(&mut self.scale);
-        let accepted = self.step_in_units(step, longest, &mut scale, list);
+        let accepted = match self.options.method {
+            Method::Lsoda => self.step_of_many(step, longest, &mut scale, list),
+            _ => self.step_in_units(step, longest, &mut scale, list),
+        };
         self.scale = scale;
         accepted
     }
@@ -1237,7 +1247,8 @@ impl<'a> Follower<'a> {
                 let mut farthest = 0.0_f64;
                 let few = [0.25, 0.5, 0.75];
                 let many: Vec<f64> = (1..16).map(|i| i as f64 / 16.0).collect();
-                for &place in if step.series.is_some() { &many[..] } else { &few } {
+                let is_long = step.series.is_some() && step.multistep.is_none();
+                for &place in if is_long { &many[..] } else { &few } {
                     step.at(place, &mut at);
                     let mut off = 0.0;
                     for i in 0..self.n {

@@ -1,8 +1,11 @@
 //! Steps for any number of states: Dormand & Prince's method of order 5 (1980) with the continuous
 //! extension of order 4 (Hairer, Norsett & Wanner 1993, sec. II.6), for stiff motion Radau IIA of
 //! order 5 with its collocation polynomial (Hairer & Wanner 1996, sec. IV.8), and Taylor series.
+//! What the multistep method makes is made elsewhere ([`Multistep`]) and read as a series is.
 
 use twofold_num::linear::solve_any;
+
+use crate::motion::Multistep;
 
 /// Nodes, coefficients row by row, and the error estimate.
 pub(crate) const C: [f64; 7] = [0.0, 0.2, 0.3, 0.8, 8.0 / 9.0, 1.0, 1.0];
@@ -51,7 +54,8 @@ const LARGEST_DEFECT: f64 = 20.0;
 /// The series of the motion where a step begins.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Series {
-    /// The coefficients of each state, and of what is followed beside them, by powers of the time.
+    /// The coefficients of each state, and of what is followed beside them, by powers of the time;
+    /// of the fraction of the whole step if the multistep method made it.
     pub terms: Vec<Vec<f64>>,
     /// The same by powers of the fraction of the step.
     pub scaled: Vec<Vec<f64>>,
@@ -62,6 +66,21 @@ pub(crate) struct Series {
     /// Differences of the series' derivative from the field in the middle and at the end, times the
     /// step.
     defect: Vec<f64>,
+}
+
+impl Series {
+    /// Sets the coefficients of a step of this length.
+    fn scale(&mut self, h: f64) {
+        self.scaled.resize(self.terms.len(), Vec::new());
+        for (scaled, terms) in self.scaled.iter_mut().zip(&self.terms) {
+            scaled.clear();
+            let mut power = 1.0;
+            for c in terms {
+                scaled.push(c * power);
+                power *= h;
+            }
+        }
+    }
 }
 
 fn horner(c: &[f64], u: f64) -> f64 {
@@ -92,8 +111,10 @@ pub(crate) struct Step {
     pub jacobian: Option<Vec<f64>>,
     /// The error estimate of an implicit step.
     estimate: Vec<f64>,
-    /// The series where it begins: the step is then one of them.
+    /// The series where it begins: the step is then one of them, or of the multistep method.
     pub series: Option<Series>,
+    /// The multistep method: the step is then one that it made, or the beginning of one.
+    pub multistep: Option<Multistep>,
 }
 
 impl Step {
@@ -110,6 +131,7 @@ impl Step {
             jacobian: None,
             estimate: zeros(),
             series: None,
+            multistep: None,
         }
     }
 
@@ -117,6 +139,10 @@ impl Step {
     pub fn take(&mut self, h: f64, rhs: &mut RightHandSide<'_>) {
         self.h = h;
         let n = self.x.len();
+        if self.multistep.is_some() {
+            self.take_beginning(h);
+            return;
+        }
         if let Some(mut series) = self.series.take() {
             self.take_series(h, &mut series, rhs);
             self.series = Some(series);
@@ -160,16 +186,8 @@ impl Step {
     /// Enright 1989).
     fn take_series(&mut self, h: f64, series: &mut Series, rhs: &mut RightHandSide<'_>) {
         let n = self.x.len();
-        series.scaled.resize(series.terms.len(), Vec::new());
         series.defect.resize(n, 0.0);
-        for (scaled, terms) in series.scaled.iter_mut().zip(&series.terms) {
-            scaled.clear();
-            let mut power = 1.0;
-            for c in terms {
-                scaled.push(c * power);
-                power *= h;
-            }
-        }
+        series.scale(h);
         for i in 0..n {
             self.y[i] = self.x[i] + horner(&series.scaled[i][1..], 1.0);
             self.stage[i] = self.x[i] + 0.5 * horner(&series.scaled[i][1..], 0.5);
@@ -184,6 +202,25 @@ impl Step {
                 if middle.abs() > end.abs() { middle.abs() } else { end.abs() + 0.0 * middle };
         }
         for s in 2..6 {
+            let (done, open) = self.k.split_at_mut(s);
+            open[0].copy_from_slice(&done[1]);
+        }
+    }
+
+    /// The beginning, of length `h`, of the step that the multistep method made.
+    fn take_beginning(&mut self, h: f64) {
+        let (Some(series), Some(own)) = (&mut self.series, &self.multistep) else { return };
+        let (share, end) = own.share(h);
+        series.scale(share);
+        match end {
+            Some(end) => self.y.copy_from_slice(end),
+            None => (0..self.y.len()).for_each(|i| {
+                self.y[i] = self.x[i] + horner(&series.scaled[i][1..], 1.0);
+            }),
+        }
+        let (scaled, h) = (&series.scaled, self.h);
+        self.k[1].iter_mut().zip(scaled).for_each(|(k, c)| *k = horner_slope(c, 1.0) / h);
+        for s in 2..7 {
             let (done, open) = self.k.split_at_mut(s);
             open[0].copy_from_slice(&done[1]);
         }

@@ -53,7 +53,7 @@ pub use dopri5::Dopri5;
 pub use driver::{DriveOptions, Ignore, Monitor, Observer, Summary, drive};
 pub use guard::Guarded;
 pub use layered::Layered;
-pub use lsoda::Lsoda;
+pub use lsoda::{Lsoda, LsodaOf};
 pub use method::{Method, PRECISIONS, WithStepper, with_extended};
 pub use radau5::Radau5;
 pub use schedule::{Kick, KickLaw, Kicker, Schedule, StepCap};

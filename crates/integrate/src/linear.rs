@@ -1,29 +1,38 @@
-//! Linear systems of a fixed small size, for the implicit methods: LU with partial pivoting.
+//! Linear systems of a small size, mostly a fixed one, for the implicit methods: LU with partial
+//! pivoting.
 //!
 //! `nalgebra`'s own `LU` type asks every caller to carry its dimension bounds (`DimMin`), up to the
 //! figure that only wants a `Stepper<N>`, and its elimination step finds the size out only when it
 //! runs.
 
-use nalgebra::{ComplexField, SMatrix, SVector};
+use nalgebra::allocator::Allocator;
+use nalgebra::{ComplexField, DefaultAllocator, Dim, OMatrix, OVector, Scalar, U1};
 
 /// P A = L U.
 #[derive(Clone, Debug)]
-pub(super) struct Lu<T, const N: usize> {
+pub(super) struct Lu<T: Scalar, D: Dim>
+where
+    DefaultAllocator: Allocator<D> + Allocator<D, D>,
+{
     /// L below the diagonal (its unit diagonal is not stored), U on and above it.
-    factors: SMatrix<T, N, N>,
+    factors: OMatrix<T, D, D>,
     /// Row exchanged with row i at elimination step i.
-    exchanged: [usize; N],
+    exchanged: OVector<usize, D>,
 }
 
-impl<T: ComplexField<RealField = f64> + Copy, const N: usize> Lu<T, N> {
+impl<T: ComplexField<RealField = f64> + Copy, D: Dim> Lu<T, D>
+where
+    DefaultAllocator: Allocator<D> + Allocator<D, D>,
+{
     /// Factorises `a`; `None` if it is singular to working precision or not finite.
     #[inline(always)]
-    pub fn new(a: SMatrix<T, N, N>) -> Option<Self> {
+    pub fn new(a: OMatrix<T, D, D>) -> Option<Self> {
         let mut factors = a;
-        let mut exchanged = [0; N];
-        for i in 0..N {
+        let (states, n) = (factors.shape_generic().0, factors.nrows());
+        let mut exchanged = OVector::from_element_generic(states, U1, 0);
+        for i in 0..n {
             let mut pivot = i;
-            for row in i + 1..N {
+            for row in i + 1..n {
                 if factors[(row, i)].norm1() > factors[(pivot, i)].norm1() {
                     pivot = row;
                 }
@@ -32,7 +41,7 @@ impl<T: ComplexField<RealField = f64> + Copy, const N: usize> Lu<T, N> {
             // By numbers that are known when this is compiled, so that the matrix stays in
             // registers: a row that is looked up sends it through memory, where it is read before
             // it is written.
-            for row in i + 1..N {
+            for row in i + 1..n {
                 if row == pivot {
                     factors.swap_rows(i, row);
                 }
@@ -43,12 +52,12 @@ impl<T: ComplexField<RealField = f64> + Copy, const N: usize> Lu<T, N> {
                 return None;
             }
             let inverse = T::one() / diagonal;
-            for row in i + 1..N {
+            for row in i + 1..n {
                 factors[(row, i)] *= inverse;
             }
-            for column in i + 1..N {
+            for column in i + 1..n {
                 let above = -factors[(i, column)];
-                for row in i + 1..N {
+                for row in i + 1..n {
                     let eliminated = above * factors[(row, i)];
                     factors[(row, column)] = eliminated + factors[(row, column)];
                 }
@@ -59,22 +68,23 @@ impl<T: ComplexField<RealField = f64> + Copy, const N: usize> Lu<T, N> {
 
     /// The solution of A x = b.
     #[inline(always)]
-    pub fn solve(&self, mut b: SVector<T, N>) -> SVector<T, N> {
-        for i in 0..N {
-            for row in i + 1..N {
+    pub fn solve(&self, mut b: OVector<T, D>) -> OVector<T, D> {
+        let n = b.len();
+        for i in 0..n {
+            for row in i + 1..n {
                 if row == self.exchanged[i] {
                     b.swap_rows(i, row);
                 }
             }
         }
-        for i in 1..N {
+        for i in 1..n {
             for j in 0..i {
                 let known = self.factors[(i, j)] * b[j];
                 b[i] -= known;
             }
         }
-        for i in (0..N).rev() {
-            for j in i + 1..N {
+        for i in (0..n).rev() {
+            for j in i + 1..n {
                 let known = self.factors[(i, j)] * b[j];
                 b[i] -= known;
             }
@@ -87,7 +97,7 @@ impl<T: ComplexField<RealField = f64> + Copy, const N: usize> Lu<T, N> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{Complex, matrix, vector};
+    use nalgebra::{Complex, SMatrix, SVector, matrix, vector};
     use proptest::prelude::*;
 
     #[test]

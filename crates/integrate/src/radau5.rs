@@ -6,7 +6,7 @@
 //! method that estimates the error of the solution it goes on with. Tolerances are taken literally;
 //! Hairer & Wanner's own program replaces rtol by 0.1 rtol^(2/3) to compensate.
 
-use nalgebra::{Complex, Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{Complex, Const, Matrix3, SMatrix, SVector, Vector3};
 
 use super::guard::Redoable;
 use super::linear::Lu;
@@ -120,8 +120,8 @@ mod control {
 /// The two factorised matrices real/h - J and complex/h - J.
 #[derive(Clone, Debug)]
 struct Matrices<const N: usize> {
-    real: Lu<f64, N>,
-    complex: Lu<Complex<f64>, N>,
+    real: Lu<f64, Const<N>>,
+    complex: Lu<Complex<f64>, Const<N>>,
 }
 
 /// The collocation polynomial of one step: x0 + theta (p1 + theta (p2 + theta p3)).

@@ -285,7 +285,7 @@ impl Follower<'_> {
         }
         // Weights of sliding and forces of contacts are made of the fields.
         let fields = !(self.sliding.is_empty() && self.contacts.is_empty());
-        let mut whole = true;
+        let mut whole = step.multistep.is_none() || list.is_empty();
         for of_field in [false, true] {
             whole &= (of_field && !fields) || self.smooth_parts(step, 1, of_field)?.len() <= 1;
         }

@@ -35,14 +35,13 @@ mod coefficients;
 mod nordsieck;
 mod selection;
 
-use nalgebra::{SMatrix, SVector};
+use nalgebra::allocator::Allocator;
+use nalgebra::{Const, DefaultAllocator, Dim, OMatrix, OVector, SVector, U1};
 use serde::{Deserialize, Serialize};
 
 use super::guard::Redoable;
 use super::linear::Lu;
-use super::step::{
-    Driven, Failure, Interpolant, Statistics, Steady, Step, Stepper, Tolerance, finite,
-};
+use super::step::{Driven, Failure, Interpolant, Statistics, Steady, Step, Stepper, Tolerance};
 use coefficients::{ADAMS, ADAMS_ORDERS, ADAMS_STABILITY, BDF, BDF_ORDERS, ERROR_RATIO, Formula};
 use nordsieck::Nordsieck;
 use selection::*;
@@ -100,7 +99,33 @@ struct Change {
     ratio: f64,
 }
 
-/// The LSODA stepper.
+/// A right-hand side of as many states as `D` says, which may be known only at run time.
+pub trait RightHandSide<D: Dim>
+where
+    DefaultAllocator: Allocator<D> + Allocator<D, D>,
+{
+    /// f(t, x).
+    fn eval(&self, t: f64, x: &OVector<f64, D>) -> OVector<f64, D>;
+    /// The Jacobian matrix df/dx at (t, x).
+    fn jacobian(&self, t: f64, x: &OVector<f64, D>) -> OMatrix<f64, D, D>;
+}
+
+impl<F: VectorField<N>, const N: usize> RightHandSide<Const<N>> for Steady<'_, F> {
+    #[inline(always)]
+    fn eval(&self, t: f64, x: &SVector<f64, N>) -> SVector<f64, N> {
+        Driven::eval(self, t, x)
+    }
+    #[inline(always)]
+    fn jacobian(&self, t: f64, x: &SVector<f64, N>) -> OMatrix<f64, Const<N>, Const<N>> {
+        Driven::jacobian(self, t, x)
+    }
+}
+
+/// The LSODA stepper of a number of states that is known when it is compiled.
+pub type Lsoda<const N: usize> = LsodaOf<Const<N>>;
+
+/// The LSODA stepper, of a number of states that is known when it is compiled ([`Lsoda`]) or only
+/// at run time ([`nalgebra::Dyn`]; [`LsodaOf::start`], [`LsodaOf::advance`]).
 ///
 /// ```
 /// # use nalgebra::{SVector, vector};
@@ -121,7 +146,10 @@ struct Change {
 /// # Ok::<(), twofold_integrate::Failure>(())
 /// ```
 #[derive(Clone, Debug)]
-pub struct Lsoda<const N: usize> {
+pub struct LsodaOf<D: Dim>
+where
+    DefaultAllocator: Allocator<D> + Allocator<D, D>,
+{
     tolerance: Tolerance,
     statistics: Statistics,
     switches: Vec<Switch>,
@@ -133,15 +161,15 @@ pub struct Lsoda<const N: usize> {
     order: usize,
     /// The step that the history is scaled with.
     h: f64,
-    history: Nordsieck<N>,
+    history: Nordsieck<D>,
     /// 1 / (rtol |x_i| + atol) at the start of the step.
-    weights: SVector<f64, N>,
+    weights: OVector<f64, D>,
     /// e of the corrector formula y <- y + l e.
-    correction: SVector<f64, N>,
+    correction: OVector<f64, D>,
     /// Norm of the predicted state: the scale of rounding errors in this step.
     predicted_size: f64,
     /// e of an earlier step, for the error at the next higher order.
-    correction_before: SVector<f64, N>,
+    correction_before: OVector<f64, D>,
 
     /// Accepted steps to go until step and order are thought over.
     until_selection: usize,
@@ -160,7 +188,7 @@ pub struct Lsoda<const N: usize> {
     stability_bound: bool,
 
     /// I - h l_0 J, factorised.
-    matrix: Option<Lu<f64, N>>,
+    matrix: Option<Lu<f64, D>>,
     /// The h l_0 it was made with.
     matrix_h: f64,
     /// The step it was made in.
@@ -180,12 +208,22 @@ struct NotConverged;
 impl<const N: usize> Lsoda<N> {
     /// A stepper with the given tolerances.
     pub fn new(tolerance: Tolerance) -> Self {
-        Self { switches: Vec::with_capacity(SWITCHES_KEPT), ..Self::blank(tolerance) }
+        Self { switches: Vec::with_capacity(SWITCHES_KEPT), ..Self::blank(tolerance, Const) }
+    }
+}
+
+impl<D: Dim> LsodaOf<D>
+where
+    DefaultAllocator: Allocator<D> + Allocator<D, D>,
+{
+    /// A stepper with the given tolerances, of so many states.
+    pub fn of(tolerance: Tolerance, states: D) -> Self {
+        Self::blank(tolerance, states)
     }
 
-    /// A stepper that knows nothing yet, and has allocated nothing.
-    fn blank(tolerance: Tolerance) -> Self {
-        let zero = SVector::zeros();
+    /// A stepper that knows nothing yet.
+    fn blank(tolerance: Tolerance, states: D) -> Self {
+        let zero = OVector::zeros_generic(states, U1);
         Self {
             tolerance,
             statistics: Statistics::default(),
@@ -196,9 +234,9 @@ impl<const N: usize> Lsoda<N> {
             family: Family::Adams,
             order: 1,
             h: 0.0,
-            history: Nordsieck::new(zero, zero),
-            weights: zero,
-            correction: zero,
+            history: Nordsieck::new(zero.clone(), zero.clone()),
+            weights: zero.clone(),
+            correction: zero.clone(),
             predicted_size: 0.0,
             correction_before: zero,
             until_selection: 2,
@@ -241,7 +279,7 @@ impl<const N: usize> Lsoda<N> {
 
     /// The weighted maximum norm.
     #[inline]
-    fn norm(&self, v: &SVector<f64, N>) -> f64 {
+    fn norm(&self, v: &OVector<f64, D>) -> f64 {
         let (mut largest, mut sum) = (0.0_f64, 0.0);
         for (v, w) in v.iter().zip(&self.weights) {
             let size = v.abs() * w;
@@ -253,16 +291,103 @@ impl<const N: usize> Lsoda<N> {
     }
 
     /// The matrix norm that belongs to it: max_i w_i sum_j |J_ij| / w_j.
-    fn matrix_norm(&self, j: &SMatrix<f64, N, N>) -> f64 {
+    fn matrix_norm(&self, j: &OMatrix<f64, D, D>) -> f64 {
         let mut largest = 0.0_f64;
-        for i in 0..N {
+        let n = self.weights.len();
+        for i in 0..n {
             let mut sum = 0.0;
-            for k in 0..N {
+            for k in 0..n {
                 sum += j[(i, k)].abs() / self.weights[k];
             }
             largest = largest.max(sum * self.weights[i]);
         }
         largest
+    }
+
+    /// Begins at `x`, of whose past nothing is known.
+    #[inline]
+    fn forget(
+        &mut self,
+        t: f64,
+        x: OVector<f64, D>,
+        derivative: &OVector<f64, D>,
+        t_end: f64,
+        max_step: f64,
+    ) {
+        let fresh = Self::blank(self.tolerance, x.shape_generic().0);
+        *self = Self {
+            statistics: std::mem::take(&mut self.statistics),
+            switches: std::mem::take(&mut self.switches),
+            t,
+            t_end,
+            max_step,
+            history: Nordsieck::new(x, derivative.clone()),
+            ..fresh
+        };
+    }
+
+    /// Takes the first step's length from the weights.
+    #[inline]
+    fn begin(&mut self, derivative: OVector<f64, D>) {
+        self.h = self.first_step(&derivative);
+        self.history.set_column(1, derivative * self.h);
+    }
+
+    /// Starts at `x` with the `derivative` there, towards `t_end`. An error as large as `scale` is
+    /// the largest that a step may make; the tolerances say no more than how carefully the first
+    /// step is chosen.
+    pub fn start(
+        &mut self,
+        t: f64,
+        x: OVector<f64, D>,
+        derivative: OVector<f64, D>,
+        scale: &OVector<f64, D>,
+        t_end: f64,
+    ) {
+        self.statistics.restarts += 1;
+        self.forget(t, x, &derivative, t_end, f64::INFINITY);
+        self.weights = scale.map(|scale| 1.0 / scale);
+        self.begin(derivative);
+    }
+
+    /// Makes a step from `x` at the time `t`, where the last one ended but for the rounding of
+    /// either, to `t_end` at the latest. Errors count as in [`LsodaOf::start`].
+    ///
+    /// # Errors
+    /// If no step is short enough; the stepper is then to be started again.
+    pub fn advance(
+        &mut self,
+        rhs: &dyn RightHandSide<D>,
+        t: f64,
+        x: &OVector<f64, D>,
+        scale: &OVector<f64, D>,
+        t_end: f64,
+    ) -> Result<(), Failure> {
+        (self.t, self.t_end) = (t, t_end);
+        self.history.set_column(0, x.clone());
+        self.prepare();
+        self.weights = scale.map(|scale| 1.0 / scale);
+        self.accepted(rhs)
+    }
+
+    /// The length of the last step, or of one that failed.
+    pub fn length(&self) -> f64 {
+        self.h
+    }
+
+    /// The order and family of the last step.
+    pub fn made_by(&self) -> (usize, Family) {
+        (self.order, self.family)
+    }
+
+    /// The end of the last step.
+    pub fn time(&self) -> f64 {
+        self.t
+    }
+
+    /// The dense output of the last step: coefficients of the powers of s, which goes from -1 to 0.
+    pub fn polynomial(&self) -> &[OVector<f64, D>] {
+        self.history.polynomial()
     }
 
     fn weigh(&mut self) {
@@ -273,7 +398,7 @@ impl<const N: usize> Lsoda<N> {
     /// The first step, Radhakrishnan & Hindmarsh (1993), sec. 3.5: such that an Euler step would
     /// make an error well below the tolerance, for a solution that varies either on the scale of
     /// `t` or as fast as f says.
-    fn first_step(&self, derivative: &SVector<f64, N>) -> f64 {
+    fn first_step(&self, derivative: &OVector<f64, D>) -> f64 {
         let Tolerance { rtol, atol } = self.tolerance;
         let mut tolerance = rtol;
         if tolerance <= 0.0 {
@@ -316,7 +441,7 @@ impl<const N: usize> Lsoda<N> {
     fn change_order(&mut self, order: usize) {
         if order > self.order {
             let scale = self.formula().l[self.order] / order as f64;
-            self.history.set_column(order, self.correction * scale);
+            self.history.set_column(order, &self.correction * scale);
         }
         self.order = order;
     }
@@ -347,10 +472,10 @@ impl<const N: usize> Lsoda<N> {
     /// Evaluates the Jacobian and factorises I - h l_0 J.
     fn make_matrix(
         &mut self,
-        field: &dyn Driven<N>,
-        x: &SVector<f64, N>,
+        field: &dyn RightHandSide<D>,
+        x: &OVector<f64, D>,
     ) -> Result<(), NotConverged> {
-        let j = field.jacobian(self.t, x);
+        let j = field.jacobian(self.t + self.h, x);
         let h = self.h * self.formula().l[0];
         self.statistics.jacobians += 1;
         self.statistics.factorisations += 1;
@@ -359,50 +484,52 @@ impl<const N: usize> Lsoda<N> {
         self.matrix_h = h;
         self.matrix_step = self.statistics.steps;
         self.rate = FIRST_RATE;
-        self.matrix = Lu::new(SMatrix::identity() - j * h);
+        let (rows, columns) = j.shape_generic();
+        self.matrix = Lu::new(OMatrix::identity_generic(rows, columns) - j * h);
         if self.matrix.is_some() { Ok(()) } else { Err(NotConverged) }
     }
 
     /// Solves the corrector equation e = h f(y_0 + l_0 e) - y_1 from e = 0, by functional iteration
     /// (Adams) or Newton iteration with a kept matrix (BDF). Returns the error of the step in units
     /// of the tolerance.
-    fn correct(&mut self, field: &dyn Driven<N>) -> Result<f64, NotConverged> {
+    fn correct(&mut self, field: &dyn RightHandSide<D>) -> Result<f64, NotConverged> {
         let formula = self.formula();
         let l0 = formula.l[0];
-        let (y0, y1) = (*self.history.x(), *self.history.column(1));
+        let t = self.t + self.h;
+        let (y0, y1) = (self.history.x().clone(), self.history.column(1).clone());
         let size = self.norm(&y0);
         self.predicted_size = size;
         let tolerance = formula.converged;
         let most = if self.held { 200 } else { MOST_ITERATIONS };
         let mut new_matrix = false;
         'start: loop {
-            let mut x = y0;
-            let mut derivative = field.eval(self.t, &x);
+            let mut x = y0.clone();
+            let mut derivative = field.eval(t, &x);
             self.statistics.evaluations += 1;
             if self.family == Family::Bdf && self.renew_matrix {
                 self.make_matrix(field, &x)?;
                 new_matrix = true;
             }
-            self.correction = SVector::zeros();
+            self.correction.fill(0.0);
             let (mut change_before, mut largest_rate) = (0.0, 0.0_f64);
             let mut iteration = 0;
             loop {
                 let change = match self.family {
                     Family::Adams => {
-                        let e = derivative * self.h - y1;
-                        let change = self.norm(&(e - self.correction));
+                        let e = derivative * self.h - &y1;
+                        let change = self.norm(&(&e - &self.correction));
                         self.correction = e;
                         change
                     }
                     Family::Bdf => {
-                        let residual = derivative * self.h - (y1 + self.correction);
+                        let residual = derivative * self.h - (&y1 + &self.correction);
                         let Some(matrix) = &self.matrix else { return Err(NotConverged) };
                         let delta = matrix.solve(residual);
-                        self.correction += delta;
+                        self.correction += &delta;
                         self.norm(&delta)
                     }
                 };
-                x = y0 + self.correction * l0;
+                x = &y0 + &self.correction * l0;
                 let mut converged = change <= 100.0 * size * EPSILON;
                 // Functional iteration may not stop on the first pass: a rate is known only from
                 // the second on.
@@ -440,7 +567,7 @@ impl<const N: usize> Lsoda<N> {
                     continue 'start;
                 }
                 change_before = change;
-                derivative = field.eval(self.t, &x);
+                derivative = field.eval(t, &x);
                 self.statistics.evaluations += 1;
             }
         }
@@ -469,7 +596,7 @@ impl<const N: usize> Lsoda<N> {
         let (q, formula) = (self.order, self.formula());
         let may_rise = failures == 0 && q < self.family.highest_order();
         let higher_error = if may_rise {
-            self.norm(&(self.correction - self.correction_before)) / formula.higher
+            self.norm(&(&self.correction - &self.correction_before)) / formula.higher
         } else {
             f64::INFINITY
         };
@@ -586,15 +713,19 @@ impl<const N: usize> Lsoda<N> {
         accurate.min(stable)
     }
 
-    /// One accepted step.
-    fn advance(&mut self, field: &dyn Driven<N>) -> Result<Step<'_, N>, Failure> {
+    /// What is to be done before a step.
+    #[inline]
+    fn prepare(&mut self) {
         if !self.held {
             self.carry_out_pending();
             self.stop_at_end();
         }
-        self.weigh();
-        let (t0, x0) = (self.t, *self.history.x());
-        let underflow = |h: f64| Failure::StepUnderflow { t: t0, h, state: Failure::state(&x0) };
+    }
+
+    /// One accepted step.
+    fn accepted(&mut self, field: &dyn RightHandSide<D>) -> Result<(), Failure> {
+        let (t0, x0) = (self.t, self.history.x().clone());
+        let underflow = |h: f64| Failure::StepUnderflow { t: t0, h, state: state(&x0) };
         // Tolerances below the rounding of x itself (or zero: a NaN here).
         let rounding = self.norm(&x0) * EPSILON;
         if rounding > 1.0 || rounding.is_nan() {
@@ -616,18 +747,18 @@ impl<const N: usize> Lsoda<N> {
                 _ => {}
             }
             self.history.retract(self.order);
-            self.history.set_column(0, x0);
+            self.history.set_column(0, x0.clone());
             self.growth_limit = GROWTH_AFTER_FAILURE;
             match corrected {
                 Err(NotConverged) => {
                     self.statistics.convergence_failures += 1;
                     not_converged += 1;
                     if not_converged == MOST_FAILURES {
-                        let x = x0 + *self.history.column(1);
-                        return Err(if finite(&field.eval(self.t, &x)) {
-                            Failure::NotConverged { t: t0, h: self.h, state: Failure::state(&x0) }
+                        let x = &x0 + self.history.column(1);
+                        return Err(if finite(&field.eval(t0 + self.h, &x)) {
+                            Failure::NotConverged { t: t0, h: self.h, state: state(&x0) }
                         } else {
-                            Failure::NotFinite { t: t0, state: Failure::state(&x0) }
+                            Failure::NotFinite { t: t0, state: state(&x0) }
                         });
                     }
                     self.renew_matrix = true;
@@ -665,9 +796,8 @@ impl<const N: usize> Lsoda<N> {
         // A first step may be below the spacing of numbers at t and soon grows; a run of such steps
         // will not.
         self.standing_still = if self.t > t0 { 0 } else { self.standing_still + 1 };
-        let x1 = *self.history.x();
-        if !finite(&x1) {
-            return Err(Failure::NotFinite { t: t0, state: Failure::state(&x0) });
+        if !finite(self.history.x()) {
+            return Err(Failure::NotFinite { t: t0, state: state(&x0) });
         }
         if self.standing_still > 100 {
             return Err(underflow(self.h));
@@ -675,20 +805,35 @@ impl<const N: usize> Lsoda<N> {
         if !self.held {
             self.look_ahead(error);
         }
-        Ok(Step { t0, t1: self.t, x0, x1, interpolant: &self.history })
+        Ok(())
     }
 
     /// After repeated failures the history is not to be believed: keep x alone, at order 1 and a
     /// tenth of the step.
-    fn start_over(&mut self, field: &dyn Driven<N>) {
+    fn start_over(&mut self, field: &dyn RightHandSide<D>) {
         self.h *= SHRINK_RESET;
-        let x = *self.history.x();
+        let x = self.history.x().clone();
         self.history.set_column(1, field.eval(self.t, &x) * self.h);
         self.statistics.evaluations += 1;
         self.order = 1;
         self.renew_matrix = true;
         self.until_selection = 5;
     }
+}
+
+fn finite<D: Dim>(x: &OVector<f64, D>) -> bool
+where
+    DefaultAllocator: Allocator<D>,
+{
+    x.iter().all(|v| v.is_finite())
+}
+
+/// A state as an error's list.
+fn state<D: Dim>(x: &OVector<f64, D>) -> Vec<f64>
+where
+    DefaultAllocator: Allocator<D>,
+{
+    x.iter().copied().collect()
 }
 
 /// The larger of two numbers, the first if the second is none. `f64::max` minds a NaN in the first
@@ -705,6 +850,17 @@ fn not_a_number() -> f64 {
     f64::NAN
 }
 
+impl<const N: usize> Lsoda<N> {
+    /// One accepted step.
+    fn step_of(&mut self, field: &dyn RightHandSide<Const<N>>) -> Result<Step<'_, N>, Failure> {
+        self.prepare();
+        self.weigh();
+        let (t0, x0) = (self.t, *self.history.x());
+        self.accepted(field)?;
+        Ok(Step { t0, t1: self.t, x0, x1: *self.history.x(), interpolant: &self.history })
+    }
+}
+
 impl<const N: usize> Stepper<N> for Lsoda<N> {
     fn restart<F: VectorField<N>>(
         &mut self,
@@ -718,26 +874,16 @@ impl<const N: usize> Stepper<N> for Lsoda<N> {
         self.statistics.evaluations += 1;
         self.statistics.restarts += 1;
         if !finite(&x) || !finite(&derivative) {
-            return Err(Failure::NotFinite { t, state: Failure::state(&x) });
+            return Err(Failure::NotFinite { t, state: state(&x) });
         }
-        let fresh = Self::blank(self.tolerance);
-        *self = Self {
-            statistics: std::mem::take(&mut self.statistics),
-            switches: std::mem::take(&mut self.switches),
-            t,
-            t_end,
-            max_step,
-            history: Nordsieck::new(x, derivative),
-            ..fresh
-        };
+        self.forget(t, x, &derivative, t_end, max_step);
         self.weigh();
-        self.h = self.first_step(&derivative);
-        self.history.set_column(1, derivative * self.h);
+        self.begin(derivative);
         Ok(())
     }
 
     fn step<F: VectorField<N>>(&mut self, field: &F) -> Result<Step<'_, N>, Failure> {
-        self.advance(&Steady(field))
+        self.step_of(&Steady(field))
     }
 
     fn statistics(&self) -> &Statistics {
@@ -751,7 +897,10 @@ impl<const N: usize> Redoable<N> for Lsoda<N> {
     }
 }
 
-impl<const N: usize> Lsoda<N> {
+impl<D: Dim> LsodaOf<D>
+where
+    DefaultAllocator: Allocator<D> + Allocator<D, D>,
+{
     /// After an accepted step: switch the family, or think over step and order, or leave things as
     /// they are.
     fn look_ahead(&mut self, error: f64) {
@@ -770,7 +919,7 @@ impl<const N: usize> Lsoda<N> {
         match self.until_selection {
             0 => self.pending = self.select(error, 0),
             1 if self.order < self.family.highest_order() => {
-                self.correction_before = self.correction
+                self.correction_before.copy_from(&self.correction)
             }
             _ => {}
         }

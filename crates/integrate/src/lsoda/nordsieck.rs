@@ -1,36 +1,49 @@
 //! The Nordsieck array: x and its scaled derivatives h^j x^(j)/j!.
 
-use nalgebra::SVector;
+use nalgebra::allocator::Allocator;
+use nalgebra::{Const, DefaultAllocator, Dim, OVector, SVector, U1};
 
 use super::coefficients::{COLUMNS, Formula};
 use crate::step::Interpolant;
 
 /// Scaled derivatives y_j = h^j x^(j)/j! at one time, j = 0..=q used.
 #[derive(Clone, Debug)]
-pub(super) struct Nordsieck<const N: usize> {
-    y: [SVector<f64, N>; COLUMNS],
+pub(super) struct Nordsieck<D: Dim>
+where
+    DefaultAllocator: Allocator<D>,
+{
+    y: [OVector<f64, D>; COLUMNS],
     /// The order of the step that led here: the degree of the polynomial that is its dense output.
     degree: usize,
 }
 
-impl<const N: usize> Nordsieck<N> {
-    pub fn new(x: SVector<f64, N>, h_derivative: SVector<f64, N>) -> Self {
-        let mut y = [SVector::zeros(); COLUMNS];
+impl<D: Dim> Nordsieck<D>
+where
+    DefaultAllocator: Allocator<D>,
+{
+    pub fn new(x: OVector<f64, D>, h_derivative: OVector<f64, D>) -> Self {
+        let states = x.shape_generic().0;
+        let mut y = [(); COLUMNS].map(|()| OVector::zeros_generic(states, U1));
         y[0] = x;
         y[1] = h_derivative;
         Self { y, degree: 1 }
     }
 
-    pub fn column(&self, j: usize) -> &SVector<f64, N> {
+    pub fn column(&self, j: usize) -> &OVector<f64, D> {
         &self.y[j]
     }
 
-    pub fn set_column(&mut self, j: usize, value: SVector<f64, N>) {
+    pub fn set_column(&mut self, j: usize, value: OVector<f64, D>) {
         self.y[j] = value;
     }
 
+    /// The columns of the dense output.
+    pub fn polynomial(&self) -> &[OVector<f64, D>] {
+        &self.y[..=self.degree]
+    }
+
     /// The state.
-    pub fn x(&self) -> &SVector<f64, N> {
+    pub fn x(&self) -> &OVector<f64, D> {
         &self.y[0]
     }
 
@@ -52,32 +65,42 @@ impl<const N: usize> Nordsieck<N> {
         }
     }
 
-    /// For one order, so that the columns stay in registers from the first addition to the last:
-    /// through memory each would wait for the one before to be written and read again.
+    /// For one order, so that columns whose size is known when this is compiled stay in registers
+    /// from the first addition to the last: through memory each would wait for the one before to be
+    /// written and read again.
     #[inline]
     fn predict_of<const ORDER: usize>(&mut self) {
-        let mut y = self.y;
+        if D::try_to_usize().is_none() {
+            for start in (0..ORDER).rev() {
+                for j in start..ORDER {
+                    let (low, high) = self.y.split_at_mut(j + 1);
+                    low[j] += &high[0];
+                }
+            }
+            return;
+        }
+        let mut y = self.y.clone();
         for start in (0..ORDER).rev() {
             for j in start..ORDER {
-                let next = y[j + 1];
+                let next = y[j + 1].clone();
                 y[j] += next;
             }
         }
-        self.y[..=ORDER].copy_from_slice(&y[..=ORDER]);
+        self.y[..=ORDER].clone_from_slice(&y[..=ORDER]);
     }
 
     /// Undoes [`Nordsieck::predict`] up to rounding.
     pub fn retract(&mut self, order: usize) {
         for start in (0..order).rev() {
             for j in start..order {
-                let next = self.y[j + 1];
-                self.y[j] -= next;
+                let (low, high) = self.y.split_at_mut(j + 1);
+                low[j] -= &high[0];
             }
         }
     }
 
     /// y <- y + l e.
-    pub fn correct(&mut self, order: usize, formula: &Formula, e: &SVector<f64, N>) {
+    pub fn correct(&mut self, order: usize, formula: &Formula, e: &OVector<f64, D>) {
         for (y, l) in self.y[..=order].iter_mut().zip(formula.l) {
             *y += e * l;
         }
@@ -97,7 +120,7 @@ impl<const N: usize> Nordsieck<N> {
 /// The Nordsieck polynomial, over the step that was corrected last and has not been rescaled since.
 /// It misses that step's start by about the local error, as the dense output of a multistep method
 /// does: it is the new polynomial, not the one before.
-impl<const N: usize> Interpolant<N> for Nordsieck<N> {
+impl<const N: usize> Interpolant<N> for Nordsieck<Const<N>> {
     fn at(&self, theta: f64) -> SVector<f64, N> {
         let s = theta - 1.0;
         let mut x = self.y[self.degree];

@@ -315,7 +315,7 @@ impl Coordinate {
             Coordinate::Method => {
                 run.options.method = Method::named(value.word()).ok_or_else(|| {
                     format!(
-                        "general systems are followed by dopri5, radau5 or taylor, not {}",
+                        "general systems are followed by dopri5, lsoda, radau5 or taylor, not {}",
                         value.word()
                     )
                 })?;
