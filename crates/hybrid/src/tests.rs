@@ -2797,7 +2797,7 @@ fn second_order_sliding_goes_on_under_a_disturbance() {
                 f = [\"v\", \"-2*sign(x) - sign(v) + {disturbance}\", \"x + v + 1\"]"
         )
     };
-    for method in [Method::Dopri5, Method::Radau5] {
+    for method in [Method::Dopri5, Method::Radau5, Method::Lsoda] {
         let end = end_of(&twisting("0.3*sin(t)"), 20.0, method).unwrap();
         let later = end_of(&twisting("0.3*sin(t)"), 25.0, method).unwrap();
         assert_eq!((end[0], end[1]), (0.0, 0.0), "{method:?}");
@@ -2855,6 +2855,8 @@ fn surfaces_that_depend_on_each_other_are_slid_upon_under_a_drift() {
         for (x, want) in end.iter().zip([met + 3.9, met + 3.0, met + 3.0]) {
             assert!((x - want).abs() < 1e-8, "{method:?} {end:?}");
         }
+    }
+}
 
 /// Robertson's reactions (1966), which ODEPACK's LSODA is shown by: the sum of the three is kept,
 /// the event marks the time of a tenth, and a dose then restarts them.
