@@ -50,7 +50,7 @@ fn commit() -> String {
             println!("cargo::rerun-if-changed={}", file.display());
         }
     }
-    let watched = ["src", "crates", "figures", "systems", "Cargo.toml", "Cargo.lock"];
+    let watched = ["src", "crates", "figures", "papers", "systems", "Cargo.toml", "Cargo.lock"];
     for path in watched {
         println!("cargo::rerun-if-changed={path}");
     }

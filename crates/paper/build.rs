@@ -23,5 +23,9 @@ fn figures() -> std::io::Result<String> {
     sources.add(root, "figures", |file| {
         inputs.iter().any(|e| file.ends_with(e)) && !file.ends_with("/main.rs")
     })?;
+    // Rules and readings of the paper; what its figures ask is in their questions.
+    sources.add(root, "papers/jeffrey-2013", |file| {
+        ["paper.toml", "sentences.toml"].iter().any(|own| file.ends_with(own))
+    })?;
     Ok(sources.digest())
 }

@@ -1,6 +1,6 @@
 //! The census: what a panel of figs 7 and 8 shows is drawn from a lottery, and these are the odds.
 //! Not a figure of the paper. Its data are committed beside it and made by `make census`; the rules
-//! were fixed before (crates/paper/src/claims.toml).
+//! were fixed before (papers/jeffrey-2013/sentences.toml).
 
 use std::sync::Arc;
 

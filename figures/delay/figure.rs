@@ -1,7 +1,7 @@
 //! The delayed switch, which the paper leaves out (end of sec. 4.3), beside smoothing and
 //! hysteresis. Not a figure of the paper. The data of (b), (c) and (d) are committed beside it and
 //! made by `make delay-data`; sentence 4.8's rules were fixed before
-//! (crates/paper/src/claims.toml).
+//! (papers/jeffrey-2013/sentences.toml).
 
 use std::cmp::Ordering;
 use std::sync::Arc;

@@ -16,20 +16,8 @@ pub use twofold_jeffrey_2013::{audit, census, data, delay, fig1, fig3, fig4};
 /// Folder of the paper in the sources.
 pub const FOLDER: &str = "papers/jeffrey-2013";
 
-macro_rules! files {
-    ($($file:literal)*) => {
-        &[$(($file, include_str!(concat!("../../papers/jeffrey-2013/", $file)))),*]
-    };
-}
-
 /// The paper's folder, so that an installed program can make and check its figures anywhere.
-pub const FILES: Embedded = files! {
-    "paper.toml"
-    "figures/fig2.toml" "figures/fig5.toml" "figures/fig6.toml"
-    "figures/fig7.toml" "figures/fig8.toml" "figures/fig9.toml"
-    "expected/fig2.json" "expected/fig5.json" "expected/fig6.json"
-    "expected/fig7.json" "expected/fig8.json" "expected/fig9.json"
-};
+pub const FILES: Embedded = twofold_papers::JEFFREY_2013;
 
 fn folder() -> &'static Folder {
     static OWN: OnceLock<Folder> = OnceLock::new();
@@ -127,7 +115,9 @@ mod tests {
         let files = read_tree(&root, &|path| !path.starts_with("out/")).unwrap().files;
         let known = |path: &str| FILES.iter().find(|f| f.0 == path).map(|f| f.1.as_bytes());
         let ours = |path: &str| {
-            path == "paper.toml" || path.starts_with("figures/") || path.starts_with("expected/fig")
+            ["paper.toml", "sentences.toml"].contains(&path)
+                || path.starts_with("figures/")
+                || path.starts_with("expected/fig")
         };
         for file in files.iter().filter(|f| ours(&f.path)) {
             assert!(

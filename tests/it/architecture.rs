@@ -50,7 +50,7 @@ const CRATES: [(&str, &[&str], &[&str]); 14] = [
 ];
 
 /// Packages that hold only data, with the crate that embeds each.
-const DATA: [(&str, &str); 2] = [("systems", "system"), ("jeffrey-2013", "paper")];
+const DATA: [(&str, &str); 2] = [("systems", "system"), ("papers", "paper")];
 
 /// Crates that no crate below the command may name: flags and terminals.
 const COMMAND: [&str; 5] = ["clap", "clap_complete", "clap_mangen", "indicatif", "signal-hook"];

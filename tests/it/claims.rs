@@ -1,5 +1,5 @@
-//! The paper's sentences, measured: each quantity that crates/paper/src/claims.toml names for a
-//! sentence is read by the test that it names.
+//! The paper's sentences, measured: each quantity that papers/jeffrey-2013/sentences.toml names for
+//! a sentence is read by the test that it names.
 #![allow(clippy::disallowed_methods)] // compared with tolerances, not with hashes
 
 use std::collections::BTreeSet;
@@ -39,12 +39,12 @@ impl Reads {
         let named = claims().sentence.iter().flat_map(|s| s.reads.iter().map(move |r| (s, r)));
         let named = named.filter(|(_, r)| r.test == test);
         let left: BTreeSet<_> = named.map(|(s, r)| (s.id.as_str(), r.quantity.as_str())).collect();
-        assert!(!left.is_empty(), "claims.toml names no quantity that {test} measures");
+        assert!(!left.is_empty(), "sentences.toml names no quantity that {test} measures");
         Self { left }
     }
 
     /// Holds what was measured against the sentence: it lies where the sentence is true if and only
-    /// if claims.toml says so.
+    /// if sentences.toml says so.
     pub fn read(&mut self, id: &str, quantity: &str, value: f64) {
         let known = self.left.len();
         self.left.retain(|left| *left != (id, quantity));

@@ -195,6 +195,7 @@ fn the_package_holds_what_it_embeds() {
     for (package, folder) in [
         ("twofold-dynamics", ""),
         ("twofold-systems", "systems"),
+        ("twofold-papers", "papers"),
         ("twofold-jeffrey-2013", "figures"),
         ("twofold-paper", "crates/paper"),
         ("twofold-render", "crates/render"),

@@ -1,5 +1,5 @@
-//! Every testable sentence of the paper, and the rules by which sections are judged: `claims.toml`,
-//! embedded.
+//! Every testable sentence of the paper, and the rules by which sections are judged:
+//! `papers/jeffrey-2013/sentences.toml`, embedded.
 //!
 //! ```
 //! let claims = twofold_paper::claims::claims();
@@ -122,7 +122,7 @@ pub struct Quantity {
 pub fn claims() -> &'static Claims {
     static CLAIMS: OnceLock<Claims> = OnceLock::new();
     CLAIMS.get_or_init(|| {
-        toml::from_str(include_str!("claims.toml"))
+        toml::from_str(twofold_papers::jeffrey_2013("sentences.toml"))
             .expect("the embedded file is well formed: a test reads it")
     })
 }

@@ -1,5 +1,5 @@
 //! In which ways a delayed switch is similar to hysteresis (sentence 4.8), scored from committed
-//! runs by the rules that `claims.toml` fixes.
+//! runs by the rules that `sentences.toml` fixes.
 
 use twofold_analyse::counts::wilson;
 
@@ -26,7 +26,7 @@ pub const RULES: [Rule; 5] =
     [Rule::Smoothed, Rule::Literal, Rule::Single, Rule::Delayed, Rule::DelayedLong];
 
 impl Rule {
-    /// The name in claims.toml and in tables.
+    /// The name in sentences.toml and in tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Smoothed => "smoothed",
