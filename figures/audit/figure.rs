@@ -91,8 +91,9 @@ pub fn candidates_in(
         usize::try_from(runs).unwrap_or(usize::MAX)
     });
     let equal = audit::cells(&sweeps, fewest, rules);
+    let readings = Reading::ALL.map(Reading::parameters);
     let two: Vec<Cell> =
-        all.into_iter().filter(|cell| READINGS.contains(&[cell.alpha, cell.beta])).collect();
+        all.into_iter().filter(|cell| readings.contains(&[cell.alpha, cell.beta])).collect();
     match (audit::candidates(&equal, rules), audit::candidates(&two, rules)) {
         (Some(equal), Some(two)) => Ok([equal, two]),
         _ => {
@@ -117,9 +118,6 @@ pub fn support(panel: &str, reading: Reading) -> Result<Support, JobError> {
         runs: runs.len() as u64,
     })
 }
-
-/// The printed and the reconstructed alpha and beta.
-const READINGS: [[f64; 2]; 2] = [[1e-3, 1e-5], [1e-1, 1e-5]];
 
 fn tables() -> Result<Vec<Table>, JobError> {
     let [fig7, fig8] =
@@ -178,12 +176,12 @@ fn draw(tables: &[Table]) -> Sheet {
     let marks = [
         (
             "printed",
-            vec![[1e-3, 1e-5]],
+            vec![Reading::Printed.parameters()],
             MarkerStyle { shape: MarkerShape::Cross, colour: style::VERMILLION, size: 6.0 },
         ),
         (
             "reconstructed",
-            vec![[1e-1, 1e-5]],
+            vec![Reading::Reconstructed.parameters()],
             MarkerStyle { shape: MarkerShape::Star, colour: style::ORANGE, size: 7.0 },
         ),
         (

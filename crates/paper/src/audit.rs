@@ -3,6 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::Reading;
 use super::census::{self, CensusPanel, CensusRun, Probability, Said};
 use super::claims::Rules;
 use twofold_job::table::{Column, Entry, Table};
@@ -75,8 +76,9 @@ impl Cell {
 /// Runs of a table at a pair of parameters. What a table does not vary has the paper's value in it.
 fn runs_at(table: &Table, [alpha, beta]: [f64; 2], panel: &CensusPanel) -> Vec<CensusRun> {
     let mut chosen = Vec::new();
+    let printed = Reading::Printed.parameters();
     for (name, wanted, printed) in
-        [("params.alpha", alpha, PRINTED[0]), ("params.beta", beta, PRINTED[1])]
+        [("params.alpha", alpha, printed[0]), ("params.beta", beta, printed[1])]
     {
         if table.column(name).is_some() {
             chosen.push((name, Entry::Number(wanted)));
@@ -92,12 +94,13 @@ fn runs_at(table: &Table, [alpha, beta]: [f64; 2], panel: &CensusPanel) -> Vec<C
 /// many of the first runs count as `most` says, in the panels' order.
 pub fn cells(sweeps: &Sweeps, most: [usize; 7], rules: &Rules) -> Vec<Cell> {
     let mut pairs: Vec<[f64; 2]> = Vec::new();
+    let printed = Reading::Printed.parameters();
     for table in sweeps.iter().flatten() {
         let values = |name: &str, printed: f64| -> Vec<f64> {
             table.column(name).map_or(vec![printed; table.len()], |_| table.numbers(name).to_vec())
         };
         for (alpha, beta) in
-            values("params.alpha", PRINTED[0]).into_iter().zip(values("params.beta", PRINTED[1]))
+            values("params.alpha", printed[0]).into_iter().zip(values("params.beta", printed[1]))
         {
             if !pairs.contains(&[alpha, beta]) {
                 pairs.push([alpha, beta]);
@@ -140,20 +143,18 @@ const DRAWS: usize = 20_000;
 /// Probabilities, before any run, that the printed numbers are right.
 pub const PRIORS: [f64; 2] = [0.5, 0.99];
 
-/// The paper's alpha and beta.
-const PRINTED: [f64; 2] = [1e-3, 1e-5];
-
 /// The candidates among the cells: the printed pair, and those in which one exponent has another
 /// digit. `None` without the printed pair.
 pub fn candidates(cells: &[Cell], rules: &Rules) -> Option<Vec<Candidate>> {
+    let at = Reading::Printed.parameters();
     let is_power = |v: f64| {
         let e = log10(v);
         (e - e.round()).abs() < 1e-9 && (-9.5..0.5).contains(&e)
     };
-    let printed = cells.iter().find(|c| [c.alpha, c.beta] == PRINTED && c.is_whole())?;
+    let printed = cells.iter().find(|c| [c.alpha, c.beta] == at && c.is_whole())?;
     let mut chosen: Vec<Cell> = vec![*printed];
     chosen.extend(cells.iter().filter(|c| {
-        let changed = [c.alpha != PRINTED[0], c.beta != PRINTED[1]];
+        let changed = [c.alpha != at[0], c.beta != at[1]];
         c.is_whole() && changed[0] != changed[1] && is_power(c.alpha) && is_power(c.beta)
     }));
     let factors: Vec<f64> =

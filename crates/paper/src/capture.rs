@@ -175,10 +175,6 @@ pub struct Candidate {
     pub hits: [u64; 8],
 }
 
-/// The printed alpha and beta, and the reconstructed ones.
-const READINGS: [([f64; 2], &str); 2] =
-    [([1e-3, 1e-5], " (printed)"), ([1e-1, 1e-5], " (reconstructed)")];
-
 /// Visits by t = 150 that the eighth outcome needs.
 const VISITS: f64 = 2.0;
 
@@ -231,7 +227,8 @@ impl Candidate {
     }
 
     fn name(&self) -> String {
-        let reading = READINGS.iter().find(|(at, _)| *at == self.at).map_or("", |r| r.1);
+        let reading = Reading::ALL.iter().find(|r| r.parameters() == self.at);
+        let reading = reading.map_or(String::new(), |r| format!(" ({})", r.word()));
         format!("{:.3e}, {:.3e}{reading}", self.at[0], self.at[1]).replace(".000e", "e")
     }
 }
@@ -266,8 +263,8 @@ const DRAWS: usize = 4000;
 /// The table of posteriors: of the printed and the reconstructed numbers and of the best of the
 /// others, for each pseudo-count and prior.
 pub fn priors_text(candidates: &[Candidate], rules: &Rules) -> String {
-    let place = |at: [f64; 2]| candidates.iter().position(|c| c.at == at);
-    let [Some(printed), Some(reconstructed)] = READINGS.map(|(at, _)| place(at)) else {
+    let place = |r: Reading| candidates.iter().position(|c| c.at == r.parameters());
+    let [Some(printed), Some(reconstructed)] = Reading::ALL.map(place) else {
         return String::new();
     };
     let mut text = String::from(

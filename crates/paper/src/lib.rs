@@ -46,7 +46,7 @@ pub mod verdict_table;
 pub mod wording;
 
 use std::borrow::Cow;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use serde::{Deserialize, Serialize};
 
@@ -173,9 +173,9 @@ pub struct Camera {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Reading {
-    /// As printed: alpha = 1e-3, beta = 1e-5. Its late motion is always one stable periodic orbit.
+    /// As printed. Its late motion is always one stable periodic orbit.
     Printed,
-    /// One digit changed: alpha = 1e-1, beta = 1e-5. It gives the paper's story.
+    /// One digit of alpha changed. It gives the paper's story.
     Reconstructed,
 }
 
@@ -191,14 +191,31 @@ impl Reading {
         }
     }
 
+    /// Its alpha and beta, as the paper's folder has them.
+    pub fn parameters(self) -> [f64; 2] {
+        READINGS[self as usize]
+    }
+
     /// The caricature with this reading's re-injection.
     pub fn caricature(self) -> Caricature {
-        match self {
-            Reading::Printed => Caricature::with_reinjection(1e-3, 1e-5),
-            Reading::Reconstructed => Caricature::with_reinjection(1e-1, 1e-5),
-        }
+        let [alpha, beta] = self.parameters();
+        Caricature::with_reinjection(alpha, beta)
     }
 }
+
+/// Alpha and beta of each reading: `[readings]` of `papers/jeffrey-2013/paper.toml`.
+static READINGS: LazyLock<[[f64; 2]; 2]> = LazyLock::new(|| {
+    let paper: toml::Table = twofold_papers::jeffrey_2013("paper.toml")
+        .parse()
+        .expect("the embedded file is well formed: a test reads it");
+    Reading::ALL.map(|reading| {
+        ["alpha", "beta"].map(|name| {
+            paper["readings"][reading.word()]["run"]["set"][name]
+                .as_float()
+                .expect("a reading sets both: a test reads it")
+        })
+    })
+});
 
 impl Figure {
     /// A figure with one study per reading, printed first.
