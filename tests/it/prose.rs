@@ -557,7 +557,7 @@ const EXAMPLES: [(&str, &[&str]); 30] = [
     ("system/src/field.rs", &["struct Field"]),
     ("system/src/smoothed.rs", &["struct Smoothed"]),
     ("system/src/filippov.rs", &["fn sliding_field", "fn two_fold"]),
-    ("integrate/src/lsoda/mod.rs", &["struct Lsoda"]),
+    ("integrate/src/lsoda/mod.rs", &["struct LsodaOf"]),
     ("integrate/src/taylor.rs", &["struct Taylor"]),
     ("integrate/src/layered/mod.rs", &["struct Layered"]),
     ("integrate/src/filippov/engine.rs", &["fn run"]),

@@ -388,7 +388,11 @@ const COLUMNS: [(&str, &str); 46] = [
         "of a sweep: returns to the section in one period, 0 if there is none; of a closed orbit: \
             its period, as time",
     ),
-    ("captured_at", "from this time on the run only turns around one periodic orbit"),
+    (
+        "captured_at",
+        "from this time on the run only turns around one periodic orbit; of quasi-periodic runs, as \
+            far back as the ring was followed",
+    ),
     ("settled_at", "from this time on it is within tolerance of the orbit"),
     ("radius", "mean distance of the last returns, once settled, from the orbit"),
     ("rate", "rate of approach, per unit time"),

@@ -38,6 +38,7 @@
 pub mod data;
 pub mod definition;
 pub mod equation;
+mod history;
 pub mod model;
 pub mod motion;
 mod range;

@@ -17,7 +17,6 @@ mod sliding;
 pub mod tangent;
 
 use clock::Clock;
-pub(crate) use multistep::Multistep;
 use search::active_value;
 pub(crate) use sliding::determinant_of_negative;
 

@@ -397,8 +397,8 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 /// Rows shorter than this part of their length are sums of others.
 const NOT_NEW: f64 = 1e-9;
 
-/// The part of a row of numbers that is new beside an orthonormal basis, and its length; none if it is a sum
-/// of them to rounding.
+/// The part of a row of numbers that is new beside an orthonormal basis, and its length; none if it
+/// is a sum of them to rounding.
 fn new_part(basis: &[Vec<f64>], row: &[f64]) -> Option<(Vec<f64>, f64)> {
     let mut new = row.to_vec();
     for q in basis.iter().chain(basis) {

@@ -5,7 +5,7 @@
 
 use twofold_num::linear::solve_any;
 
-use crate::motion::Multistep;
+use crate::history::Multistep;
 
 /// Nodes, coefficients row by row, and the error estimate.
 pub(crate) const C: [f64; 7] = [0.0, 0.2, 0.3, 0.8, 8.0 / 9.0, 1.0, 1.0];

@@ -2753,8 +2753,8 @@ fn end_of(text: &str, t_end: f64, method: Method) -> Result<Vec<f64>, String> {
 fn resets_have_the_derivatives_of_the_side_that_they_are_on() {
     let slope = |start: f64, set: &str, rest: &str| {
         let model = model(&format!(
-            "states = ['x']\nstart = [{start}]\nf = ['0']\n{rest}\n[[event]]\nname = 'e'\nat = 0.5\n\
-                set = {{ x = '{set}' }}"
+            "states = ['x']\nstart = [{start}]\nf = ['0']\n{rest}\n[[event]]\nname = 'e'\n\
+                at = 0.5\nset = {{ x = '{set}' }}"
         ));
         let options = Options { t_end: 1.0, ..Options::default() };
         crate::motion::sensitivity::sensitivities(&model, &options, &[]).unwrap().by_start[0][0]

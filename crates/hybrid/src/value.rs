@@ -58,7 +58,7 @@ pub fn evaluate<S: Scalar>(e: &Expression, name: &dyn Fn(&str) -> Option<S>) -> 
                 let (y0, x0) = (y.to_f64(), x.to_f64());
                 let value = number(elementary::atan2(y0, x0));
                 let square = x0 * x0 + y0 * y0;
-                // What is added has no value, and the derivative of the angle.
+                // Zero, with the derivative of the angle.
                 let turn = (y.scale(x0) - x.scale(y0)).scale(1.0 / square);
                 if square > 0.0 && turn.to_f64() == 0.0 { value + turn } else { value }
             }

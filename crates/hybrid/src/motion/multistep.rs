@@ -11,46 +11,12 @@ use twofold_integrate::lsoda::{Family, RightHandSide};
 use twofold_integrate::{LsodaOf, Tolerance};
 
 use super::*;
+use crate::history::{Branch, Multistep};
 
 /// Most tenths of tenths of a step that are tried, to see what errors count as.
 const MOST_TRIALS: usize = 30;
 /// Part of a failed step that is tried next.
 const SHORTER: f64 = 0.1;
-
-/// The branch on which a step ended: what the motion's right-hand side depends on beside time and
-/// state, and where it was.
-#[derive(Clone, Debug, PartialEq)]
-struct Branch {
-    t: f64,
-    x: Vec<f64>,
-    config: Configuration,
-    sliding: Vec<usize>,
-    contacts: Vec<Contact>,
-}
-
-/// The multistep method between two steps, and the step that it made.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Multistep {
-    /// As it is where the step begins; without one the step is a first one.
-    begin: Option<LsodaOf<Dyn>>,
-    /// As it is where the step ends.
-    made: Option<LsodaOf<Dyn>>,
-    /// Where `begin` stands.
-    branch: Option<Branch>,
-    /// Errors that count as one.
-    scale: Vec<f64>,
-    /// The length of the step that it made, and its end, which may be cut off.
-    whole: f64,
-    end: Vec<f64>,
-}
-
-impl Multistep {
-    /// The fraction of the step made at which one of length `h` ends, and the end if it is whole.
-    pub(crate) fn share(&self, h: f64) -> (f64, Option<&[f64]>) {
-        let share = h / self.whole;
-        (share, (share == 1.0).then_some(&self.end))
-    }
-}
 
 /// The field that moves the states, as LSODA asks for it.
 struct Field<'f, 'a>(RefCell<&'f mut Follower<'a>>);
@@ -90,7 +56,7 @@ impl Follower<'_> {
             x: self.x.clone(),
             config: self.config.clone(),
             sliding: self.sliding.clone(),
-            contacts: self.contacts.clone(),
+            contacts: self.contacts.iter().map(|c| (c.state, c.watched)).collect(),
         }
     }
 

@@ -122,8 +122,8 @@ impl Follower<'_> {
         matrix
     }
 
-    /// The Jacobian for iterations, which settle in short steps without a slope that is infinite, as
-    /// that of a root at zero.
+    /// The Jacobian for iterations, which settle in short steps without a slope that is infinite,
+    /// as that of a root at zero.
     pub(super) fn finite_jacobian(&mut self, t: f64, x: &[f64]) -> Vec<f64> {
         let mut jacobian = self.jacobian(t, x);
         jacobian.iter_mut().filter(|j| !j.is_finite()).for_each(|j| *j = 0.0);

@@ -713,7 +713,7 @@ where
         accurate.min(stable)
     }
 
-    /// What is to be done before a step.
+    /// Carries out what the step before has decided.
     #[inline]
     fn prepare(&mut self) {
         if !self.held {

@@ -222,15 +222,43 @@ fn judged(
         middle = [0.0; 2];
         (seen, extent) = from(middle);
     }
-    let thresholds =
-        Thresholds { dot: same / extent, longest_period: LONGEST_PERIOD, ..Thresholds::default() };
-    let mut evidence = attractor::classify(&seen, question, &thresholds);
+    let by = |same: f64| {
+        let dot = same / extent;
+        let thresholds =
+            Thresholds { dot, longest_period: LONGEST_PERIOD, ..Thresholds::default() };
+        attractor::classify(&seen, question, &thresholds)
+    };
+    let mut evidence = by(same);
+    // An orbit that is still approached shrinks; bands of chaos as thin do not.
+    if !matches!(evidence.verdict, Verdict::Periodic(_)) {
+        let wider = by(same.max(Thresholds::default().dot * swing));
+        if let Verdict::Periodic(cycle) = &wider.verdict
+            && shrinks(&seen, cycle.period)
+        {
+            evidence = wider;
+        }
+    }
     if let Verdict::QuasiPeriodic(cycle) = &evidence.verdict
         && cycle.rotation.is_none()
     {
         evidence.verdict = Verdict::Undecided { lyapunov: None };
     }
     (evidence, middle)
+}
+
+/// Whether the points of one direction come closer to those a period before.
+fn shrinks(section: &[SectionPoint], period: usize) -> bool {
+    const LESS: f64 = 0.7;
+    let up: Vec<[f64; 2]> = section.iter().filter(|p| p.upward).map(|p| p.u).collect();
+    let moved: Vec<f64> = (period..up.len())
+        .map(|i| {
+            let [a, b] = [0, 1].map(|k| up[i][k] - up[i - period][k]);
+            sqrt(a * a + b * b)
+        })
+        .collect();
+    let (earlier, last) = moved[moved.len() / 2..].split_at(moved.len() / 4);
+    let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
+    mean(last) < LESS * mean(earlier)
 }
 
 impl GeneralEnding {
