@@ -390,8 +390,8 @@ const COLUMNS: [(&str, &str); 46] = [
     ),
     (
         "captured_at",
-        "from this time on the run only turns around one periodic orbit; of quasi-periodic runs, as \
-            far back as the ring was followed",
+        "from this time on the run only turns around one periodic orbit; of quasi-periodic runs, \
+            as far back as the ring was followed",
     ),
     ("settled_at", "from this time on it is within tolerance of the orbit"),
     ("radius", "mean distance of the last returns, once settled, from the orbit"),
