@@ -441,6 +441,11 @@ struct Follower<'a> {
     /// Guards and watched expressions that left zero at the step's beginning.
     fresh_guard: Vec<bool>,
     fresh_watch: Vec<bool>,
+    /// Of each watched expression whose contact has opened, and that is zero to rounding since, by
+    /// how much it may be beyond zero; else zero.
+    released: Vec<f64>,
+    /// The watched expression that leaves zero in the present step, with its rounding there.
+    leaves: Option<(usize, f64)>,
     /// Of each guard whose zero was slid upon until now, by how much the speeds of its two sides
     /// differ; and the same of each watched expression held there, with the sign of the side that
     /// it leaves to.
@@ -756,6 +761,8 @@ impl<'a> Follower<'a> {
             held: vec![false; watched],
             fresh_guard: vec![false; guards],
             fresh_watch: vec![false; watched],
+            released: vec![0.0; watched],
+            leaves: None,
             left: vec![0.0; guards],
             left_watch: vec![0.0; watched],
             event_of,
@@ -988,6 +995,7 @@ impl<'a> Follower<'a> {
             }
             if progress {
                 self.clear_fresh(&list, &last_values, earliest.is_finite());
+                self.clear_released();
             }
             h = if earliest.is_finite() {
                 // If switches or events are frequent, a step is about as long as the time between

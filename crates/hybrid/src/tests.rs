@@ -2933,3 +2933,80 @@ fn tangent_vectors_name_the_methods_that_carry_none() {
         assert!(error.contains("carried by dopri5"), "{error}");
     }
 }
+
+/// Balls on vibrating tables whose impacts accumulate, at last in flights that rounding hides: they
+/// stick until the table falls away, and are never below it.
+#[test]
+fn contacts_hold_where_flights_end_in_rounding() {
+    for (r, a) in [(0.2, 1.2), (0.1, 1.8), (0.3, 1.8), (0.5, 1.8), (0.1, 2.2), (0.0, 1.5)] {
+        let text = format!(
+            "states = ['x', 'v']\nstart = [2.0, -0.6]\nf = ['v', '-1']\n[[event]]\n\
+             when = 'x - {a}*sin(t)'\ndirection = 'down'\n\
+             set = {{ v = '-{r}*v + {}*cos(t)' }}\nafter_zeno = 'stick'",
+            (1.0 + r) * a
+        );
+        for method in [Method::Dopri5, Method::Radau5, Method::Taylor] {
+            let record = Record::Times { every: 0.37 };
+            let options = Options { t_end: 100.0, method, record, ..Options::default() };
+            let mut least = f64::INFINITY;
+            let outcome = follow(&model(&text), &options, &mut |p| {
+                least = least.min(p.x[0] - a * p.t.sin());
+                true
+            });
+            assert!(least > -1e-8, "{r} {a} {method:?}: {least} {outcome:?}");
+            assert_eq!(outcome.unwrap().ending, Ending::Finished, "{r} {a} {method:?}");
+        }
+    }
+}
+
+/// A body at a stop is let go at pi/2 by a force that grows from zero: x = 3 cos t + 3 (t - pi/2).
+#[test]
+fn contacts_open_as_a_cube_leaves_zero() {
+    let text = |set: &str| {
+        format!(
+            "states = ['x', 'v']\nstart = [0.5, 0]\nf = ['v', '-3*cos(t)']\n[[event]]\n\
+             when = 'x'\ndirection = 'down'\nset = {{ v = {set} }}\nafter_zeno = 'stick'"
+        )
+    };
+    for set in ["0", "'0*v'"] {
+        for method in [Method::Dopri5, Method::Radau5, Method::Taylor] {
+            for t_end in [3.0, 30.0] {
+                let record = Record::Times { every: 3.0 };
+                let options = Options { t_end, method, record, ..Options::default() };
+                let mut found = f64::NAN;
+                let outcome = follow(&model(&text(set)), &options, &mut |p| {
+                    found = if p.t == 3.0 { p.x[0] } else { found };
+                    true
+                });
+                outcome.unwrap_or_else(|e| panic!("{set} {method:?} {t_end}: {e}"));
+                let want = 3.0 * 3.0_f64.cos() + 3.0 * (3.0 - std::f64::consts::FRAC_PI_2);
+                near(found, want, 1e-8);
+            }
+        }
+    }
+}
+
+/// A blow at an event's zero is met at once: by a wall that is touched, and by the third ball of a
+/// cradle, there and back.
+#[test]
+fn what_lies_at_an_events_zero_is_not_struck_through_it() {
+    let wall = "states = ['x', 'v']\nstart = [0, 0]\nf = ['v', '0']\n[[event]]\nat = 1\n\
+        set = { v = 1 }\n[[event]]\nwhen = 'x'\ndirection = 'up'\nset = { v = '-v' }";
+    let cradle = "states = ['a', 'va', 'b', 'vb', 'c', 'vc']\nstart = [-1, 0, 1, 0, 2, 0]\n\
+        f = ['va', '-a', 'vb', '-(b - 1)', 'vc', '-(c - 2)']\n[[event]]\nwhen = 'b - a - 1'\n\
+        direction = 'down'\nset = { va = 'vb', vb = 'va' }\n[[event]]\nwhen = 'c - b - 1'\n\
+        direction = 'down'\nset = { vb = 'vc', vc = 'vb' }";
+    for method in [Method::Dopri5, Method::Radau5, Method::Taylor] {
+        let x = |text: &str, t_end| end_of(text, t_end, method).unwrap();
+        near(x(wall, 3.0)[0], -2.0, 1e-12);
+        for (direction, want) in [("", -2.0), ("\ndirection = 'down'", 2.0)] {
+            let text = wall.replace("\ndirection = 'up'", direction);
+            near(x(&text, 3.0)[0], want, 1e-12);
+        }
+        let (there, back) = (x(cradle, 3.0), x(cradle, 6.0));
+        near(there[2], 1.0, 1e-9);
+        near(there[4], 2.0 - 3.0_f64.cos(), 1e-8);
+        near(back[0], -6.0_f64.cos(), 1e-8);
+        near(back[4], 2.0, 1e-8);
+    }
+}

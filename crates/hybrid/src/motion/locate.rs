@@ -2,6 +2,10 @@
 
 use super::*;
 
+/// A flight may be hidden by rounding if the square of its speed is less than so many roundings of
+/// its expression's terms times its bend.
+const MAY_HIDE: f64 = 1e3;
+
 impl Follower<'_> {
     /// First condition met in a step, with its place and all others in the same part of the step;
     /// `last` takes the values at the end of the search.
@@ -13,6 +17,7 @@ impl Follower<'_> {
         last: &mut Vec<f64>,
     ) -> Vec<(f64, Sought)> {
         let mut found = Vec::new();
+        self.leaves = None;
         if list.is_empty() {
             return found;
         }
@@ -47,17 +52,32 @@ impl Follower<'_> {
         found: &mut Vec<(f64, Sought)>,
     ) -> Vec<Option<f64>> {
         let polynomial = |sought: Sought| {
-            self.polynomial_of(step, sought).filter(|b| b.iter().all(|b| b.is_finite()))
+            self.polynomial_of(step, sought).filter(|(b, _)| b.iter().all(|b| b.is_finite()))
         };
         let Some(all) =
             list.iter().map(|(sought, _)| polynomial(*sought)).collect::<Option<Vec<_>>>()
         else {
             return vec![None; list.len()];
         };
-        let end = |((sought, side), b): (&(Sought, f64), [f64; 5])| {
+        let end = |((sought, side), (b, size)): (&(Sought, f64), ([f64; 5], f64))| {
             let mut v = PLACES.map(|theta| at_fraction(&b, theta));
             let end = v[4];
+            let allowance = self.allowance(*sought, *side);
+            if allowance != 0.0 {
+                v.iter_mut().for_each(|v| *v += allowance);
+                found.extend(first_of_polynomial(v, *side).map(|theta| (theta, *sought)));
+                return Some(end);
+            }
             let change = self.begin_at_zero(*sought, *side, step.h, &mut v);
+            let (slope, bend) = (4.0 * (b[1] - b[0]), 12.0 * (b[2] - 2.0 * b[1] + b[0]));
+            if v[0] == 0.0
+                && slope * slope <= MAY_HIDE * f64::EPSILON * size * bend.abs()
+                && let Some(leaving) = self.leaving(*sought, *side)
+                && let Some(theta) = self.hidden(leaving, step.h)
+            {
+                found.extend((theta <= 1.0).then_some((theta, *sought)));
+                return Some(end);
+            }
             let first = if change == 0.0 {
                 first_of_polynomial(v, *side)
             } else {
@@ -90,6 +110,37 @@ impl Follower<'_> {
         change
     }
 
+    /// The place in a step of this length where a flight that rounding hides ends, as its parabola
+    /// does.
+    fn hidden(&mut self, (until, slope, bend): (f64, f64, f64), h: f64) -> Option<f64> {
+        let end = -2.0 * slope / bend;
+        let (i, _) = self.leaves?;
+        // Bodies that touch without a law of rest may part by rounding alone.
+        let sticks = self.event_of[i].is_some_and(|e| self.model.definition().events()[e].sticks);
+        if !(sticks && end > 0.0 && end <= until) {
+            return None;
+        }
+        self.leaves = Some((i, f64::INFINITY));
+        Some(end / h)
+    }
+
+    /// A watched expression that leaves zero at the step's beginning to its side has no sign beyond
+    /// rounding for a while, in which a parabola says more: its time, slope, and second derivative.
+    fn leaving(&mut self, sought: Sought, side: f64) -> Option<(f64, f64, f64)> {
+        let Sought::Watched(i) = sought else { return None };
+        let (compiled, rates) = self.rates_of_second_order(&self.config.clone());
+        let place = compiled.active.len() + i;
+        let (slope, bend) = (rates.first_or_zero(place), rates.second[place]);
+        if !(slope * side > 0.0) {
+            return None;
+        }
+        let rounding = self.grain_of(i, rates.terms[place]);
+        self.leaves = Some((i, 0.25 * rounding));
+        let rounding = 4.0 * rounding;
+        let until = (rounding / slope.abs()).min((2.0 * rounding / bend.abs()).sqrt());
+        until.is_finite().then_some((until, slope, bend))
+    }
+
     /// The speed by which rounding of a slope is measured where sliding has just left a surface:
     /// the motion is tangent to it.
     fn left(&self, sought: Sought) -> f64 {
@@ -115,11 +166,13 @@ impl Follower<'_> {
         for (sought, side) in list {
             let series = self.series_of(step, *sought, is_whole);
             ends.push(series.as_ref().map(|c| c.iter().rev().sum()));
-            let Some(c) = series else { continue };
+            let Some(mut c) = series else { continue };
+            let allowance = self.allowance(*sought, *side);
+            c[0] += allowance;
             // Of the two ends of a whole part one is left.
             let far = matches!(sought, Sought::Guard { guard,
                 .. } if self.equation.guards[*guard].whole && c[0] > 0.5);
-            let begins = (self.is_fresh(*sought) && !far).then(|| {
+            let begins = (self.is_fresh(*sought) && !far && allowance == 0.0).then(|| {
                 let terms =
                     self.place_of(*sought).and_then(|place| terms.get(place)).unwrap_or(&0.0);
                 SMALLEST_SLOPE * step.h * terms.max(self.left(*sought))
@@ -128,7 +181,7 @@ impl Follower<'_> {
             let mut f = |theta: f64| {
                 step.at(theta, &mut at);
                 self.measure(&one, step.t + theta * step.h, &at, &mut value);
-                value[0]
+                value[0] + allowance
             };
             let first = first_of_series(&c, *side, begins, &mut f);
             found.extend(first.map(|theta| (theta, *sought)));
@@ -163,7 +216,10 @@ impl Follower<'_> {
             }
             for (j, (sought, side)) in list.iter().enumerate().filter(|(j, _)| open[*j]) {
                 let mut v: [f64; 5] = std::array::from_fn(|i| values[i][j]);
-                let change = if from == 0.0 {
+                let allowance = self.allowance(*sought, *side);
+                v.iter_mut().for_each(|v| *v += allowance);
+                let begins = from == 0.0 && allowance == 0.0;
+                let change = if begins {
                     self.begin_at_zero(*sought, *side, to * step.h, &mut v) / to
                 } else {
                     0.0
@@ -179,11 +235,23 @@ impl Follower<'_> {
                 if stays(&v, *side) {
                     continue;
                 }
+                let leaving =
+                    if begins && v[0] == 0.0 { self.leaving(*sought, *side) } else { None };
+                if let Some(theta) = leaving.and_then(|leaving| self.hidden(leaving, step.h)) {
+                    found.extend((theta <= to).then_some((theta, *sought)));
+                    continue;
+                }
                 let (one, mut value) = ([(*sought, *side)], Vec::new());
                 let mut f = |theta: f64| {
+                    let time = theta * step.h;
+                    if let Some((until, slope, bend)) = leaving
+                        && time <= until
+                    {
+                        return time * (slope + 0.5 * time * bend);
+                    }
                     step.at(theta, &mut at);
                     self.measure(&one, step.t + theta * step.h, &at, &mut value);
-                    value[0] - theta * change
+                    value[0] + allowance - theta * change
                 };
                 let first = if change == 0.0 {
                     first(v, *side, from, to, &mut f, 0)

@@ -137,6 +137,7 @@ impl Follower<'_> {
             let old = self.watch_side[i];
             self.watch_side[i] = -old;
             self.fresh_watch[i] = true;
+            self.released[i] = 0.0;
         }
         jumps.iter().for_each(|(i, away)| self.fresh_watch[*i] = !away);
         fired.extend(self.new_conditions(definition));
@@ -159,6 +160,13 @@ impl Follower<'_> {
             self.contacts.retain(|c| c.watched != contact.watched);
             self.watch_side[contact.watched] = contact.above;
             self.fresh_watch[contact.watched] = true;
+            let (compiled, rates) = self.rates(&self.config.clone());
+            let speeds = rates.terms[compiled.active.len() + contact.watched];
+            let e = &self.equation.watched[contact.watched];
+            let beyond = -self.equation.value(e, self.t, &self.x) * contact.above;
+            self.released[contact.watched] = beyond.max(0.0)
+                + 4.0 * self.grain_of(contact.watched, speeds)
+                + 64.0 * f64::EPSILON * self.magnitude(e);
             self.trains[contact.event] = Train::default();
         }
     }
@@ -212,10 +220,12 @@ impl Follower<'_> {
             return Ok(None);
         }
         let quiet = matches!(self.options.record, Record::Section(_));
-        let (mut stop, mut zeno, mut newly) = (None, None, Vec::new());
+        let (mut stop, mut zeno, mut newly, mut through) = (None, None, Vec::new(), None);
         let old = self.x.clone();
         let mut new = self.x.clone();
         let mut mode = None;
+        // Of several events, the states that each leaves behind.
+        let mut left_behind = Vec::new();
         for i in &fired {
             let event = &definition.events()[*i];
             self.outcome.events += 1;
@@ -244,6 +254,9 @@ impl Follower<'_> {
                 }
             }
             mode = event.mode.or(mode);
+            if fired.len() > 1 {
+                left_behind.push(new.clone());
+            }
             if event.stop {
                 stop = Some(Ending::Stopped(event.name.clone()));
             }
@@ -312,13 +325,35 @@ impl Follower<'_> {
                     && asked
                     && fired.contains(&event)
                     && !definition.events()[event].set.is_empty()
-                    && self.rests_on_watched(*i)
                 {
-                    zeno = Some((event, self.t, 4.0 * f64::EPSILON * self.t.abs()));
+                    let rounding = 4.0 * f64::EPSILON * self.t.abs();
+                    if self.rests_on_watched(*i) {
+                        zeno = Some((event, self.t, rounding));
+                    } else if definition.events()[event].sticks {
+                        match self.flight_in_rounding(*i) {
+                            Some(time) => zeno = Some((event, self.t, time + rounding)),
+                            None => through = Some(event),
+                        }
+                    }
                 }
             }
             newly = self.new_conditions(definition);
             newly.extend(struck);
+            if changed {
+                let blown = self.blown(definition, &old, &fired, &left_behind)?;
+                newly.extend(blown);
+            }
+            newly.sort_unstable();
+            newly.dedup();
+            // What may stick to a surface is not let through it without a word.
+            if let Some(event) = through.filter(|event| zeno.is_none() && !newly.contains(event)) {
+                let why = format!(
+                    "`set` of {} leaves the motion going on through the surface that it may stick \
+                        to (after_zeno = \"stick\"): let it turn the speed back there",
+                    definition.events()[event].name
+                );
+                return Err(HybridError::Stuck { t: self.t, x: self.x.clone(), why });
+            }
             let setting = fired.iter().rev().find(|i| !definition.events()[**i].set.is_empty());
             let name = &definition.events()[*setting.unwrap_or(&fired[fired.len() - 1])].name;
             if !quiet && !self.emit(self.t, Some(name), observe) {
@@ -356,18 +391,100 @@ impl Follower<'_> {
         self.happen(definition, &newly, &[], observe)
     }
 
+    /// The time of a flight at the present speed over a watched expression's surface, into which
+    /// the motion is pressed, if rounding hides its height.
+    fn flight_in_rounding(&mut self, i: usize) -> Option<f64> {
+        const ROUNDINGS: f64 = 1e4;
+        let (compiled, rates) = self.rates_of_second_order(&self.config.clone());
+        let place = compiled.active.len() + i;
+        let (speed, bend) = (rates.first[place].abs(), rates.second[place]);
+        let height = 0.5 * speed * speed / bend.abs();
+        let hidden = height <= ROUNDINGS * self.grain_of(i, rates.terms[place]);
+        (bend * self.watch_side[i] > 0.0 && hidden).then_some(2.0 * speed / bend.abs())
+    }
+
+    /// The events at whose surfaces the motion lies, and that a reset turns into them: they are met
+    /// at this moment. One that has just happened is so if what happened after it turns it.
+    fn blown(
+        &mut self,
+        definition: &crate::Definition,
+        old: &[f64],
+        fired: &[usize],
+        left_behind: &[Vec<f64>],
+    ) -> Result<Vec<usize>, HybridError> {
+        let mut found = Vec::new();
+        for i in 0..self.watch_side.len() {
+            let (Some(event), side) = (self.event_of[i], self.watch_side[i]) else { continue };
+            let When::Zero(_, direction) = definition.events()[event].when else { continue };
+            let into = match direction {
+                Direction::Down => side < 0.0,
+                Direction::Up => side > 0.0,
+                Direction::Both => side != 0.0,
+            };
+            let rests = self.held[i] || self.contacts.iter().any(|c| c.watched == i);
+            if !into || !self.fresh_watch[i] || rests {
+                continue;
+            }
+            let of_mode = |mode| mode == self.config.mode;
+            if !definition.events()[event].from.is_none_or(of_mode) {
+                continue;
+            }
+            let before = match fired.iter().position(|f| *f == event) {
+                Some(place) => match left_behind.get(place) {
+                    Some(x) => x,
+                    // It alone has happened, and says itself where motion goes.
+                    None => continue,
+                },
+                None => old,
+            };
+            let e = &self.equation.watched[i];
+            let lay = self.equation.value(e, self.t, before).abs() <= 1e-12 * self.magnitude(e);
+            if !lay || before == self.x {
+                continue;
+            }
+            // Rounding of a speed that a blow changes is none.
+            const ROUNDING: f64 = 1e-9;
+            let config = self.config.clone();
+            let (compiled, after) = self.rates(&config);
+            let now = std::mem::replace(&mut self.x, before.to_vec());
+            let (_, rates) = self.rates(&config);
+            self.x = now;
+            let place = compiled.active.len() + i;
+            let small = ROUNDING * after.first_or_zero(place).abs();
+            if rates.direction(place) == side && !(rates.first[place].abs() < small) {
+                continue;
+            }
+            if self.tangents.is_some() {
+                return Err(self.no_tangents(
+                    "what lies at an event's zero is struck through it, where neighbours have no \
+                        common linear motion",
+                ));
+            }
+            // A train that holds nothing but this moment goes on without end.
+            let train = &self.trains[event].times;
+            if train.len() > 60 && train[train.len() - 60] == self.t {
+                let why = format!(
+                    "{} happens again and again without time passing: describe by one event \
+                        what happens there",
+                    definition.events()[event].name
+                );
+                return Err(HybridError::Stuck { t: self.t, x: self.x.clone(), why });
+            }
+            found.push(event);
+        }
+        Ok(found)
+    }
+
     /// The time of a flight over an event's surface whose height is a thousand roundings of the
     /// event's expression: shorter ones are not resolved.
     fn grain(&mut self, event: usize) -> f64 {
         let Some(watched) = self.event_of.iter().position(|e| *e == Some(event)) else {
             return 0.0;
         };
-        self.variables[..self.n].copy_from_slice(&self.x);
-        self.variables[self.n] = self.t;
-        let mut field = vec![0.0; self.n];
-        self.compiled.field.evaluate(&self.variables, &mut field);
-        let bend = self.second_along(&field, None)[self.compiled.active.len() + watched].abs();
-        let rounding = f64::EPSILON * self.terms_now(&self.equation.watched[watched]);
+        let (compiled, rates) = self.rates_of_second_order(&self.config.clone());
+        let place = compiled.active.len() + watched;
+        let bend = rates.second[place].abs();
+        let rounding = 0.25 * self.grain_of(watched, rates.terms[place]);
         // A parabola of height bend*g^2/8.
         if bend > 0.0 { (8e3 * rounding / bend).sqrt() } else { 0.0 }
     }

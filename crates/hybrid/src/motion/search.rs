@@ -129,9 +129,9 @@ impl Follower<'_> {
     }
 
     /// The same for what is sought, of which whole parts are measured as they are.
-    pub(super) fn polynomial_of(&self, step: &Step, sought: Sought) -> Option<[f64; 5]> {
+    pub(super) fn polynomial_of(&self, step: &Step, sought: Sought) -> Option<([f64; 5], f64)> {
         let place = self.plain_place(sought)?;
-        self.polynomial(step, place, 0.0).map(|(b, _)| b)
+        self.polynomial(step, place, 0.0)
     }
 
     /// The place of a guard or watched value.
@@ -467,7 +467,18 @@ impl Follower<'_> {
         step.at(b, &mut room);
         let high = self.value_of(sought, self.t + b * longest, &room);
         self.room = room;
-        let slope = (high - low) / ((b - a) * longest);
+        let mut slope = (high - low) / ((b - a) * longest);
+        let mut before = low;
+        if !(low * high < 0.0)
+            && let Some(place) = self.place_of(sought)
+        {
+            // Rounding hides a difference over so short a time.
+            let (mut x, mut field) = (vec![0.0; self.n], vec![0.0; self.n]);
+            step.at(h / longest, &mut x);
+            self.rhs(self.t + h, &x, &mut field);
+            slope = Self::along(&self.compiled, &self.variables, &field)[place];
+            before = -slope;
+        }
         let mut length = h;
         for correction in 0.. {
             let follower = &mut *self;
@@ -475,7 +486,11 @@ impl Follower<'_> {
             if correction == 3 || matches!(sought, Sought::Pole(_)) {
                 break;
             }
-            let correction = self.value_of(sought, self.t + length, &step.y) / slope;
+            let value = self.value_of(sought, self.t + length, &step.y);
+            let correction = value / slope;
+            if value != 0.0 && self.is_rounding(sought, value) {
+                break;
+            }
             // If the function only touches zero, or has no value, the first place stays.
             let rounding = 2.0 * f64::EPSILON * (self.t + length).abs();
             let wanted = (length - correction).clamp(0.0, longest);
@@ -489,8 +504,21 @@ impl Follower<'_> {
             length = wanted;
         }
         if !matches!(sought, Sought::Pole(_)) {
-            self.land_beyond(step, longest, sought, low, slope);
+            self.land_beyond(step, longest, sought, before, slope);
         }
+    }
+
+    /// Whether a value of a watched expression that left zero at the step's beginning is as small
+    /// as its rounding: it says nothing of the place of a zero.
+    fn is_rounding(&self, sought: Sought, value: f64) -> bool {
+        self.leaves.is_some_and(|(i, size)| sought == Sought::Watched(i) && value.abs() <= size)
+    }
+
+    /// A bound on the rounding of a watched expression's value: that of its terms, and of the time,
+    /// by which they move at these speeds.
+    pub(super) fn grain_of(&self, watched: usize, speeds: f64) -> f64 {
+        let terms = self.terms_now(&self.equation.watched[watched]);
+        4.0 * f64::EPSILON * (terms + self.t.abs() * speeds)
     }
 
     /// A zero of higher order is flat, and Newton's method ends before it: where the function's
@@ -863,6 +891,24 @@ impl Follower<'_> {
             let guard = self.sliding[place];
             if self.along[guard] == if plus { 1.0 } else { -1.0 } && *value > ALONG.sqrt() {
                 self.along[guard] = 0.0;
+            }
+        }
+    }
+
+    /// By how much a watched expression may be beyond zero without being met: where a contact has
+    /// opened, it leaves zero as a cube does, and what its rounding does there is nothing.
+    pub(super) fn allowance(&self, sought: Sought, side: f64) -> f64 {
+        if let Sought::Watched(i) = sought { side * self.released[i] } else { 0.0 }
+    }
+
+    /// What has left zero after its contact opened is watched as others are.
+    pub(super) fn clear_released(&mut self) {
+        for i in 0..self.released.len() {
+            if self.released[i] > 0.0 {
+                let (e, side) = (&self.equation.watched[i], self.watch_side[i]);
+                if self.equation.value(e, self.t, &self.x) * side > self.released[i] {
+                    self.released[i] = 0.0;
+                }
             }
         }
     }

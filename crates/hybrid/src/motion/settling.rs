@@ -54,11 +54,18 @@ impl Follower<'_> {
 
     /// The size of the terms that an expression is a sum of, as they are now.
     pub(super) fn terms_now(&self, e: &Expression) -> f64 {
+        self.terms_at(e, self.t, &self.x)
+    }
+
+    /// The size of the terms that an expression is a sum of, as they are at a point.
+    pub(super) fn terms_at(&self, e: &Expression, t: f64, x: &[f64]) -> f64 {
         match e {
-            Expression::Add(a, b) | Expression::Sub(a, b) => self.terms_now(a) + self.terms_now(b),
-            Expression::Neg(a) => self.terms_now(a),
-            Expression::Mul(a, b) => self.terms_now(a) * self.terms_now(b),
-            other => self.equation.value(other, self.t, &self.x).abs(),
+            Expression::Add(a, b) | Expression::Sub(a, b) => {
+                self.terms_at(a, t, x) + self.terms_at(b, t, x)
+            }
+            Expression::Neg(a) => self.terms_at(a, t, x),
+            Expression::Mul(a, b) => self.terms_at(a, t, x) * self.terms_at(b, t, x),
+            other => self.equation.value(other, t, x).abs(),
         }
     }
 
@@ -1196,6 +1203,7 @@ impl Follower<'_> {
     /// Finds the side of a watched expression; `zero`: it is zero here, whatever rounding says.
     pub(super) fn begin_watching(&mut self, i: usize, zero: bool) {
         let place = self.compiled.active.len() + i;
+        self.released[i] = 0.0;
         if !zero {
             let value = self.watched_values()[place];
             if value.abs() > 1e-14 * self.magnitude(&self.equation.watched[i]) {
