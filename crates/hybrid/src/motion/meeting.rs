@@ -345,7 +345,7 @@ impl Follower<'_> {
             }
             newly.sort_unstable();
             newly.dedup();
-            // What may stick to a surface is not let through it without a word.
+            // A state that may stick to a surface is not let through it without a word.
             if let Some(event) = through.filter(|event| zeno.is_none() && !newly.contains(event)) {
                 let why = format!(
                     "`set` of {} leaves the motion going on through the surface that it may stick \

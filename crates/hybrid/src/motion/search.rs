@@ -901,7 +901,7 @@ impl Follower<'_> {
         if let Sought::Watched(i) = sought { side * self.released[i] } else { 0.0 }
     }
 
-    /// What has left zero after its contact opened is watched as others are.
+    /// Watches an expression that has left zero after its contact opened as others are watched.
     pub(super) fn clear_released(&mut self) {
         for i in 0..self.released.len() {
             if self.released[i] > 0.0 {
