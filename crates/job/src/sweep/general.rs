@@ -190,7 +190,7 @@ impl Late {
                 size = size.max(p.u[k].abs());
             }
         }
-        if !(low[0] <= high[0]) {
+        if low[0] > high[0] {
             return Self { middle: [0.0; 2], swing: 0.0, size: 0.0 };
         }
         let [a, b] = [high[0] - low[0], high[1] - low[1]];
