@@ -13,6 +13,7 @@ use twofold::integrate::Schedule;
 use twofold::job::JobError;
 use twofold::job::spec::*;
 use twofold::job::sweep::{Axis, Rows, Sweep};
+use twofold::job::table::Entry;
 use twofold::paper::claims::claims;
 use twofold::paper::{Reading, census, figures};
 use twofold::record::Journal;
@@ -270,4 +271,25 @@ fn a_journal_is_gone_on_with() {
     let error =
         recompute(&[("a.csv", &whole.csv())], folder.path(), 1, &Progress::new(true)).unwrap_err();
     assert!(error.to_string().contains("row 0 of a.csv"), "{error}");
+}
+
+/// Two groups alone, as the page has them: LSODA and the Taylor method to t = 5000, and fig. 7(iii)
+/// beside fig. 8.
+#[test]
+fn groups_of_two_differ_as_the_page_says() {
+    let rules = &claims().rules;
+    let of = |name: &str, alpha: f64, interval: Option<f64>| {
+        let mut chosen = vec![("params.alpha", Entry::Number(alpha))];
+        chosen.extend(interval.map(|v| ("interval", Entry::Number(v))));
+        census::runs(&rows(&format!("figures/census/{name}.csv")).table(), &chosen)
+    };
+    let page = fs::read_to_string(path("docs/census.md")).unwrap();
+    for (groups, said) in [
+        ([of("ordinary-printed", 1e-3, None), of("taylor-printed", 1e-3, None)], "alone: "),
+        ([of("fig7", 0.1, Some(100.0)), of("fig8", 0.1, None)], "with interval 100, "),
+    ] {
+        let p = census::same_odds(&groups, rules).p_permutation;
+        let said = format!("{said}{}", census::p_in_words(p));
+        assert!(page.split_whitespace().collect::<Vec<_>>().join(" ").contains(&said), "{said}");
+    }
 }

@@ -602,21 +602,14 @@ fn a_sweep_says_what_runs_settle_on() {
         "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', 'p*x - x^3 - v']\n[parameters]\np = 1",
     )
     .unwrap();
-    let outcomes = |flags: &[&str]| {
-        let table = from_csv(&good(at, &[&["sweep", "--quiet"], flags].concat())).unwrap().1;
-        (
-            table.words("outcome").map(str::to_owned).collect::<Vec<_>>(),
-            table.integers("crossings").to_vec(),
-        )
-    };
     let saw = ["--system", "saw.toml", "--t-end", "300", "--over", "params.top=1,1.5"];
-    let (found, seen) = outcomes(&[&saw[..], &["--period", "0.5"]].concat());
+    let (found, seen) = outcomes(at, &[&saw[..], &["--period", "0.5"]].concat());
     assert_eq!((found, seen), (vec!["period-2".into(), "period-3".into()], vec![601, 601]));
-    let (found, seen) = outcomes(&[&saw[..], &["--section", "x=0.5"]].concat());
+    let (found, seen) = outcomes(at, &[&saw[..], &["--section", "x=0.5"]].concat());
     assert_eq!((found, seen), (vec!["period-1".into(), "period-1".into()], vec![300, 200]));
-    assert_eq!(outcomes(&saw).0, ["moving", "moving"]);
+    assert_eq!(outcomes(at, &saw).0, ["moving", "moving"]);
     assert_eq!(
-        outcomes(&["--system", "well.toml", "--t-end", "100", "--over", "params.p=1,4"]).0,
+        outcomes(at, &["--system", "well.toml", "--t-end", "100", "--over", "params.p=1,4"]).0,
         ["rest", "rest"]
     );
     let scan = [
@@ -647,10 +640,6 @@ fn periods_do_not_depend_on_the_origin() {
             1\nset = { x = 'c + r*(x - c)*(1 - (x - c))' }",
     )
     .unwrap();
-    let outcomes = |flags: &[&str]| -> Vec<String> {
-        let table = from_csv(&good(at, &[&["sweep", "--quiet"], flags].concat())).unwrap().1;
-        table.words("outcome").map(str::to_owned).collect()
-    };
     for (c, start) in [("0", "0.3"), ("1e4", "10000.3")] {
         let set = format!("c={c}");
         let map = ["--system", "map.toml", "--period", "1", "--t-end", "3000", "--set", &set];
@@ -658,15 +647,22 @@ fn periods_do_not_depend_on_the_origin() {
         let expected = ["rest", "period-2", "period-4", "period-8", "period-16", "period-6"];
         // At 3.57 chaos in so narrow bands is not told from a long period.
         assert_eq!(
-            outcomes(&[&map[..], &over].concat()),
+            outcomes(at, &[&map[..], &over].concat()).0,
             [&expected[..], &["undecided", "irregular"]].concat(),
             "{c}"
         );
     }
     // Doubled at 24.5166 V.
     let buck = ["--system", "buck", "--period", "400e-6", "--t-end", "1"];
-    let found = outcomes(&[&buck[..], &["--over", "params.input=24,24.6,25"]].concat());
-    assert_eq!(found, ["period-1", "period-2", "period-2"]);
+    let found = outcomes(at, &[&buck[..], &["--over", "params.input=24,24.6,25"]].concat());
+    assert_eq!(found.0, ["period-1", "period-2", "period-2"]);
+}
+
+/// The outcomes and crossings of a sweep's rows.
+fn outcomes(folder: &Path, flags: &[&str]) -> (Vec<String>, Vec<i64>) {
+    let table = from_csv(&good(folder, &[&["sweep", "--quiet"], flags].concat())).unwrap().1;
+    let words = table.words("outcome").map(str::to_owned).collect();
+    (words, table.integers("crossings").to_vec())
 }
 
 /// Motion that is not decided, and the end of a domain: exit code 3, and the rows so far.

@@ -13,7 +13,7 @@ pub(crate) struct Branch {
     pub x: Vec<f64>,
     pub config: Configuration,
     pub sliding: Vec<usize>,
-    /// The state and the expression of each.
+    /// Of each contact its state and its watched expression.
     pub contacts: Vec<(usize, usize)>,
 }
 

@@ -1083,7 +1083,7 @@ impl<'a> Follower<'a> {
     ) -> Option<Accepted> {
         let mut scale = std::mem::take(&mut self.scale);
         let accepted = match self.options.method {
-            Method::Lsoda => self.step_of_many(step, longest, &mut scale, list),
+            Method::Lsoda => self.multistep_within(step, longest, &mut scale, list),
             _ => self.step_in_units(step, longest, &mut scale, list),
         };
         self.scale = scale;

@@ -143,7 +143,7 @@ impl Follower<'_> {
             terms.clear();
             let x = step.x[i];
             if is_start {
-                // The slopes at both ends are known: a cubic, and the trapezoidal rule for its end.
+                // The slopes at both ends are known: a parabola, by the trapezoidal rule.
                 let [begin, end] = [step.h * step.k[0][i], columns[1][i]];
                 let bend = 0.5 * (end - begin);
                 own.end[i] = x + (begin + bend);
@@ -169,7 +169,7 @@ impl Follower<'_> {
     }
 
     /// As [`Follower::step_within`], for the multistep method.
-    pub(super) fn step_of_many(
+    pub(super) fn multistep_within(
         &mut self,
         step: &mut Step,
         longest: f64,
