@@ -118,8 +118,7 @@ where
 }
 
 /// The Nordsieck polynomial, over the step that was corrected last and has not been rescaled since.
-/// It misses that step's start by about the local error, as the dense output of a multistep method
-/// does: it is the new polynomial, not the one before.
+/// What a correction adds vanishes at that step's start, which it misses by rounding alone.
 impl<const N: usize> Interpolant<N> for Nordsieck<Const<N>> {
     fn at(&self, theta: f64) -> SVector<f64, N> {
         let s = theta - 1.0;

@@ -219,6 +219,22 @@ fn starts_late() {
     assert!((x - vector![20_f64.cos(), 20_f64.sin()]).amax() < 1e-6);
 }
 
+/// Both families' formulas vanish at the step's start, so that the dense output goes through it.
+#[test]
+fn the_dense_output_begins_at_the_step() {
+    for tolerance in [1e-4, 1e-8, 1e-11] {
+        let mut lsoda = Lsoda::new(Tolerance { rtol: tolerance, atol: tolerance });
+        lsoda.restart(&Circle, 0.0, vector![1.0, 0.0], 20.0, f64::INFINITY).unwrap();
+        loop {
+            let step = lsoda.step(&Circle).unwrap();
+            assert!((step.at(0.0) - step.x0).amax() < 1e-14 && step.at(1.0) == step.x1);
+            if step.t1 == 20.0 {
+                break;
+            }
+        }
+    }
+}
+
 #[test]
 fn keeps_the_cap() {
     let mut lsoda = Lsoda::new(Tolerance { rtol: 1e-4, atol: 1e-4 });
