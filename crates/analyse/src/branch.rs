@@ -4,11 +4,15 @@
 //! pseudo-arclength (Keller 1977; Seydel 2010, Practical Bifurcation and Stability Analysis, ch.
 //! 4), so that folds, where the branch turns back in p, are passed.
 
+mod changes;
+
 use serde::{Deserialize, Serialize};
+
+use changes::{changes, on_circle, turning};
 
 use super::floquet::{Returned, multipliers_of};
 use twofold_num::elementary::{ln, sqrt};
-use twofold_num::linear::solve_any;
+use twofold_num::linear::{solve_any, solve_some};
 
 /// A return map P(u, p) of a plane in a system with a parameter.
 pub trait ReturnMap {
@@ -29,6 +33,11 @@ pub trait ReturnMap {
     /// Why there is no return or no derivative.
     fn roughly(&self, u: &[f64], p: f64) -> Result<Returned, Trouble> {
         self.returned(u, p, true)
+    }
+    /// Whether a point that stays where it is counts as an orbit: of a map, or of the period of a
+    /// drive.
+    fn has_points(&self) -> bool {
+        false
     }
     /// The rest near `u` at the parameter's value `p`, and the eigenvalues there.
     fn rest(&self, _u: &[f64], _p: f64) -> Option<(Vec<f64>, Vec<[f64; 2]>)> {
@@ -203,9 +212,9 @@ impl Newton {
     /// Largest distance that counts as closed for the return `r` of `u`.
     ///
     /// # Errors
-    /// If all of it is a point.
-    fn closed(&self, u: &[f64], r: &Returned) -> Result<f64, Trouble> {
-        if r.extent <= POINT * self.error(u) {
+    /// If all of it is a point, and a point is no orbit of the map.
+    fn closed(&self, map: &dyn ReturnMap, u: &[f64], r: &Returned) -> Result<f64, Trouble> {
+        if r.extent <= POINT * self.error(u) && !map.has_points() {
             let said = "the search comes to a rest: its loop shrinks to a point".to_owned();
             return Err(Trouble { obstacle: Obstacle::Point(u.to_vec()), said });
         }
@@ -241,7 +250,7 @@ pub fn closed_orbit(
         let r = map.returned(&u, p, true)?;
         let difference: Vec<f64> = r.point.iter().zip(&u).map(|(a, b)| a - b).collect();
         let residual = sized(&difference, &r);
-        if settled(residual, before, newton.closed(&u, &r)?) {
+        if settled(residual, before, newton.closed(map, &u, &r)?) {
             return orbit(map, u, p, r, residual, iterations);
         }
         before = residual;
@@ -446,6 +455,9 @@ pub struct BranchOptions {
     pub longest: f64,
     /// Maximum number of orbits.
     pub most: usize,
+    /// The least size of a state that counts: a change of it is a step of length one along the
+    /// branch. Zero for loops, whose extent is known.
+    pub size: f64,
     /// Newton's method.
     pub newton: Newton,
 }
@@ -509,7 +521,7 @@ struct Scales {
 /// }
 /// let newton = Newton { closed: 1e-10, atol: 1e-12, rtol: 1e-12, iterations: 20 };
 /// let first = closed_orbit(&Circle, &[1.1, 0.0], 1.0, newton).expect("an orbit");
-/// let options = BranchOptions { from: 1.0, to: 4.0, longest: 0.1, most: 100, newton };
+/// let options = BranchOptions { from: 1.0, to: 4.0, longest: 0.1, most: 100, size: 0.0, newton };
 /// let branch = follow(&Circle, first, &options, &mut |_| true);
 /// let last = branch.orbits.last().expect("at least one");
 /// assert!((last.point[0] - last.parameter.sqrt()).abs() < 1e-8);
@@ -520,7 +532,13 @@ pub fn follow(
     options: &BranchOptions,
     go_on: &mut dyn FnMut(&Orbit) -> bool,
 ) -> Branch {
-    let scales = Scales { state: first.extent, parameter: (options.to - options.from).abs() };
+    let scales = Scales {
+        state: first.extent.max(options.size),
+        parameter: (options.to - options.from).abs(),
+    };
+    let points = map.has_points();
+    // The last member whose multipliers are told from one on the unit circle.
+    let mut told = first.clone();
     let towards = (options.to - options.from).signum();
     let mut branch = Branch { orbits: vec![first], bifurcations: Vec::new(), end: End::Enough };
     let mut step = 0.25 * options.longest;
@@ -533,7 +551,7 @@ pub fn follow(
         // An orbit that shrinks to a point is not stepped over: behind it the same orbits come
         // again, seen from their other side.
         let way = scales.state * sqrt(du.iter().map(|d| d * d).sum());
-        if step * way > REACH * last.extent {
+        if step * way > REACH * last.extent && !points {
             step = REACH * last.extent / way;
         }
         let guess: Vec<f64> =
@@ -553,7 +571,8 @@ pub fn follow(
         let widest = branch.orbits.iter().map(|o| o.extent).fold(0.0, f64::max);
         let next = match next {
             Ok(next)
-                if next.extent <= VANISHING * widest
+                if !points
+                    && next.extent <= VANISHING * widest
                     && !(last.fills && next.fills && next.extent > GONE * widest)
                     && !is_loop(map, &next) =>
             {
@@ -580,13 +599,7 @@ pub fn follow(
                         && let Some((next, hop)) =
                             behind_grazing(map, last, (&du, dp), &scales, options)
                     {
-                        branch.bifurcations.extend(changes(
-                            map,
-                            last,
-                            &next,
-                            &scales,
-                            options.newton,
-                        ));
+                        note(map, &mut branch, &mut told, &next, &scales, options.newton);
                         let stop = !go_on(&next);
                         branch.orbits.push(next);
                         step = hop;
@@ -603,7 +616,7 @@ pub fn follow(
                 continue;
             }
         };
-        if next.extent <= GONE * widest {
+        if next.extent <= GONE * widest && !points {
             let (missed, said) = (
                 (next.parameter - last.parameter).abs(),
                 "the orbit shrinks to a point".to_owned(),
@@ -623,7 +636,7 @@ pub fn follow(
             (next.parameter - last.parameter) / scales.parameter,
         );
         let length = sqrt(su.iter().map(|s| s * s).sum::<f64>() + sp * sp);
-        branch.bifurcations.extend(changes(map, last, &next, &scales, options.newton));
+        note(map, &mut branch, &mut told, &next, &scales, options.newton);
         if length > 0.0 {
             direction = Some((su.iter().map(|s| s / length).collect(), sp / length));
         }
@@ -642,6 +655,31 @@ pub fn follow(
         }
     }
     branch
+}
+
+/// Notes what changes from the last member `told` to the next one of the branch, if it is told.
+fn note(
+    map: &dyn ReturnMap,
+    branch: &mut Branch,
+    told: &mut Orbit,
+    next: &Orbit,
+    scales: &Scales,
+    newton: Newton,
+) {
+    let last = &branch.orbits[branch.orbits.len() - 1];
+    let others = last.events != next.events;
+    // One on the unit circle that was not there before is about to pass it, or will not.
+    if !others && on_circle(next) > on_circle(told) {
+        return;
+    }
+    let mut found = changes(map, if others { last } else { told }, next, scales, newton);
+    if let [.., before, _] = &branch.orbits[..]
+        && found.is_empty()
+    {
+        found.extend(turning(map, [before, last, next], scales, newton));
+    }
+    branch.bifurcations.extend(found);
+    *told = next.clone();
 }
 
 /// Whether a small orbit is one, and not the rest within: the rest is a zero of P(u) - u too, and
@@ -745,7 +783,7 @@ fn ended(
     let here =
         |change| Some(Bifurcation { change, parameter: last.parameter, uncertainty: missed });
     let largest = orbits.iter().map(|o| o.extent).fold(0.0, f64::max);
-    let small = last.extent <= VANISHING * largest;
+    let small = last.extent <= VANISHING * largest && !map.has_points();
     match trouble.obstacle {
         Obstacle::Grazing => (here(Change::Grazing), End::Lost(trouble.said)),
         Obstacle::SetValued => (here(Change::SetValued), End::Lost(trouble.said)),
@@ -844,7 +882,7 @@ fn arclength(
         let residual = sized(&difference, &r);
         let along: f64 = (0..n).map(|i| du[i] * (u[i] - guess[i]) / scales.state).sum::<f64>()
             + dp * (q - p) / scales.parameter;
-        let done = settled(residual, before, newton.closed(&u, &r)?) && along.abs() < 1e-6;
+        let done = settled(residual, before, newton.closed(map, &u, &r)?) && along.abs() < 1e-6;
         // With a multiplier near 1 a small residual may still be far from an orbit: Newton's method
         // goes on as long as it helps.
         let near_one = |m: &[f64; 2]| distance(*m, [1.0, 0.0]) < NEAR_ONE;
@@ -872,7 +910,9 @@ fn arclength(
         matrix[n * size + n] = dp;
         let mut right: Vec<f64> = difference.iter().map(|d| -d).collect();
         right.push(-along);
-        let step = solve_any(&matrix, &right, SINGULAR * largest(&matrix))
+        let rounding = SINGULAR * largest(&matrix);
+        let step = solve_any(&matrix, &right, rounding)
+            .or_else(|| solve_some(&matrix, &right, rounding))
             .ok_or("branches meet here: the branch's direction is not determined")?;
         u.iter_mut()
             .zip(&step)
@@ -884,216 +924,9 @@ fn arclength(
     Err("Newton's method did not converge along the branch".into())
 }
 
-/// Changes of stability between neighbours on a branch.
-fn changes(
-    map: &dyn ReturnMap,
-    a: &Orbit,
-    b: &Orbit,
-    scales: &Scales,
-    newton: Newton,
-) -> Vec<Bifurcation> {
-    let between = |change| Bifurcation {
-        change,
-        parameter: 0.5 * (a.parameter + b.parameter),
-        uncertainty: 0.5 * (a.parameter - b.parameter).abs() + f64::EPSILON * a.parameter.abs(),
-    };
-    if a.events != b.events {
-        return vec![between(Change::DiscontinuityInduced)];
-    }
-    let count = |o: &Orbit, test: &dyn Fn(&[f64; 2]) -> bool| {
-        o.multipliers.iter().filter(|m| test(m)).count()
-    };
-    let below: &dyn Fn(&[f64; 2]) -> bool = &|m| m[1] == 0.0 && m[0] < -1.0;
-    let above: &dyn Fn(&[f64; 2]) -> bool = &|m| m[1] == 0.0 && m[0] > 1.0;
-    let outside: &dyn Fn(&[f64; 2]) -> bool = &|m| m[1] != 0.0 && m[0] * m[0] + m[1] * m[1] > 1.0;
-    let mut found = Vec::new();
-    if count(a, below) != count(b, below) {
-        let at = locate(map, a, b, scales, newton, &|o| product(o, -1.0));
-        found.push(at.map_or_else(
-            || between(Change::PeriodDoubling),
-            |at| at.transversal(Change::PeriodDoubling),
-        ));
-    }
-    if count(a, above) != count(b, above) {
-        let at = locate(map, a, b, scales, newton, &|o| product(o, 1.0));
-        found.push(at.map_or_else(
-            || between(Change::Branching),
-            |at| at.fold_or_branching(map, a, b, scales, newton),
-        ));
-    }
-    if count(a, outside) != count(b, outside) {
-        let modulus = |o: &Orbit| {
-            let squares = o
-                .multipliers
-                .iter()
-                .filter(|m| m[1] != 0.0)
-                .map(|m| m[0] * m[0] + m[1] * m[1] - 1.0);
-            squares.min_by(|x, y| x.abs().total_cmp(&y.abs())).unwrap_or(f64::NAN)
-        };
-        let at = locate(map, a, b, scales, newton, &modulus);
-        found.push(at.map_or_else(|| between(Change::Torus), |at| at.transversal(Change::Torus)));
-    }
-    found
-}
-
-/// The product of all multipliers less `value`: it changes sign where one passes it, and stays
-/// smooth where others meet.
-fn product(o: &Orbit, value: f64) -> f64 {
-    let factors = o
-        .multipliers
-        .iter()
-        .map(|m| if m[1] == 0.0 { [m[0] - value, 0.0] } else { [m[0] - value, m[1]] });
-    // Complex factors come in pairs, beside each other.
-    factors.fold([1.0, 0.0], |p, f| [p[0] * f[0] - p[1] * f[1], p[0] * f[1] + p[1] * f[0]])[0]
-}
-
-/// A zero of a test function along a branch, between two members.
-struct Located {
-    /// The member nearest to it.
-    orbit: Orbit,
-    /// Its share of the way from the one to the other.
-    share: f64,
-    /// Change of the parameter over that of the test function, over the whole way.
-    slope: f64,
-    /// The test function's error there.
-    error: f64,
-}
-
-/// Zero of a test function between two members: by regula falsi (the Illinois variant, Dowell &
-/// Jarratt 1971) along the chord.
-fn locate(
-    map: &dyn ReturnMap,
-    a: &Orbit,
-    b: &Orbit,
-    scales: &Scales,
-    newton: Newton,
-    test: &dyn Fn(&Orbit) -> f64,
-) -> Option<Located> {
-    let ((mut sa, mut ga), (mut sb, mut gb)) = ((0.0, test(a)), (1.0, test(b)));
-    let slope = (b.parameter - a.parameter) / (gb - ga);
-    if ga.is_nan() || gb.is_nan() || ga * gb > 0.0 || ga == gb {
-        return None;
-    }
-    let mut last_side = 0;
-    let mut nearest: Option<(Orbit, f64, f64)> = None;
-    for _ in 0..ITERATIONS {
-        let share = sb - gb * (sb - sa) / (gb - ga);
-        let orbit = member(map, a, b, share, scales, newton).ok()?;
-        let g = test(&orbit);
-        let error = sensitivity(&orbit);
-        let done = g.abs() <= error || (sb - sa).abs() <= 1e-9;
-        let side = if g * gb > 0.0 { 1 } else { -1 };
-        if side > 0 {
-            (sb, gb) = (share, g);
-            ga *= if last_side > 0 { 0.5 } else { 1.0 };
-        } else {
-            (sa, ga) = (share, g);
-            gb *= if last_side < 0 { 0.5 } else { 1.0 };
-        }
-        last_side = side;
-        if nearest.as_ref().is_none_or(|(_, _, best)| g.abs() < best.abs()) {
-            nearest = Some((orbit, share, g));
-        }
-        if done {
-            break;
-        }
-    }
-    let (orbit, share, g) = nearest?;
-    let error = g.abs() + sensitivity(&orbit);
-    Some(Located { orbit, share, slope, error })
-}
-
-/// By how much a product of multipliers, or a modulus, may be off.
-fn sensitivity(orbit: &Orbit) -> f64 {
-    let others =
-        orbit.multipliers.iter().map(|m| 1.0 + sqrt(m[0] * m[0] + m[1] * m[1])).product::<f64>();
-    orbit.multiplier_error * others * orbit.multipliers.len() as f64
-}
-
-/// The member at a share of the way from `a` to `b`.
-fn member(
-    map: &dyn ReturnMap,
-    a: &Orbit,
-    b: &Orbit,
-    share: f64,
-    scales: &Scales,
-    newton: Newton,
-) -> Result<Orbit, Trouble> {
-    let guess: Vec<f64> = a.point.iter().zip(&b.point).map(|(a, b)| a + share * (b - a)).collect();
-    let chord: Vec<f64> =
-        a.point.iter().zip(&b.point).map(|(a, b)| (b - a) / scales.state).collect();
-    let along = (b.parameter - a.parameter) / scales.parameter;
-    let length = sqrt(chord.iter().map(|c| c * c).sum::<f64>() + along * along);
-    let chord: Vec<f64> = chord.iter().map(|c| c / length).collect();
-    let p = a.parameter + share * (b.parameter - a.parameter);
-    arclength(map, &guess, p, (&chord, along / length), scales, newton)
-}
-
-impl Located {
-    /// A change at which the parameter goes on in proportion to the test function.
-    fn transversal(self, change: Change) -> Bifurcation {
-        let p = self.orbit.parameter;
-        // Twice: the slope is that of a chord.
-        let uncertainty = 2.0 * self.error * self.slope.abs() + f64::EPSILON * p.abs();
-        Bifurcation { change, parameter: p, uncertainty }
-    }
-
-    /// A fold if the members on both sides are on one side in the parameter.
-    fn fold_or_branching(
-        self,
-        map: &dyn ReturnMap,
-        a: &Orbit,
-        b: &Orbit,
-        scales: &Scales,
-        newton: Newton,
-    ) -> Bifurcation {
-        let p = self.orbit.parameter;
-        let beside =
-            |by: f64| member(map, a, b, self.share + by, scales, newton).map(|o| o.parameter - p);
-        let (Ok(before), Ok(after)) = (beside(-0.5), beside(0.5)) else {
-            return self.transversal(Change::Branching);
-        };
-        if before * after <= 0.0 {
-            return self.transversal(Change::Branching);
-        }
-        // The parameter is largest or smallest: what it is off by over half of the way, in
-        // proportion to the square of the share that is left of it; and by how much it moves with
-        // the error of the return.
-        let size = 0.5 * (before.abs() + after.abs());
-        let left = self.error / (2.0 * self.error + self.sway(a, b));
-        let delta = 1e-6 * scales.parameter;
-        let moved = |q: f64| map.returned(&self.orbit.point, q, false).map(|r| r.point);
-        let off =
-            match (moved(p + delta), moved(p - delta), map.roughly(&self.orbit.point, p), moved(p))
-            {
-                (Ok(up), Ok(down), Ok(rough), Ok(fine)) => {
-                    let gap = |a: &[f64], b: &[f64]| {
-                        sqrt(a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum())
-                    };
-                    let moves = gap(&up, &down) / (2.0 * delta);
-                    (self.orbit.residual
-                        + gap(&rough.point, &fine)
-                        + newton.error(&self.orbit.point))
-                        / moves
-                }
-                _ => f64::INFINITY,
-            };
-        let uncertainty = 4.0 * size * left * left + 4.0 * off + 4.0 * f64::EPSILON * p.abs();
-        Bifurcation {
-            change: Change::Fold,
-            parameter: p,
-            uncertainty: if off.is_finite() { uncertainty } else { size },
-        }
-    }
-
-    /// By how much the product of multipliers less 1 changes over half of the way.
-    fn sway(&self, a: &Orbit, b: &Orbit) -> f64 {
-        0.5 * (product(a, 1.0) - product(b, 1.0)).abs()
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::changes::{locate, product, sensitivity};
     use super::*;
 
     fn once(point: Vec<f64>, derivative: Vec<f64>) -> Returned {
@@ -1149,7 +982,14 @@ mod tests {
     #[test]
     fn the_logistic_map_doubles_at_three() {
         let first = closed_orbit(&Logistic, &[0.5, 0.0], 2.0, NEWTON).unwrap();
-        let options = BranchOptions { from: 2.0, to: 3.5, longest: 0.1, most: 200, newton: NEWTON };
+        let options = BranchOptions {
+            from: 2.0,
+            to: 3.5,
+            longest: 0.1,
+            most: 200,
+            size: 0.0,
+            newton: NEWTON,
+        };
         let branch = follow(&Logistic, first, &options, &mut |_| true);
         assert_eq!(branch.end, End::Reached);
         let last = branch.orbits.last().unwrap();
@@ -1171,8 +1011,14 @@ mod tests {
     #[test]
     fn a_fold_is_passed() {
         let first = closed_orbit(&FoldMap, &[1.1, 0.0], 1.0, NEWTON).unwrap();
-        let options =
-            BranchOptions { from: 1.0, to: -1.0, longest: 0.05, most: 400, newton: NEWTON };
+        let options = BranchOptions {
+            from: 1.0,
+            to: -1.0,
+            longest: 0.05,
+            most: 400,
+            size: 0.0,
+            newton: NEWTON,
+        };
         let branch = follow(&FoldMap, first, &options, &mut |_| true);
         assert_eq!(branch.end, End::TurnedBack, "{:?}", branch.orbits.len());
         let last = branch.orbits.last().unwrap();
@@ -1319,7 +1165,14 @@ mod tests {
         // x = p, from 1 to 5: of the state's scale 2 and the parameter's 4.
         let line = Zeros(|x: f64, p: f64| Some([0.5 * (p - x), -0.5]));
         let first = Orbit { extent: 2.0, ..closed_orbit(&line, &[1.0, 0.0], 1.0, NEWTON).unwrap() };
-        let options = BranchOptions { from: 1.0, to: 5.0, longest: 0.1, most: 200, newton: NEWTON };
+        let options = BranchOptions {
+            from: 1.0,
+            to: 5.0,
+            longest: 0.1,
+            most: 200,
+            size: 0.0,
+            newton: NEWTON,
+        };
         let branch = follow(&line, first, &options, &mut |_| true);
         assert_eq!(branch.end, End::Reached);
         assert!(branch.bifurcations.is_empty());
@@ -1359,8 +1212,14 @@ mod tests {
         let circle = Zeros(|x: f64, p: f64| Some([0.1 * (25.0 - x * x - p * p), -0.2 * x]));
         let first =
             Orbit { extent: 6.0, ..closed_orbit(&circle, &[4.9, 0.0], 0.0, NEWTON).unwrap() };
-        let options =
-            BranchOptions { from: 0.0, to: 6.0, longest: 0.05, most: 400, newton: NEWTON };
+        let options = BranchOptions {
+            from: 0.0,
+            to: 6.0,
+            longest: 0.05,
+            most: 400,
+            size: 0.0,
+            newton: NEWTON,
+        };
         let branch = follow(&circle, first, &options, &mut |_| true);
         assert_eq!(branch.end, End::TurnedBack);
         for (k, pair) in branch.orbits.windows(2).enumerate() {
@@ -1385,7 +1244,14 @@ mod tests {
     #[test]
     fn a_branch_ends_where_its_orbits_do_or_where_it_is_told() {
         let ray = Zeros(|x: f64, p: f64| (p <= 1.0).then_some([-0.5 * x, -0.5]));
-        let options = BranchOptions { from: 0.0, to: 4.0, longest: 0.1, most: 100, newton: NEWTON };
+        let options = BranchOptions {
+            from: 0.0,
+            to: 4.0,
+            longest: 0.1,
+            most: 100,
+            size: 0.0,
+            newton: NEWTON,
+        };
         let first = || closed_orbit(&ray, &[0.0, 0.0], 0.0, NEWTON).unwrap();
         let branch = follow(&ray, first(), &options, &mut |_| true);
         assert_eq!(branch.end, End::Lost("nothing there".into()));
@@ -1410,8 +1276,14 @@ mod tests {
             let steep =
                 Zeros(|x: f64, p: f64| Some([(steepness * p - 1.0) * x, steepness * p - 1.0]));
             let first = closed_orbit(&steep, &[0.0, 0.0], -1.0, NEWTON).unwrap();
-            let options =
-                BranchOptions { from: -1.0, to: 1.0, longest: 0.1, most: 200, newton: NEWTON };
+            let options = BranchOptions {
+                from: -1.0,
+                to: 1.0,
+                longest: 0.1,
+                most: 200,
+                size: 0.0,
+                newton: NEWTON,
+            };
             let branch = follow(&steep, first, &options, &mut |_| true);
             assert_eq!(branch.end, End::Reached);
             let within = &branch.orbits[..branch.orbits.len() - 1];
@@ -1520,7 +1392,8 @@ mod tests {
         // With long steps too, which could pass the point and find the same orbits from their other
         // side.
         for (to, longest) in [(-0.5, 0.1), (-3.0, 0.1), (-0.5, 1.0), (-3.0, 5.0)] {
-            let options = BranchOptions { from: 0.5, to, longest, most: 200, newton: NEWTON };
+            let options =
+                BranchOptions { from: 0.5, to, longest, most: 200, size: 0.0, newton: NEWTON };
             let branch = follow(&Shrinking, first.clone(), &options, &mut |_| true);
             assert_eq!(branch.end, End::Vanished);
             assert!(
@@ -1561,7 +1434,8 @@ mod tests {
     #[test]
     fn a_branch_goes_on_behind_a_grazing_if_there_is_more_of_it() {
         for (from, to) in [(0.0, 1.0), (0.1, 0.9), (0.3, 0.500_01), (0.499, 0.6)] {
-            let options = BranchOptions { from, to, longest: 0.05, most: 200, newton: NEWTON };
+            let options =
+                BranchOptions { from, to, longest: 0.05, most: 200, size: 0.0, newton: NEWTON };
             for goes_on in [true, false] {
                 let map = Graze { goes_on };
                 let first = closed_orbit(&map, &[0.5 * from, 0.0], from, NEWTON).unwrap();
@@ -1585,7 +1459,8 @@ mod tests {
         let curved = Zeros(|x: f64, p: f64| Some([(-ninth(p) - 1.0) * x, -ninth(p) - 1.0]));
         let scales = Scales { state: 1.0, parameter: 1.0 };
         let doubling = |a: &Orbit, b: &Orbit| {
-            let at = locate(&curved, a, b, &scales, NEWTON, &|o| product(o, -1.0))?;
+            let test = |o: &Orbit| (product(o, -1.0), sensitivity(o));
+            let at = locate(&curved, a, b, &scales, NEWTON, &test)?;
             Some(at.transversal(Change::PeriodDoubling))
         };
         let at = |p: f64| closed_orbit(&curved, &[0.0, 0.0], p, NEWTON).unwrap();

@@ -516,7 +516,43 @@ impl Equation {
         self.value_with(e, t, x, &RefCell::new(Vec::new()))
     }
 
-    /// The same; terms are evaluated once each.
+    /// Gives what decides between the pieces of an expression: whether conditions hold, signs, the
+    /// levels of steps, in the order in which they stand.
+    pub(crate) fn pieces(&self, e: &Expression, t: f64, x: &[f64], note: &mut dyn FnMut(i64)) {
+        let value = |e: &Expression| self.value(e, t, x);
+        let mut parts = e.parts();
+        match e {
+            Expression::Name(name) => parts.extend(self.term(name)),
+            Expression::Apply(General::If, list) => {
+                let holds = value(&list[0]) != 0.0;
+                note(i64::from(holds));
+                parts = vec![&list[if holds { 1 } else { 2 }]];
+            }
+            _ if e.is_condition() => {
+                note(i64::from(value(e) != 0.0));
+                parts.clear();
+            }
+            Expression::Apply(General::Heaviside | General::Floor, _) => {
+                note(value(e) as i64);
+                parts.clear();
+            }
+            Expression::Call(Function::Sign | Function::Abs, a) => {
+                note(i64::from(value(a) > 0.0) - i64::from(value(a) < 0.0));
+            }
+            Expression::Apply(General::Mod, list) => {
+                note((value(&list[0]) / value(&list[1])).floor() as i64);
+            }
+            Expression::Apply(General::Min | General::Max | General::Clip, list) => {
+                let chosen = list.iter().position(|part| value(part) == value(e));
+                note(chosen.map_or(-1, |i| i as i64));
+                parts = chosen.map(|i| &list[i]).into_iter().collect();
+            }
+            _ => {}
+        }
+        parts.into_iter().for_each(|part| self.pieces(part, t, x, note));
+    }
+
+    /// The value; terms are evaluated once each.
     fn value_with<S: Scalar>(
         &self,
         e: &Expression,

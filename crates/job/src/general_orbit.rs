@@ -28,6 +28,9 @@ pub struct GeneralOrbit {
     pub along: Option<Along>,
 }
 
+/// States that have settled at less than this share of their sizes at the start are at zero.
+const ROUNDED: f64 = 1e-6;
+
 /// A settling that ends on an event is repeated so many times, by this share longer each time.
 const LONGER: u32 = 8;
 const LONGER_BY: f64 = 1.0 / 128.0;
@@ -117,6 +120,14 @@ impl Question for GeneralOrbit {
             rtol,
             iterations: ITERATIONS,
         };
+        // States that have come to a zero, to rounding, are as large as at the start.
+        let size = |x: &[f64]| x.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+        let began = match &self.run.options.start {
+            Some(start) => size(start),
+            None => model.start().ok().flatten().map_or(0.0, |start| size(&start)),
+        };
+        let now = size(&found.x);
+        let size = [now, began, 1.0].into_iter().find(|s| *s > ROUNDED * began && *s > 0.0);
         let guess: Vec<f64> = found.x.into_iter().chain([0.0]).collect();
         let first = branch::closed_orbit(&map, &guess, along.from, newton)
             .map_err(|trouble| HybridError::NoOrbit(trouble.said))?;
@@ -126,6 +137,7 @@ impl Question for GeneralOrbit {
             to: along.to,
             longest: 1.0 / along.steps as f64,
             most: along.most,
+            size: size.filter(|_| map.has_points()).unwrap_or(0.0),
             newton,
         };
         let mut go_on = |orbit: &Orbit| {
@@ -178,6 +190,12 @@ impl Map<'_> {
         for (i, row) in turn.matrix.chunks(n).enumerate() {
             derivative[i * (n + 1)..i * (n + 1) + n].copy_from_slice(row);
         }
+        // A point of a map has no extent: it is closed to a share of its size, or of one.
+        let mut extent = turn.extent;
+        if self.has_points() {
+            extent = u.iter().fold(extent, |most, x| most.max(x.abs()));
+            extent = if extent > 0.0 { extent } else { 1.0 };
+        }
         let point: Vec<f64> = turn.end.into_iter().chain([0.0]).collect();
         Ok(Returned {
             same: vec![point.clone()],
@@ -185,11 +203,11 @@ impl Map<'_> {
             time: turn.time,
             derivative,
             opposite: Vec::new(),
-            extent: turn.extent,
-            sizes: vec![turn.extent; n + 1],
+            extent,
+            sizes: vec![extent; n + 1],
             passes: true,
             derivative_error: 0.0,
-            events: usize::try_from(turn.changes).unwrap_or(usize::MAX),
+            events: turn.itinerary,
         })
     }
 }
@@ -201,6 +219,10 @@ impl ReturnMap for Map<'_> {
 
     fn axis(&self) -> usize {
         self.model.coordinates().len()
+    }
+
+    fn has_points(&self) -> bool {
+        matches!(self.after, Return::Period(_))
     }
 
     fn returned(&self, u: &[f64], p: f64, _: bool) -> Result<Returned, Trouble> {
@@ -236,6 +258,7 @@ mod tests {
     use super::*;
     use crate::Executor;
     use crate::general::expression;
+    use std::sync::Arc;
     use twofold_hybrid::Definition;
 
     fn run(text: &str, t_end: f64) -> GeneralRun {
@@ -325,6 +348,127 @@ mod tests {
         }
         assert_eq!(changes.words("change").collect::<Vec<_>>(), ["period-doubling"]);
         assert!((changes.numbers("c")[0] - 2.0).abs() < 1e-6, "{:?}", changes.numbers("c"));
+    }
+
+    fn branch(text: &str, period: f64, settle: f64, along: Option<Along>) -> Arc<Answer> {
+        let after = Return::Period(period);
+        let question = GeneralOrbit { run: run(text, 1e3), settle, after, along };
+        Executor::quiet().ask(&question).unwrap()
+    }
+
+    fn changes_of(answer: &Answer, parameter: &str) -> Vec<(String, f64, f64)> {
+        let table = answer.table("bifurcations").unwrap();
+        let numbers = |name: &str| table.numbers(name).to_vec();
+        let (at, within) = (numbers(parameter), numbers("uncertainty"));
+        let words = table.words("change").map(str::to_owned);
+        words.zip(at).zip(within).map(|((word, at), within)| (word, at, within)).collect()
+    }
+
+    /// Fixed points of maps are orbits of their period: r x (1 - x) has 1 - 1/r with the multiplier
+    /// 2 - r, Henon's map doubles at a = 3 (1 - b)^2 / 4.
+    #[test]
+    fn fixed_points_of_maps_are_followed() {
+        let map = |states: &str, start: &str, set: &str, parameters: &str| {
+            format!(
+                "states = {states}\nstart = {start}\nf = [{}]\n[parameters]\n{parameters}\n\
+                 [[event]]\nevery = 1\nset = {{ {set} }}",
+                if start.contains(',') { "'0', '0'" } else { "'0'" }
+            )
+        };
+        let logistic = map("['x']", "[0.3]", "x = 'r*x*(1-x)'", "r = 2.5");
+        let found = branch(&logistic, 1.0, 50.0, along("r", 2.5, 3.5));
+        let table = found.table("branch").unwrap();
+        for (r, x) in table.numbers("r").iter().zip(table.numbers("x")) {
+            // Closed to 100 times the relative tolerance.
+            assert!((x - (1.0 - 1.0 / r)).abs() < 1e-8, "{r} {x}");
+        }
+        let changes = changes_of(&found, "r");
+        assert_eq!(changes.len(), 1, "{changes:?}");
+        assert!(changes[0].0 == "period-doubling" && (changes[0].1 - 3.0).abs() < changes[0].2);
+        // The trivial point loses its stability where the other one passes.
+        let found = branch(&logistic, 1.0, 2000.0, along("r", 0.5, 1.5));
+        let changes = changes_of(&found, "r");
+        assert_eq!(changes.len(), 1, "{changes:?}");
+        assert!(changes[0].0 == "branching" && (changes[0].1 - 1.0).abs() <= changes[0].2);
+        let henon = map("['x', 'y']", "[0.1, 0.1]", "x = '1 - a*x^2 + y', y = '0.3*x'", "a = 0.2");
+        let changes = changes_of(&branch(&henon, 1.0, 50.0, along("a", 0.2, 0.6)), "a");
+        assert_eq!(changes.len(), 1, "{changes:?}");
+        assert!(changes[0].0 == "period-doubling");
+        assert!((changes[0].1 - 0.75 * 0.49).abs() <= changes[0].2, "{changes:?}");
+    }
+
+    /// The multiplier of the piecewise linear map jumps from 1/2 to -3/2 or 3/2 where its fixed
+    /// point meets the border (Nusse & Yorke 1992).
+    #[test]
+    fn border_collisions_are_discontinuity_induced() {
+        for slope in ["-1.5", "-0.7", "0.2"] {
+            let text = format!(
+                "states = ['x']\nstart = [-1]\nf = ['0']\n[parameters]\nm = -0.5\n[[event]]\n\
+                 every = 1\nset = {{ x = 'm + if(x < 0, 0.5*x, {slope}*x)' }}"
+            );
+            let changes = changes_of(&branch(&text, 1.0, 50.0, along("m", -0.5, 0.5)), "m");
+            assert_eq!(changes.len(), 1, "{slope} {changes:?}");
+            assert_eq!(changes[0].0, "discontinuity-induced", "{slope}");
+            assert!(changes[0].1.abs() <= changes[0].2 && changes[0].2 < 1e-4, "{changes:?}");
+        }
+    }
+
+    /// Two equal blocks have two equal multipliers, exp(2 pi m): one point, m = 0. So has a pair of
+    /// them, - exp(2 pi m), that turns by half.
+    #[test]
+    fn equal_multipliers_pass_once() {
+        let text = "states = ['x', 'y', 'z']\nstart = [0.1, 0.1, 0]\n\
+            f = ['m*x - x^3', 'm*y - y^3', '-z + cos(t)']\n[parameters]\nm = -0.2";
+        let along = || along("m", -0.2, 0.2);
+        let changes = changes_of(&branch(text, 2.0 * std::f64::consts::PI, 100.0, along()), "m");
+        assert_eq!(changes.len(), 1, "{changes:?}");
+        assert!(changes[0].0 == "branching" && changes[0].1.abs() <= changes[0].2, "{changes:?}");
+        let text = "states = ['x', 'y', 'z']\nstart = [0.1, 0.1, 0]\n\
+            f = ['m*x - 0.5*y - x*(x^2 + y^2)', '0.5*x + m*y - y*(x^2 + y^2)', '-z + cos(t)']\n\
+            [parameters]\nm = -0.2";
+        let changes = changes_of(&branch(text, 2.0 * std::f64::consts::PI, 100.0, along()), "m");
+        assert_eq!(changes.len(), 1, "{changes:?}");
+        assert!(changes[0].0 == "period-doubling", "{changes:?}");
+        assert!(changes[0].1.abs() <= changes[0].2, "{changes:?}");
+    }
+
+    /// A flag that alternates has the multiplier 1 of two turns all along; the transcritical point
+    /// of the map beside it is at p = 1. Two doublings 10^-4 apart are two.
+    #[test]
+    fn neutral_directions_and_near_doublings_are_told_apart() {
+        let text = |set: &str, start: &str| {
+            format!(
+                "states = ['x', 'c']\nstart = {start}\nf = ['0', '0']\n[parameters]\np = 0.5\n\
+                 [[event]]\nevery = 1\nset = {{ {set} }}"
+            )
+        };
+        for start in ["[0, 1]", "[0.1, 1]"] {
+            let flag = text("x = 'p*x - x^2', c = '-c'", start);
+            let changes = changes_of(&branch(&flag, 2.0, 50.0, along("p", 0.5, 1.3)), "p");
+            assert_eq!(changes.len(), 1, "{start} {changes:?}");
+            assert!(changes[0].0 == "branching", "{changes:?}");
+            assert!((changes[0].1 - 1.0).abs() <= changes[0].2, "{changes:?}");
+            assert!(changes[0].2 < 1e-6, "{changes:?}");
+        }
+        let two = text("x = 'p*x*(1-x)', c = '(p+0.0001)*c*(1-c)'", "[0.3, 0.3]");
+        let mut changes = changes_of(&branch(&two, 1.0, 200.0, along("p", 2.8, 3.2)), "p");
+        changes.sort_by(|a, b| a.1.total_cmp(&b.1));
+        assert_eq!(changes.len(), 2, "{changes:?}");
+        for ((word, at, within), right) in changes.into_iter().zip([2.9999, 3.0]) {
+            assert!(word == "period-doubling" && (at - right).abs() <= within, "{at} {within}");
+            assert!(within < 1e-6, "{within}");
+        }
+    }
+
+    /// x = sqrt(p - 1) of p x - x^3 turns at p = 1, where x = 0 crosses it.
+    #[test]
+    fn a_pitchfork_is_seen_from_its_outer_branch() {
+        let text = "states = ['x']\nstart = [0.5]\nf = ['0']\n[parameters]\np = 1.5\n\
+            [[event]]\nevery = 1\nset = { x = 'p*x - x^3' }";
+        let changes = changes_of(&branch(text, 1.0, 50.0, along("p", 1.5, 0.7)), "p");
+        assert_eq!(changes.len(), 1, "{changes:?}");
+        assert!(changes[0].0 == "branching", "{changes:?}");
+        assert!((changes[0].1 - 1.0).abs() <= changes[0].2 && changes[0].2 < 1e-6, "{changes:?}");
     }
 
     /// Hopf's normal form with amplitude r^2 (b - r^2) + mu = 0 has a fold of cycles at mu =

@@ -192,6 +192,7 @@ impl Question for ClosedOrbit {
             to: along.to,
             longest: 1.0 / along.steps as f64,
             most: along.most,
+            size: 0.0,
             newton,
         };
         let width = (along.to - along.from).abs();

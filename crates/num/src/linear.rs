@@ -64,6 +64,58 @@ pub fn solve_any(a: &[f64], b: &[f64], smallest: f64) -> Option<Vec<f64>> {
     b.iter().all(|x| x.is_finite()).then_some(b)
 }
 
+/// A solution of a x = b for `n` equations of which some say nothing new: by elimination with full
+/// pivoting, with zeros for the unknowns that are left open. `None` if the equations contradict each
+/// other, or no pivot is above `smallest`.
+///
+/// ```
+/// use twofold_num::linear::solve_some;
+/// let twice = [1.0, 1.0, 2.0, 2.0];
+/// let x = solve_some(&twice, &[3.0, 6.0], 1e-12).unwrap();
+/// assert_eq!(x[0] + x[1], 3.0);
+/// assert!(solve_some(&twice, &[3.0, 7.0], 1e-12).is_none());
+/// ```
+pub fn solve_some(a: &[f64], b: &[f64], smallest: f64) -> Option<Vec<f64>> {
+    let n = b.len();
+    let (mut a, mut b) = (a.to_vec(), b.to_vec());
+    let size = b.iter().fold(0.0_f64, |most, b| most.max(b.abs()));
+    let mut unknowns: Vec<usize> = (0..n).collect();
+    let mut rank = 0;
+    while rank < n {
+        let places = (rank..n).flat_map(|i| (rank..n).map(move |j| (i, j)));
+        let (i, j) =
+            places.max_by(|p, q| a[p.0 * n + p.1].abs().total_cmp(&a[q.0 * n + q.1].abs()))?;
+        if a[i * n + j].is_nan() {
+            return None;
+        }
+        if a[i * n + j].abs() <= smallest {
+            break;
+        }
+        (0..n).for_each(|k| a.swap(rank * n + k, i * n + k));
+        b.swap(rank, i);
+        (0..n).for_each(|k| a.swap(k * n + rank, k * n + j));
+        unknowns.swap(rank, j);
+        for i in rank + 1..n {
+            let factor = a[i * n + rank] / a[rank * n + rank];
+            (rank..n).for_each(|k| a[i * n + k] -= factor * a[rank * n + k]);
+            b[i] -= factor * b[rank];
+        }
+        rank += 1;
+    }
+    if rank == 0 || b[rank..].iter().any(|left| left.abs() > CONTRADICTS * size) {
+        return None;
+    }
+    let mut x = vec![0.0; n];
+    for k in (0..rank).rev() {
+        let known: f64 = (k + 1..rank).map(|j| a[k * n + j] * x[unknowns[j]]).sum();
+        x[unknowns[k]] = (b[k] - known) / a[k * n + k];
+    }
+    x.iter().all(|x| x.is_finite()).then_some(x)
+}
+
+/// What is left of the right side beyond this share of it contradicts.
+const CONTRADICTS: f64 = 1e-3;
+
 /// Iterations of the QR algorithm for one eigenvalue; some three are usual.
 const MOST_ITERATIONS: usize = 60;
 

@@ -39,6 +39,8 @@ pub(super) struct Tangents {
     /// Whether a matrix without an inverse has acted since the growth was noted last: of sliding
     /// that began, or of a reset.
     pub flattened: bool,
+    /// The pieces of resets that have acted, hashed.
+    pub pieces: u64,
 }
 
 /// Field, gradient and speed before a condition is met.
@@ -392,7 +394,15 @@ impl Follower<'_> {
             }
             at[j].partials = [0.0];
         }
+        let mut hash = self.tangents.as_ref().map_or(0, |tangents| tangents.pieces);
+        for (_, e) in set {
+            // FNV-1a (Fowler, Noll & Vo 1991), a piece at a time.
+            self.equation.pieces(e, self.t, old, &mut |piece| {
+                hash = (hash ^ piece as u64).wrapping_mul(0x0100_0000_01b3);
+            });
+        }
         let Some(tangents) = &mut self.tangents else { return };
+        tangents.pieces = hash;
         if let Some((first, first_by_time)) = &tangents.reset {
             let times = |column: &dyn Fn(usize) -> f64, i: usize| {
                 (0..n).map(|k| by_state[i * n + k] * column(k)).sum::<f64>()
@@ -874,8 +884,9 @@ pub struct Turn {
     pub size: f64,
     /// The diagonal of the box around the way.
     pub extent: f64,
-    /// Switches and events on the way.
-    pub changes: u64,
+    /// What tells it from a way with other events: the number of switches and events, and the pieces
+    /// of resets that act, hashed.
+    pub itinerary: usize,
 }
 
 /// Follows motion from `x` until it is back; of a section from the point on it that is next to `x`
@@ -963,7 +974,7 @@ fn turn(
         );
         return Err(HybridError::NoOrbit(why));
     }
-    let Tangents { vectors, bounds, .. } = follower.tangents.take().unwrap_or_default();
+    let Tangents { vectors, bounds, pieces, .. } = follower.tangents.take().unwrap_or_default();
     let mut matrix = vec![0.0; n * n];
     for (j, column) in vectors.iter().enumerate() {
         for i in 0..n {
@@ -992,6 +1003,6 @@ fn turn(
         matrix,
         size: follower.size.iter().fold(0.0_f64, |most, s| most.max(*s)),
         extent: bounds.iter().map(|[low, high]| (high - low) * (high - low)).sum::<f64>().sqrt(),
-        changes: outcome.switches + outcome.events,
+        itinerary: (outcome.switches + outcome.events).wrapping_add(pieces) as usize,
     })
 }
