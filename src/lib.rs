@@ -68,11 +68,13 @@ pub use nalgebra;
 pub use twofold_analyse as analyse;
 pub use twofold_hybrid as hybrid;
 pub use twofold_integrate as integrate;
+#[cfg(feature = "cli")]
+pub use twofold_jeffrey_2013::{self as jeffrey_2013, report};
 pub use twofold_job as job;
 pub use twofold_job::record;
 pub use twofold_num as num;
 #[cfg(feature = "cli")]
-pub use twofold_paper::{compare, draw, report};
+pub use twofold_paper::{compare, draw};
 #[cfg(feature = "cli")]
 pub use twofold_render as render;
 pub use twofold_rigor as rigor;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use twofold::job::sweep::Rows;
 use twofold::job::table::{Column, Entry, Table};
 use twofold::job::{AnyQuestion, JobError};
-use twofold::paper::census::{self, MotionKind};
+use crate::study::census::{self, MotionKind};
 use twofold::paper::study::Computed;
 use twofold::paper::{Figure, Reading, Study};
 use twofold::record::Hash;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use serde_json::json;
-use twofold::draw::sketch::assembly;
+use crate::sketch::assembly;
 use twofold::paper::study::Computed;
 use twofold::paper::{Figure, Picture, Study, View};
 use twofold::system::Wheel;

@@ -2,7 +2,8 @@
 
 use pyo3::prelude::*;
 use serde_json::{Value, json};
-use twofold::paper::{Reading, figures, verdict_table as verdicts_as_table};
+use twofold::jeffrey_2013::study::verdict_table as verdicts_as_table;
+use twofold::paper::{Reading, figures};
 use twofold::record::Manifest;
 
 use crate::errors::InternalError;

@@ -13,13 +13,13 @@ use twofold::integrate::filippov::{
     EventKind, ExitRule, FilippovObserver, FilippovOptions, Mode, ModeEvent, Side, Trajectory, run,
 };
 use twofold::integrate::{Flow, Step, Tolerance};
+use twofold::jeffrey_2013::study::census::{MotionKind, PANELS, supporting, tally};
+use twofold::jeffrey_2013::study::claims::{Quantity, claims};
 use twofold::job::recording::Data;
 use twofold::job::simulate::simulate;
 use twofold::job::spec::*;
 use twofold::job::{Executor, PathComparison};
 use twofold::num::random::RandomStream;
-use twofold::paper::census::{MotionKind, PANELS, supporting, tally};
-use twofold::paper::claims::{Quantity, claims};
 use twofold::paper::{Figure, Reading, figures};
 use twofold::record::Manifest;
 use twofold::system::filippov::{normal_form_constants, two_fold};
@@ -507,7 +507,8 @@ fn the_census_counts_outcomes() {
     let rules = claims().rules;
     for reading in Reading::ALL {
         let of = |quantity| of(reading, quantity);
-        let runs = PANELS.map(|panel| figures::census::runs(panel.name, reading).unwrap());
+        let runs =
+            PANELS.map(|panel| twofold::jeffrey_2013::census::runs(panel.name, reading).unwrap());
         let support: Vec<u64> =
             PANELS.iter().zip(&runs).map(|(p, runs)| supporting(p.said, runs, &rules)).collect();
         for (id, hits) in ["7.1", "7.2", "7.3", "8.1", "8.2", "8.3"].into_iter().zip(&support) {
@@ -525,9 +526,11 @@ fn the_census_counts_outcomes() {
                 .filter(|(kind, n)| *kind != MotionKind::Undecided && *n > 0)
                 .count()
         };
-        let kinds = |runs: &[twofold::paper::census::CensusRun]| decided(tally(runs, rules.end));
+        let kinds = |runs: &[twofold::jeffrey_2013::study::census::CensusRun]| {
+            decided(tally(runs, rules.end))
+        };
         for (id, panels) in [("7.4", &runs[..3]), ("8.4", &runs[3..])] {
-            let share = |runs: &[twofold::paper::census::CensusRun]| {
+            let share = |runs: &[twofold::jeffrey_2013::study::census::CensusRun]| {
                 tally(runs, rules.end).map(|n| n as f64 / runs.len() as f64)
             };
             let alike: f64 =

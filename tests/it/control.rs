@@ -7,12 +7,12 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{SVector, vector};
 use twofold::integrate::Schedule;
+use twofold::jeffrey_2013::study::census::{CensusRun, MotionKind, PANELS, tally};
+use twofold::jeffrey_2013::study::claims::claims;
 use twofold::job::recording::Data;
 use twofold::job::simulate::simulate;
 use twofold::job::spec::*;
 use twofold::job::sweep::Rows;
-use twofold::paper::census::{CensusRun, MotionKind, PANELS, tally};
-use twofold::paper::claims::claims;
 use twofold::paper::{Reading, figures};
 use twofold::system::filippov::two_fold;
 use twofold::system::{Definition, System};
@@ -36,7 +36,7 @@ fn runs(name: &str) -> Vec<CensusRun> {
 fn with_singularity() -> Vec<CensusRun> {
     PANELS[..3]
         .iter()
-        .flat_map(|p| figures::census::runs(p.name, Reading::Reconstructed).unwrap())
+        .flat_map(|p| twofold::jeffrey_2013::census::runs(p.name, Reading::Reconstructed).unwrap())
         .collect()
 }
 

@@ -4,7 +4,8 @@ use std::fs;
 use std::path::Path;
 
 use crate::claims::Reads;
-use twofold::paper::{capture, census, figures, verdict_table};
+use twofold::jeffrey_2013::study::{capture, census, verdict_table};
+use twofold::paper::figures;
 use twofold::record::Manifest;
 
 fn text(path: &str) -> String {
@@ -225,7 +226,7 @@ fn futures_come_back_as_often_as_the_findings_say() {
         reads.read("3.6", &quantity, found as f64 / futures.len() as f64);
         assert_eq!((found, futures.len()), (back, 40), "{word}");
         // Fig. 4 says so on its face.
-        let fig4 = figures::fig4::figure()
+        let fig4 = twofold::jeffrey_2013::fig4::figure()
             .pictures
             .into_iter()
             .find(|p| p.reading == Some(reading))

@@ -10,39 +10,16 @@
 // tests compare with tolerances, not with hashes
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
 
-// Tests try the paper's own figures. Their files call the library by its public name and paths.
-#[cfg(test)]
-extern crate self as twofold;
-#[cfg(test)]
-#[allow(missing_docs)]
-#[path = "../../../figures/figures.rs"]
-pub mod figures;
-#[cfg(test)]
-#[rustfmt::skip]
-use {
-    crate as paper, twofold_analyse as analyse, twofold_integrate as integrate, twofold_job as job,
-        twofold_job::record, twofold_num as num,
-    twofold_render as render, twofold_system as system,
-};
-
-pub mod audit;
-pub mod capture;
-pub mod census;
 pub mod claim;
-pub mod claims;
 pub mod compare;
 pub mod draw;
 pub mod drawing;
-pub mod effects;
+pub mod html;
 pub mod pipeline;
 pub mod plots;
-pub mod report;
-pub mod resolved;
 pub mod reuse;
-pub mod similarity;
 pub mod study;
 pub mod verdict;
-pub mod verdict_table;
 pub mod wording;
 
 use std::borrow::Cow;

@@ -2,11 +2,11 @@
 
 use std::fmt::Write as _;
 
-use super::super::html::{escape, identifier, rich};
 use super::super::model::*;
 use super::parts::*;
-use crate::Reading;
-use crate::wording;
+use twofold_paper::Reading;
+use twofold_paper::html::{escape, identifier, rich};
+use twofold_paper::wording;
 
 pub(super) fn summary(html: &mut String, report: &Report) {
     let s = &report.summary;

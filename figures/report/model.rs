@@ -4,11 +4,11 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::space::SpaceView;
-use crate::Reading;
-use crate::compare::Comparison;
 use twofold_integrate::Statistics;
 use twofold_job::record::{Hash, Layer, PictureEntry};
 use twofold_job::spec::RunSpec;
+use twofold_paper::Reading;
+use twofold_paper::compare::Comparison;
 
 /// Version of the report's JSON.
 pub const VERSION: u32 = 1;
