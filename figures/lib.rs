@@ -15,6 +15,7 @@ use {
     twofold_paper as paper, twofold_render as render, twofold_system as system,
 };
 
+mod computed;
 mod figures;
 pub mod report;
 mod sketch;

@@ -12,7 +12,7 @@ use crate::study::audit::{self, Candidate, Cell, PRIORS};
 use crate::study::capture;
 use crate::study::census;
 use crate::study::claims::claims;
-use twofold::paper::study::Computed;
+use crate::computed::Computed;
 use twofold::paper::wording::number;
 use twofold::paper::{Figure, Picture, Reading, Study, Support, View};
 use twofold::record::Hash;

@@ -7,7 +7,7 @@ use twofold::job::sweep::Rows;
 use twofold::job::table::{Column, Entry, Table};
 use twofold::job::{AnyQuestion, JobError};
 use crate::study::census::{self, MotionKind};
-use twofold::paper::study::Computed;
+use crate::computed::Computed;
 use twofold::paper::{Figure, Reading, Study};
 use twofold::record::Hash;
 use twofold::render::sheet::*;

@@ -9,7 +9,7 @@ use twofold::job::table::Table;
 use twofold::job::{AnyQuestion, JobError};
 use crate::study::census::{self, Data, Found, MotionKind, Shorter};
 use crate::study::claims::claims;
-use twofold::paper::study::Computed;
+use crate::computed::Computed;
 use twofold::paper::{Figure, Reading, Study, Support};
 use twofold::record::Hash;
 use twofold::render::sheet::*;

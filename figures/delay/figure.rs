@@ -16,7 +16,7 @@ use twofold::num::elementary::{exp10, log10};
 use twofold::num::fit::line;
 use crate::study::claims::claims;
 use crate::study::similarity::{self, Rule, Score, WAYS};
-use twofold::paper::study::Computed;
+use crate::computed::Computed;
 use twofold::paper::wording::number;
 use twofold::paper::{Figure, Picture, Reading, Study, View};
 use twofold::record::Hash;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use serde_json::json;
 use crate::sketch::assembly;
-use twofold::paper::study::Computed;
+use crate::computed::Computed;
 use twofold::paper::{Figure, Picture, Study, View};
 use twofold::system::Wheel;
 

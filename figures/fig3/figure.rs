@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use serde_json::json;
 use crate::sketch::portrait;
-use twofold::paper::study::Computed;
+use crate::computed::Computed;
 use twofold::paper::{Figure, Picture, Study, View};
 
 /// The constants v, w < 0 with vw > 1: the paper's v+ and v-.
