@@ -16,6 +16,7 @@ use twofold::analyse::{Crossing, Direction};
 use twofold::integrate::delay::{Delayed, History, LateSwitch, Own, Sides};
 use twofold::integrate::roots::CrossingFinder;
 use twofold::integrate::{Dopri5, Failure, Method, Schedule, Stepper, Tolerance, WithStepper};
+use twofold::jeffrey_2013::Reading;
 use twofold::jeffrey_2013::study::claims::{Similarity, claims};
 use twofold::jeffrey_2013::study::similarity::{RULES, Rule};
 use twofold::job::question::NUMERICS;
@@ -24,7 +25,6 @@ use twofold::job::simulate::simulate;
 use twofold::job::spec::{MethodSpec, Observation, RunSpec, SwitchSpec};
 use twofold::num::elementary::sqrt;
 use twofold::num::random::RandomStream;
-use twofold::paper::Reading;
 use twofold::record::Hash;
 use twofold::system::{
     Caricature, Hysteretic, Relaxation, Smoothed, System, Transition, VectorField,

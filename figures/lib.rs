@@ -17,8 +17,10 @@ use {
 
 mod computed;
 mod figures;
+pub mod reading;
 pub mod report;
 mod sketch;
 pub mod study;
 
 pub use figures::*;
+pub use reading::Reading;

@@ -4,10 +4,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::space::SpaceView;
+use crate::Reading;
 use twofold_integrate::Statistics;
 use twofold_job::record::{Hash, Layer, PictureEntry};
 use twofold_job::spec::RunSpec;
-use twofold_paper::Reading;
 use twofold_paper::compare::Comparison;
 
 /// Version of the report's JSON.

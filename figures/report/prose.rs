@@ -5,7 +5,7 @@
 use std::fmt::Write as _;
 
 use super::model::{Report, VerdictReport, of_the_paper};
-use twofold_paper::Reading;
+use crate::Reading;
 use twofold_paper::html::escape;
 
 /// Verdicts of this folder, a paragraph for each reading, as HTML.

@@ -5,10 +5,10 @@ use serde::{Deserialize, Serialize};
 
 use super::census::{self, CensusPanel, CensusRun, Probability, Said};
 use super::claims::Rules;
+use crate::Reading;
 use twofold_job::table::{Column, Entry, Table};
 use twofold_num::elementary::{exp10, log10};
 use twofold_num::random::RandomStream;
-use twofold_paper::Reading;
 
 /// The panels whose outcomes are judged: the six of the census, and 9(i), fig. 7(iii) with
 /// hysteresis.

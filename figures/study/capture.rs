@@ -8,11 +8,11 @@ use super::audit::{self, Cell, Sweeps};
 use super::census::{self, CensusRun, MotionKind, PANELS, tally};
 use super::claims::Rules;
 use super::effects::{self, Estimate, LogRank, Time};
+use crate::Reading;
 use twofold_analyse::counts::wilson;
 use twofold_job::table::{Column, Entry, Table};
 use twofold_num::elementary::{exp10, log10};
 use twofold_num::random::RandomStream;
-use twofold_paper::Reading;
 
 /// Stands before each text in docs/capture.md and docs/parameters.md.
 pub const BEGIN: &str =

@@ -7,11 +7,11 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::claims::Rules;
+use crate::Reading;
 use twofold_analyse::counts::{Homogeneity, goodman, homogeneity, wilson};
 use twofold_job::record::Manifest;
 use twofold_job::table::{Column, Entry, Table};
 use twofold_num::random::RandomStream;
-use twofold_paper::Reading;
 
 /// The kind of motion of a run at a given time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]

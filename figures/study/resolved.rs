@@ -10,9 +10,9 @@ use super::census::{
 };
 use super::claims::Rules;
 use super::effects::{self, LogRank};
+use crate::Reading;
 use twofold_analyse::counts::{homogeneity, wilson};
 use twofold_job::table::{Entry, Table};
-use twofold_paper::Reading;
 
 /// Stands before each text in docs/resolved.md.
 pub const BEGIN: &str =

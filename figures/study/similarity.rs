@@ -4,7 +4,7 @@
 use twofold_analyse::counts::wilson;
 
 use super::claims::claims;
-use twofold_paper::Reading;
+use crate::Reading;
 
 /// The switching rule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
+use crate::Reading;
 use twofold_job::record::{Manifest, PanelEntry, VerdictEntry};
-use twofold_paper::Reading;
 
 /// Stands before the table.
 pub const BEGIN: &str =

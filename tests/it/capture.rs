@@ -4,13 +4,13 @@
 use std::fs;
 
 use twofold::analyse::counts::wilson;
+use twofold::jeffrey_2013::Reading;
 use twofold::jeffrey_2013::study::capture::{self, ByMethod, Candidate};
 use twofold::jeffrey_2013::study::census::PANELS;
 use twofold::jeffrey_2013::study::claims::claims;
 use twofold::jeffrey_2013::study::effects;
 use twofold::job::sweep::Rows;
 use twofold::job::table::{Column, Entry, Table};
-use twofold::paper::Reading;
 
 use crate::census::{path, rows};
 use crate::examples::visits;

@@ -10,13 +10,14 @@ use twofold::cli::progress::Progress;
 use twofold::cli::recompute::recompute;
 use twofold::cli::rows::journal_of;
 use twofold::integrate::Schedule;
+use twofold::jeffrey_2013::Reading;
 use twofold::jeffrey_2013::study::census;
 use twofold::jeffrey_2013::study::claims::claims;
 use twofold::job::JobError;
 use twofold::job::spec::*;
 use twofold::job::sweep::{Axis, Rows, Sweep};
 use twofold::job::table::Entry;
-use twofold::paper::{Reading, figures};
+use twofold::paper::figures;
 use twofold::record::Journal;
 use twofold::system::Caricature;
 

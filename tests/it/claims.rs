@@ -13,6 +13,7 @@ use twofold::integrate::filippov::{
     EventKind, ExitRule, FilippovObserver, FilippovOptions, Mode, ModeEvent, Side, Trajectory, run,
 };
 use twofold::integrate::{Flow, Step, Tolerance};
+use twofold::jeffrey_2013::Reading;
 use twofold::jeffrey_2013::study::census::{MotionKind, PANELS, supporting, tally};
 use twofold::jeffrey_2013::study::claims::{Quantity, claims};
 use twofold::job::recording::Data;
@@ -20,7 +21,7 @@ use twofold::job::simulate::simulate;
 use twofold::job::spec::*;
 use twofold::job::{Executor, PathComparison};
 use twofold::num::random::RandomStream;
-use twofold::paper::{Figure, Reading, figures};
+use twofold::paper::{Figure, figures};
 use twofold::record::Manifest;
 use twofold::system::filippov::{normal_form_constants, two_fold};
 use twofold::system::{
@@ -410,7 +411,8 @@ fn figure(id: &str) -> Figure {
 
 /// The run of a figure's panel in a reading.
 fn panel(id: &str, reading: Reading, label: &str) -> RunSpec {
-    let picture = figure(id).pictures.into_iter().find(|p| p.reading == Some(reading)).unwrap();
+    let picture =
+        figure(id).pictures.into_iter().find(|p| p.reading == Some(reading.into())).unwrap();
     picture.panels.into_iter().find(|p| p.label == label).unwrap().run
 }
 
@@ -601,7 +603,7 @@ fn both_orbits_are_proved() {
 /// The late half of every panel of fig. 7 in a reading.
 fn late_halves(reading: Reading) -> Vec<Vec<Crossing>> {
     let figure = figures::all().into_iter().find(|f| f.id == "fig7").unwrap();
-    let picture = figure.pictures.into_iter().find(|p| p.reading == Some(reading)).unwrap();
+    let picture = figure.pictures.into_iter().find(|p| p.reading == Some(reading.into())).unwrap();
     picture
         .panels
         .iter()

@@ -16,6 +16,7 @@ use twofold::analyse::passage::Predicted;
 use twofold::analyse::{Crossing, Direction};
 use twofold::integrate::delay::{History, Inside};
 use twofold::integrate::{Kick, KickLaw, Schedule, StepCap, Tolerance};
+use twofold::jeffrey_2013::Reading;
 use twofold::jeffrey_2013::delay;
 use twofold::jeffrey_2013::study::claims::claims;
 use twofold::jeffrey_2013::study::similarity::{Rule, Similar, WAYS};
@@ -24,7 +25,6 @@ use twofold::job::simulate::simulate;
 use twofold::job::spec::*;
 use twofold::job::{Executor, Run};
 use twofold::num::elementary::{exp, ln};
-use twofold::paper::Reading;
 use twofold::system::{Caricature, Definition, System, Transition};
 
 fn spec(alpha: f64, switch: SwitchSpec, method: Method, tolerance: f64, t_end: f64) -> RunSpec {

@@ -55,7 +55,7 @@ impl Question for Drawn<'_> {
             parts(self.0).into_iter().map(|(part, q)| (part, question_hash(&*q))).collect();
         let said: Vec<_> = panels
             .iter()
-            .map(|p| (&p.title, &p.claim, p.repeats.as_ref().map(|r| (&r.panel, r.reading))))
+            .map(|p| (&p.title, &p.claim, p.repeats.as_ref().map(|r| &r.panel)))
             .collect();
         let view = match view {
             // The function that draws, by its offset from another one, since a program's address
@@ -145,7 +145,7 @@ mod tests {
 
     use super::*;
     use crate::pipeline::compute_with_tables;
-    use crate::{FigurePanel, Reading, Study};
+    use crate::{FigurePanel, ParameterReading, Study};
     use twofold_job::spec::{Method, MethodSpec, Observation, RunSpec, SwitchSpec};
     use twofold_job::{Column, Entry, Executor, Table};
     use twofold_render::Sheet;
@@ -311,7 +311,7 @@ mod tests {
             &|p| p.title = "something else".into(),
             &|p| p.caption.push('.'),
             &|p| p.name.push_str("-printed"),
-            &|p| p.reading = Some(Reading::Printed),
+            &|p| p.reading = Some(ParameterReading { name: "a".into(), parameters: Vec::new() }),
             &|p| {
                 p.view =
                     View::Study(Study { draw: |_| Sheet::new(ColumnWidth::Single, 1, ""), ..study })

@@ -8,8 +8,8 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+use super::Picture;
 pub use super::claim::Claim as SectionClaim;
-use super::{Picture, Reading};
 use twofold_analyse::attractor::Evidence;
 use twofold_analyse::divider::Shared;
 use twofold_job::{AnyQuestion, Ask, Classification, JobError, PathComparison};
@@ -39,7 +39,7 @@ pub struct PanelVerdict {
     /// The picture's name.
     pub picture: String,
     /// The figure's reading.
-    pub reading: Option<Reading>,
+    pub reading: Option<String>,
     /// The panel's label.
     pub panel: String,
     /// The method.
@@ -198,7 +198,7 @@ pub fn judge(picture: &Picture, executor: &dyn Ask) -> Result<Vec<PanelVerdict>,
         };
         verdicts.push(PanelVerdict {
             picture: picture.name.clone(),
-            reading: picture.reading,
+            reading: picture.reading_name().map(str::to_owned),
             panel: panel.label.clone(),
             method: panel.run.method.name.name().to_owned(),
             claim,

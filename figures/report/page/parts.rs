@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::super::model::*;
-use twofold_paper::Reading;
+use crate::Reading;
 use twofold_paper::html::{escape, identifier};
 
 /// "Figure 7" for fig7, the folder's name with a capital for others.
