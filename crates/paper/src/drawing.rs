@@ -372,7 +372,7 @@ fn returns(futures: &[Future]) -> String {
     )
 }
 
-/// A trajectory between two points of the set, through the singularity (section 3 of the paper).
+/// A trajectory between two points of the set, through the singularity.
 struct Connection {
     points: Vec<[f64; 3]>,
     /// Times from the first point to the two-fold, and from there to the last one.
@@ -525,7 +525,7 @@ fn crossings(data: &Data) -> &[Crossing] {
     }
 }
 
-/// A coordinate's name as it is printed.
+/// A coordinate's name in a picture.
 fn greek(name: &str) -> &str {
     match name {
         "omega" => "ω",

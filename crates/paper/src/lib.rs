@@ -3,9 +3,8 @@
 //! A [`Figure`] is a list of pictures, a picture a list of panels, a panel a question
 //! ([`RunSpec`]). The way of every figure is the same: questions -> [`pipeline`] (put to an
 //! [`Executor`](twofold_job::Executor) in parallel, each computed once) -> answers -> [`drawing`]
-//! -> bytes -> files. The figures themselves stand in a paper's folder or in
-//! `figures/NAME/figure.rs`: every number of the paper's caption, and nothing else.
-//!
+//! -> bytes -> files. The figures themselves stand in a paper's folder, or in a crate of the
+//! paper's own: every number of a caption, and nothing else.
 #![forbid(unsafe_code)]
 // tests compare with tolerances, not with hashes
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
@@ -48,7 +47,7 @@ pub struct Figure {
 /// One picture file.
 #[derive(Clone, Debug)]
 pub struct Picture {
-    /// File name without extension, "fig7-printed".
+    /// File name without extension: the figure's and the reading's name, "fig7-first".
     pub name: String,
     /// The parameter reading, if the figure has readings.
     pub reading: Option<ParameterReading>,
@@ -86,7 +85,7 @@ pub type Count = fn(&str) -> Result<Support, JobError>;
 /// The runs that repeat a panel, counted when the panel is drawn.
 #[derive(Clone, Debug)]
 pub struct Repeats {
-    /// The panel, "7(i)".
+    /// The panel, as the repeated runs call it.
     pub panel: String,
     /// Counts the runs.
     pub count: Count,

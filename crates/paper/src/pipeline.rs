@@ -97,7 +97,7 @@ pub struct PanelRecord {
     pub stop: Stop,
     /// Work done.
     pub statistics: Statistics,
-    /// The largest number of steps between restarts; NDSolve's default limit is 10,000.
+    /// The largest number of steps between restarts.
     pub most_steps_in_segment: u64,
 }
 

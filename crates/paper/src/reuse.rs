@@ -310,7 +310,7 @@ mod tests {
             &|p| p.alterations.push("seed 2".into()),
             &|p| p.title = "something else".into(),
             &|p| p.caption.push('.'),
-            &|p| p.name.push_str("-printed"),
+            &|p| p.name.push_str("-other"),
             &|p| p.reading = Some(ParameterReading { name: "a".into(), parameters: Vec::new() }),
             &|p| {
                 p.view =
