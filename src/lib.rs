@@ -24,9 +24,10 @@
 //! - [`job`]: a question as data, its computation, its answer. [`record`]: files, hashes,
 //!   manifests, all-or-nothing writes.
 //! - [`render`]: the only user of plotters: one drawing, three formats.
-//! - [`paper`]: everything specific to this paper: readings, claims, figures as data.
-//! - [`draw`]: drawings from answers. [`compare`]: two pictures, point by point. [`report`]: the
-//!   page about everything.
+//! - [`paper`]: figures, readings, claims and verdicts of any paper, as data.
+//! - [`draw`]: drawings from answers. [`compare`]: two pictures, point by point.
+//! - [`jeffrey_2013`]: everything specific to this paper: its readings, rules and studies.
+//!   [`report`]: the page about everything.
 //! - [`cli`]: flags, progress, error messages.
 //!
 //! # Why isn't there ...?
@@ -81,7 +82,7 @@ pub use twofold_rigor as rigor;
 pub use twofold_system as system;
 pub use twofold_verify as verify;
 
-/// Everything specific to a paper: readings, claims, verdicts; and this paper's figures as data.
+/// Figures, readings, claims and verdicts of any paper; and the figures of Jeffrey (2013).
 ///
 /// ```
 /// use twofold::job::Executor;
