@@ -16,15 +16,15 @@ use twofold::analyse::{Crossing, Direction};
 use twofold::integrate::delay::{Delayed, History, LateSwitch, Own, Sides};
 use twofold::integrate::roots::CrossingFinder;
 use twofold::integrate::{Dopri5, Failure, Method, Schedule, Stepper, Tolerance, WithStepper};
+use twofold::jeffrey_2013::Reading;
+use twofold::jeffrey_2013::study::claims::{Similarity, claims};
+use twofold::jeffrey_2013::study::similarity::{RULES, Rule};
 use twofold::job::question::NUMERICS;
 use twofold::job::recording::Data;
 use twofold::job::simulate::simulate;
 use twofold::job::spec::{MethodSpec, Observation, RunSpec, SwitchSpec};
 use twofold::num::elementary::sqrt;
 use twofold::num::random::RandomStream;
-use twofold::paper::Reading;
-use twofold::paper::claims::{Similarity, claims};
-use twofold::paper::similarity::{RULES, Rule};
 use twofold::record::Hash;
 use twofold::system::{
     Caricature, Hysteretic, Relaxation, Smoothed, System, Transition, VectorField,
@@ -382,7 +382,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             }
         }
     }
-    writeln!(out, "{}", twofold::paper::similarity::HEADER)?;
+    writeln!(out, "{}", twofold::jeffrey_2013::study::similarity::HEADER)?;
     for reading in Reading::ALL {
         let mut of = Vec::new();
         for rule in RULES {

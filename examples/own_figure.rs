@@ -7,9 +7,10 @@ use std::path::PathBuf;
 
 use twofold::cli::{CliError, make};
 use twofold::integrate::Schedule;
+use twofold::jeffrey_2013::Reading;
 use twofold::job::Executor;
 use twofold::job::spec::*;
-use twofold::paper::{Figure, FigurePanel, Picture, Reading, View};
+use twofold::paper::{Figure, FigurePanel, Picture, View};
 
 /// The figure's specification.
 pub fn figure() -> Figure {
@@ -31,7 +32,7 @@ pub fn figure() -> Figure {
         title: "Two stiffnesses".into(),
         pictures: vec![Picture {
             name: "own".into(),
-            reading: Some(Reading::Reconstructed),
+            reading: Some(Reading::Reconstructed.into()),
             title: "Two stiffnesses".into(),
             caption: "Poincaré sections y = 0 of the smoothed system for two values of ε.".into(),
             view: View::Section { horizontal: 0, vertical: 2 },

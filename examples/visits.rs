@@ -5,12 +5,12 @@
 //! `make capture`, or `cargo run --release --example visits > figures/capture/visits.csv`
 
 use twofold::integrate::Schedule;
+use twofold::jeffrey_2013::study::claims::claims;
 use twofold::job::JobError;
 use twofold::job::recording::Data;
 use twofold::job::simulate::simulate;
 use twofold::job::spec::*;
 use twofold::num::random::RandomStream;
-use twofold::paper::claims::claims;
 use twofold::system::Caricature;
 
 /// Printed, with one exponent changed, and the maximum of the map of the parameters.

@@ -5,7 +5,8 @@
 //! the hashes that it must have. Both are part of the library, so that an installed program can
 //! make and check them anywhere.
 
-use twofold::paper::Figure;
+use crate::Reading;
+use twofold::paper::{Count, Figure};
 
 /// Names a figure's module and embeds its reference.
 macro_rules! figures {
@@ -57,11 +58,14 @@ pub fn data(id: &str) -> &'static [(&'static str, &'static [u8])] {
     }
 }
 
-/// Counts the committed runs of a study that repeat a panel.
-pub fn counts(study: &str) -> Option<twofold::paper::Count> {
-    match study {
-        "census" => Some(census::support),
-        "audit" => Some(audit::support),
+/// Counts the committed runs of a study that repeat a panel in a reading.
+pub fn counts(study: &str, reading: &str) -> Option<Count> {
+    use Reading::{Printed, Reconstructed};
+    match (study, Reading::named(reading)?) {
+        ("census", Printed) => Some(|panel| census::support(panel, Printed)),
+        ("census", Reconstructed) => Some(|panel| census::support(panel, Reconstructed)),
+        ("audit", Printed) => Some(|panel| audit::support(panel, Printed)),
+        ("audit", Reconstructed) => Some(|panel| audit::support(panel, Reconstructed)),
         _ => None,
     }
 }

@@ -24,9 +24,10 @@
 //! - [`job`]: a question as data, its computation, its answer. [`record`]: files, hashes,
 //!   manifests, all-or-nothing writes.
 //! - [`render`]: the only user of plotters: one drawing, three formats.
-//! - [`paper`]: everything specific to this paper: readings, claims, figures as data.
-//! - [`draw`]: drawings from answers. [`compare`]: two pictures, point by point. [`report`]: the
-//!   page about everything.
+//! - [`paper`]: figures, readings, claims and verdicts of any paper, as data.
+//! - [`draw`]: drawings from answers. [`compare`]: two pictures, point by point.
+//! - [`jeffrey_2013`]: everything specific to this paper: its readings, rules and studies.
+//!   [`report`]: the page about everything.
 //! - [`cli`]: flags, progress, error messages.
 //!
 //! # Why isn't there ...?
@@ -68,18 +69,20 @@ pub use nalgebra;
 pub use twofold_analyse as analyse;
 pub use twofold_hybrid as hybrid;
 pub use twofold_integrate as integrate;
+#[cfg(feature = "cli")]
+pub use twofold_jeffrey_2013::{self as jeffrey_2013, report};
 pub use twofold_job as job;
 pub use twofold_job::record;
 pub use twofold_num as num;
 #[cfg(feature = "cli")]
-pub use twofold_paper::{compare, draw, report};
+pub use twofold_paper::{compare, draw};
 #[cfg(feature = "cli")]
 pub use twofold_render as render;
 pub use twofold_rigor as rigor;
 pub use twofold_system as system;
 pub use twofold_verify as verify;
 
-/// Everything specific to a paper: readings, claims, verdicts; and this paper's figures as data.
+/// Figures, readings, claims and verdicts of any paper; and the figures of Jeffrey (2013).
 ///
 /// ```
 /// use twofold::job::Executor;

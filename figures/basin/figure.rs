@@ -6,9 +6,10 @@ use std::sync::Arc;
 use twofold::job::sweep::Rows;
 use twofold::job::table::{Column, Entry, Table};
 use twofold::job::{AnyQuestion, JobError};
-use twofold::paper::census::{self, MotionKind};
-use twofold::paper::study::Computed;
-use twofold::paper::{Figure, Reading, Study};
+use crate::study::census::{self, MotionKind};
+use crate::computed::Computed;
+use crate::reading::{Reading, studied_in_both_readings};
+use twofold::paper::{Figure, Study};
 use twofold::record::Hash;
 use twofold::render::sheet::*;
 use twofold::render::style;
@@ -113,7 +114,7 @@ fn draw(tables: &[Table]) -> Sheet {
 
 /// The figure's specification.
 pub fn figure() -> Figure {
-    Figure::studied_in_both_readings(
+    studied_in_both_readings(
         "basin",
         "Where starts lead",
         "Starts on the plane y = 0, coloured by the outcome of the run: captured by the \

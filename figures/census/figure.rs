@@ -7,10 +7,11 @@ use std::sync::Arc;
 use twofold::job::sweep::Rows;
 use twofold::job::table::Table;
 use twofold::job::{AnyQuestion, JobError};
-use twofold::paper::census::{self, Data, Found, MotionKind, Shorter};
-use twofold::paper::claims::claims;
-use twofold::paper::study::Computed;
-use twofold::paper::{Figure, Reading, Study, Support};
+use crate::study::census::{self, Data, Found, MotionKind, Shorter};
+use crate::study::claims::claims;
+use crate::computed::Computed;
+use crate::reading::{Reading, studied_in_both_readings};
+use twofold::paper::{Figure, Study, Support};
 use twofold::record::Hash;
 use twofold::render::sheet::*;
 use twofold::render::style;
@@ -304,7 +305,7 @@ fn draw(tables: &[Table]) -> Sheet {
 
 /// The figure's specification.
 pub fn figure() -> Figure {
-    Figure::studied_in_both_readings(
+    studied_in_both_readings(
         "census",
         "The odds of each outcome of figs 7 and 8",
         "(a) Where runs of each panel of figs 7 and 8 end, of many starts that differ by less than \

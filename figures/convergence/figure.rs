@@ -10,7 +10,8 @@ use twofold::job::table::{Entry, Table};
 use twofold::job::{AfterVisit, AnyQuestion, SmoothingLimit};
 use twofold::num::elementary::exp10;
 use twofold::paper::wording::number;
-use twofold::paper::{Figure, Reading, Study};
+use crate::reading::{Reading, studied_in_both_readings};
+use twofold::paper::{Figure, Study};
 use twofold::render::sheet::*;
 use twofold::render::style;
 use twofold::system::System;
@@ -242,7 +243,7 @@ fn nearest_member(after: &[Vec<Entry>], distances: &[[f64; 2]]) -> PlanePanel {
 
 /// The figure's specification.
 pub fn figure() -> Figure {
-    Figure::studied_in_both_readings(
+    studied_in_both_readings(
         "convergence",
         "Smoothed orbits and the Filippov motion as the switch steepens",
         "(a) Distance between smoothed orbit and Filippov orbit at four times before the first \

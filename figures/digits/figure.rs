@@ -16,7 +16,8 @@ use twofold::job::{Answer, AnyQuestion, MethodDigits, TwoFoldPassage};
 use twofold::num::elementary::{exp10, log10};
 use twofold::num::fit::line;
 use twofold::paper::wording::number;
-use twofold::paper::{Figure, Reading, Study};
+use crate::reading::{Reading, studied_in_both_readings};
+use twofold::paper::{Figure, Study};
 use twofold::render::sheet::*;
 use twofold::render::style;
 use twofold::system::{System, Transition};
@@ -305,7 +306,7 @@ fn footer(rows: &Table, visits: &Table, series: &[Series; 3]) -> Vec<String> {
 
 /// The figure's specification.
 pub fn figure() -> Figure {
-    Figure::studied_in_both_readings(
+    studied_in_both_readings(
         "digits",
         "The breakdown of determinism, in digits",
         "(a) Digits of each passage through y = 0 that a method gets right, against time; dashed \

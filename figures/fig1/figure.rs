@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use serde_json::json;
-use twofold::draw::sketch::assembly;
-use twofold::paper::study::Computed;
+use crate::sketch::assembly;
+use crate::computed::Computed;
 use twofold::paper::{Figure, Picture, Study, View};
 use twofold::system::Wheel;
 

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use serde_json::json;
-use twofold::draw::sketch::portrait;
-use twofold::paper::study::Computed;
+use crate::sketch::portrait;
+use crate::computed::Computed;
 use twofold::paper::{Figure, Picture, Study, View};
 
 /// The constants v, w < 0 with vw > 1: the paper's v+ and v-.

@@ -4,11 +4,12 @@
 use twofold::integrate::filippov::ExitRule;
 use twofold::integrate::{Schedule, StepCap, Tolerance};
 use twofold::job::spec::*;
-use twofold::paper::{Camera, Figure, FigurePanel, Reading, View};
+use crate::reading::{Reading, in_both_readings};
+use twofold::paper::{Camera, Figure, FigurePanel, View};
 
 /// The figure's specification.
 pub fn figure() -> Figure {
-    Figure::in_both_readings(
+    in_both_readings(
         "fig4",
         "One way in, many ways out, and back",
         View::Space { camera: Camera { axes: [1, 2, 0], azimuth: -60.0, elevation: 18.0 } },

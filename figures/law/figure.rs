@@ -11,7 +11,8 @@ use twofold::job::{Answer, AnyQuestion, Leaving, Table, TwoFoldPassage};
 use twofold::num::elementary::{exp, exp10, ln, log10, sqrt};
 use twofold::num::fit::{line, median};
 use twofold::paper::wording::number;
-use twofold::paper::{Figure, Picture, Reading, Study, View};
+use crate::Reading;
+use twofold::paper::{Figure, Picture, Study, View};
 use twofold::render::sheet::*;
 use twofold::render::style;
 use twofold::system::caricature::MinusSign;
@@ -774,7 +775,7 @@ fn draw_selection(answers: &[Arc<Answer>]) -> Sheet {
 pub fn figure() -> Figure {
     let picture = |name: &str, title, caption: &str, study| Picture {
         name: name.into(),
-        reading: Some(Reading::Reconstructed),
+        reading: Some(Reading::Reconstructed.into()),
         title,
         caption: caption.into(),
         view: View::Study(study),

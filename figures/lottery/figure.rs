@@ -6,12 +6,13 @@
 
 use twofold::integrate::Schedule;
 use twofold::job::spec::*;
+use crate::reading::in_both_readings;
 use twofold::paper::verdict::{Claim, SectionClaim};
 use twofold::paper::{Figure, FigurePanel, View};
 
 /// The figure's specification.
 pub fn figure() -> Figure {
-    Figure::in_both_readings(
+    in_both_readings(
         "lottery",
         "The solver lottery: fig. 7 under three methods",
         View::LateSection { horizontal: 0, vertical: 2 },

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 use twofold::job::table::{Column, Entry, Table};
 use twofold::job::{AnyQuestion, JobError};
-use twofold::paper::study::Computed;
+use crate::computed::Computed;
 use twofold::paper::wording::number;
 use twofold::paper::{Figure, Picture, Study, View};
 use twofold::record::Hash;

@@ -2,7 +2,8 @@
 
 use pyo3::prelude::*;
 use serde_json::{Value, json};
-use twofold::paper::{Reading, figures, verdict_table as verdicts_as_table};
+use twofold::jeffrey_2013::study::verdict_table as verdicts_as_table;
+use twofold::paper::figures;
 use twofold::record::Manifest;
 
 use crate::errors::InternalError;
@@ -39,7 +40,7 @@ pub fn panels() -> PyResult<String> {
                 let value: Value = json!({
                     "figure": figure.id,
                     "title": figure.title,
-                    "reading": picture.reading.map(Reading::word),
+                    "reading": picture.reading_name(),
                     "panel": panel.label,
                     "panel_title": panel.title,
                     "spec": panel.run,

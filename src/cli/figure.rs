@@ -423,7 +423,7 @@ fn select(mut figure: Figure, arguments: &FigureFlags) -> Result<Figure, CliErro
         figure.pictures.iter_mut().for_each(|p| p.keep_only(label));
     }
     let readings = arguments.reading.unwrap_or_default();
-    figure.pictures.retain(|p| readings.wants(p.reading));
+    figure.pictures.retain(|p| readings.wants(p.reading_name()));
     let alterations = Alterations {
         seed: arguments.seed,
         t_end: arguments.t_end,

@@ -15,12 +15,12 @@ use crate::hybrid::Model;
 use crate::integrate;
 use crate::integrate::filippov::{ExitRule, Side, SlidingLaw};
 use crate::integrate::{Kick, Schedule, StepCap, Tolerance};
+use crate::jeffrey_2013;
 use crate::job::spec::*;
 use crate::job::sweep::{Axis, Coordinate};
 use crate::job::translation::{MOST_STATES, model_with};
 use crate::num::decimal::DecimalError;
 use crate::num::{Decimal, Short};
-use crate::paper;
 use crate::record::files::{read_text, read_text_from};
 use crate::system::{self, Definition, ParameterError, System};
 
@@ -895,7 +895,8 @@ impl RunFlags {
     /// Whether each number in which the readings differ is given, by a flag or as `varied` says: a
     /// reading is then of no use.
     fn gives_what_readings_differ_in(&self, varied: &dyn Fn(&str) -> bool) -> bool {
-        let values = paper::Reading::ALL.map(|r| [r.caricature().alpha, r.caricature().beta]);
+        let values =
+            jeffrey_2013::Reading::ALL.map(|r| [r.caricature().alpha, r.caricature().beta]);
         let numbers = [("alpha", self.alpha.is_some()), ("beta", self.beta.is_some())];
         numbers.into_iter().enumerate().all(|(i, (name, flag))| {
             flag || self.sets(name) || varied(name) || values.iter().all(|v| v[i] == values[0][i])
@@ -921,7 +922,7 @@ impl RunFlags {
         };
         if self.caricature() {
             let reading =
-                paper::Reading::from(self.reading.unwrap_or(Reading::Printed)).caricature();
+                jeffrey_2013::Reading::from(self.reading.unwrap_or(Reading::Printed)).caricature();
             let values = [
                 ("alpha", self.alpha.unwrap_or(reading.alpha)),
                 ("beta", self.beta.unwrap_or(reading.beta)),

@@ -3,7 +3,7 @@
 use clap::ValueEnum;
 
 use crate::integrate;
-use crate::paper;
+use crate::jeffrey_2013;
 use crate::system;
 
 /// Mirrors an enum of another crate: same variants, documented for `--help`.
@@ -103,7 +103,7 @@ mirror! {
 
 mirror! {
     /// A reading of the paper's parameters.
-    Reading = paper::Reading {
+    Reading = jeffrey_2013::Reading {
         /// As printed: alpha = 1e-3, beta = 1e-5.
         Printed,
         /// One digit changed: alpha = 1e-1, beta = 1e-5.
@@ -138,11 +138,12 @@ pub enum Readings {
 
 impl Readings {
     /// Whether a picture of this reading is wanted.
-    pub fn wants(self, reading: Option<paper::Reading>) -> bool {
+    pub fn wants(self, reading: Option<&str>) -> bool {
+        let is = |of: jeffrey_2013::Reading| reading == Some(of.word());
         match self {
             Readings::All => true,
-            Readings::Printed => reading != Some(paper::Reading::Reconstructed),
-            Readings::Reconstructed => reading != Some(paper::Reading::Printed),
+            Readings::Printed => !is(jeffrey_2013::Reading::Reconstructed),
+            Readings::Reconstructed => !is(jeffrey_2013::Reading::Printed),
         }
     }
 }
@@ -158,7 +159,7 @@ mod tests {
             assert_eq!(integrate::Method::from(word), method);
             assert_eq!(word.to_possible_value().unwrap().get_name(), method.name());
         }
-        for reading in paper::Reading::ALL {
+        for reading in jeffrey_2013::Reading::ALL {
             assert_eq!(
                 Reading::of(reading).to_possible_value().unwrap().get_name(),
                 reading.word()

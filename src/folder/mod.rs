@@ -35,7 +35,7 @@ use crate::job::spec::RunSpec;
 use crate::paper::draw::plot::{self, Look, PictureKind};
 use crate::paper::plots::{Columns, Drawing, Plot, Plots, Points, Recorded};
 use crate::paper::verdict::Claim as PanelClaim;
-use crate::paper::{Camera, Figure, FigurePanel, Picture, Reading, Repeats, View};
+use crate::paper::{Camera, Figure, FigurePanel, ParameterReading, Picture, Repeats, View};
 use crate::record::FileError;
 use crate::record::files::read_text;
 use crate::record::manifest::is_plain_name;
@@ -660,11 +660,7 @@ impl Folder {
         };
         Ok(Picture {
             name: format!("{id}{suffix}"),
-            reading: if panels.is_empty() {
-                None
-            } else {
-                Reading::ALL.into_iter().find(|r| r.word() == reading.name)
-            },
+            reading: if panels.is_empty() { None } else { reading.shown() },
             title: figure.title.clone().into(),
             caption,
             view,
@@ -733,12 +729,8 @@ impl Folder {
         reading: &str,
     ) -> Result<Repeats, FolderError> {
         let found = name.get_ref().split_once('/').and_then(|(study, panel)| {
-            let reading = Reading::ALL.into_iter().find(|r| r.word() == reading)?;
-            Some(Repeats {
-                panel: panel.to_owned(),
-                reading,
-                count: twofold_jeffrey_2013::counts(study)?,
-            })
+            let count = twofold_jeffrey_2013::counts(study, reading)?;
+            Some(Repeats { panel: panel.to_owned(), count })
         });
         found.ok_or_else(|| {
             let why = format!("no committed runs are called `{}` in this reading", name.get_ref());
@@ -908,6 +900,21 @@ struct Given {
     name: String,
     about: String,
     words: Vec<Words>,
+}
+
+impl Given {
+    /// The reading as pictures show it; none for a paper without readings.
+    fn shown(&self) -> Option<ParameterReading> {
+        let mut parameters: Vec<(String, f64)> = Vec::new();
+        for (name, value) in self.words.iter().flat_map(Words::parameters) {
+            match parameters.iter_mut().find(|(known, _)| *known == name) {
+                Some((_, old)) => *old = value,
+                None => parameters.push((name, value)),
+            }
+        }
+        let name = self.name.clone();
+        (!name.is_empty()).then_some(ParameterReading { name, parameters })
+    }
 }
 
 fn readings(origin: &Origin, about: &About) -> Result<Vec<Given>, FolderError> {

@@ -6,10 +6,10 @@ use serde_json::{Value, json};
 
 use super::Folder;
 use super::made::{Made, Scored, outcome};
+use crate::paper::html::escape;
 use crate::paper::pipeline::PictureRecord;
 use crate::paper::verdict::PanelVerdict;
 use crate::record::Hash;
-use crate::report::escape;
 
 const STYLE: &str = "body{font:16px/1.5 system-ui,sans-serif;max-width:60rem;margin:2rem \
     auto;padding:0 1rem;color:#1a1a1a;background:#fff}\

@@ -76,6 +76,17 @@ impl Words {
         };
         self.0.iter().map(flag).collect()
     }
+
+    /// The numbers that it gives to parameters, in the file's order.
+    pub fn parameters(&self) -> Vec<(String, f64)> {
+        let set = self.0.iter().find(|(key, _)| key.get_ref() == "set");
+        let texts = set.and_then(|(key, value)| texts(key.get_ref(), value.get_ref()).ok());
+        let number = |text: &String| {
+            let (name, value) = text.split_once('=')?;
+            Some((name.trim().to_owned(), value.trim().parse().ok()?))
+        };
+        texts.iter().flatten().filter_map(number).collect()
+    }
 }
 
 /// A value as the command line writes it.

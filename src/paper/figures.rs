@@ -11,7 +11,7 @@ use crate::folder::{Embedded, Folder};
 use crate::paper::Figure;
 use crate::record::{FileBytes, FileError, read_tree};
 
-pub use twofold_jeffrey_2013::{audit, census, data, delay, fig1, fig3, fig4};
+pub use twofold_jeffrey_2013::data;
 
 /// Folder of the paper in the sources.
 pub const FOLDER: &str = "papers/jeffrey-2013";

@@ -4,12 +4,13 @@
 use std::fs;
 
 use twofold::analyse::counts::wilson;
+use twofold::jeffrey_2013::Reading;
+use twofold::jeffrey_2013::study::capture::{self, ByMethod, Candidate};
+use twofold::jeffrey_2013::study::census::PANELS;
+use twofold::jeffrey_2013::study::claims::claims;
+use twofold::jeffrey_2013::study::effects;
 use twofold::job::sweep::Rows;
 use twofold::job::table::{Column, Entry, Table};
-use twofold::paper::capture::{self, ByMethod, Candidate};
-use twofold::paper::census::PANELS;
-use twofold::paper::claims::claims;
-use twofold::paper::{Reading, effects};
 
 use crate::census::{path, rows};
 use crate::examples::visits;
@@ -31,7 +32,7 @@ fn methods() -> Vec<(Reading, Vec<ByMethod>)> {
         };
         let by = |(file, name): (String, &'static str)| ByMethod {
             name,
-            runs: twofold::paper::census::runs(&table(&file), &alpha()),
+            runs: twofold::jeffrey_2013::study::census::runs(&table(&file), &alpha()),
         };
         (reading, [lsoda].into_iter().chain(others.into_iter().map(made).map(by)).collect())
     };

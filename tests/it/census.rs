@@ -10,12 +10,14 @@ use twofold::cli::progress::Progress;
 use twofold::cli::recompute::recompute;
 use twofold::cli::rows::journal_of;
 use twofold::integrate::Schedule;
+use twofold::jeffrey_2013::Reading;
+use twofold::jeffrey_2013::study::census;
+use twofold::jeffrey_2013::study::claims::claims;
 use twofold::job::JobError;
 use twofold::job::spec::*;
 use twofold::job::sweep::{Axis, Rows, Sweep};
 use twofold::job::table::Entry;
-use twofold::paper::claims::claims;
-use twofold::paper::{Reading, census, figures};
+use twofold::paper::figures;
 use twofold::record::Journal;
 use twofold::system::Caricature;
 
@@ -147,8 +149,9 @@ fn committed_rows_come_out_the_same() {
 
 #[test]
 fn the_page_says_what_the_census_says() {
-    let found = Reading::ALL
-        .map(|reading| figures::census::found_in(reading, &on_disk("figures/census")).unwrap());
+    let found = Reading::ALL.map(|reading| {
+        twofold::jeffrey_2013::census::found_in(reading, &on_disk("figures/census")).unwrap()
+    });
     let text = census::text(&found, figures::reference);
     let page = fs::read_to_string(path("docs/census.md")).unwrap();
     let (_, rest) = page.split_once(census::BEGIN).expect("the page has a place for the census");
@@ -162,8 +165,9 @@ fn the_page_says_what_the_census_says() {
 
 #[test]
 fn the_book_says_what_other_limits_would_do() {
-    let found = Reading::ALL
-        .map(|reading| figures::census::found_in(reading, &on_disk("figures/census")).unwrap());
+    let found = Reading::ALL.map(|reading| {
+        twofold::jeffrey_2013::census::found_in(reading, &on_disk("figures/census")).unwrap()
+    });
     let text = census::limits_text(&found);
     let book = fs::read_to_string(path("docs/census-sweeps.md")).unwrap();
     let (_, rest) = book

@@ -13,14 +13,15 @@ use twofold::integrate::filippov::{
     EventKind, ExitRule, FilippovObserver, FilippovOptions, Mode, ModeEvent, Side, Trajectory, run,
 };
 use twofold::integrate::{Flow, Step, Tolerance};
+use twofold::jeffrey_2013::Reading;
+use twofold::jeffrey_2013::study::census::{MotionKind, PANELS, supporting, tally};
+use twofold::jeffrey_2013::study::claims::{Quantity, claims};
 use twofold::job::recording::Data;
 use twofold::job::simulate::simulate;
 use twofold::job::spec::*;
 use twofold::job::{Executor, PathComparison};
 use twofold::num::random::RandomStream;
-use twofold::paper::census::{MotionKind, PANELS, supporting, tally};
-use twofold::paper::claims::{Quantity, claims};
-use twofold::paper::{Figure, Reading, figures};
+use twofold::paper::{Figure, figures};
 use twofold::record::Manifest;
 use twofold::system::filippov::{normal_form_constants, two_fold};
 use twofold::system::{
@@ -410,7 +411,8 @@ fn figure(id: &str) -> Figure {
 
 /// The run of a figure's panel in a reading.
 fn panel(id: &str, reading: Reading, label: &str) -> RunSpec {
-    let picture = figure(id).pictures.into_iter().find(|p| p.reading == Some(reading)).unwrap();
+    let picture =
+        figure(id).pictures.into_iter().find(|p| p.reading == Some(reading.into())).unwrap();
     picture.panels.into_iter().find(|p| p.label == label).unwrap().run
 }
 
@@ -507,7 +509,8 @@ fn the_census_counts_outcomes() {
     let rules = claims().rules;
     for reading in Reading::ALL {
         let of = |quantity| of(reading, quantity);
-        let runs = PANELS.map(|panel| figures::census::runs(panel.name, reading).unwrap());
+        let runs =
+            PANELS.map(|panel| twofold::jeffrey_2013::census::runs(panel.name, reading).unwrap());
         let support: Vec<u64> =
             PANELS.iter().zip(&runs).map(|(p, runs)| supporting(p.said, runs, &rules)).collect();
         for (id, hits) in ["7.1", "7.2", "7.3", "8.1", "8.2", "8.3"].into_iter().zip(&support) {
@@ -525,9 +528,11 @@ fn the_census_counts_outcomes() {
                 .filter(|(kind, n)| *kind != MotionKind::Undecided && *n > 0)
                 .count()
         };
-        let kinds = |runs: &[twofold::paper::census::CensusRun]| decided(tally(runs, rules.end));
+        let kinds = |runs: &[twofold::jeffrey_2013::study::census::CensusRun]| {
+            decided(tally(runs, rules.end))
+        };
         for (id, panels) in [("7.4", &runs[..3]), ("8.4", &runs[3..])] {
-            let share = |runs: &[twofold::paper::census::CensusRun]| {
+            let share = |runs: &[twofold::jeffrey_2013::study::census::CensusRun]| {
                 tally(runs, rules.end).map(|n| n as f64 / runs.len() as f64)
             };
             let alike: f64 =
@@ -598,7 +603,7 @@ fn both_orbits_are_proved() {
 /// The late half of every panel of fig. 7 in a reading.
 fn late_halves(reading: Reading) -> Vec<Vec<Crossing>> {
     let figure = figures::all().into_iter().find(|f| f.id == "fig7").unwrap();
-    let picture = figure.pictures.into_iter().find(|p| p.reading == Some(reading)).unwrap();
+    let picture = figure.pictures.into_iter().find(|p| p.reading == Some(reading.into())).unwrap();
     picture
         .panels
         .iter()

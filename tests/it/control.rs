@@ -7,13 +7,14 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::{SVector, vector};
 use twofold::integrate::Schedule;
+use twofold::jeffrey_2013::Reading;
+use twofold::jeffrey_2013::study::census::{CensusRun, MotionKind, PANELS, tally};
+use twofold::jeffrey_2013::study::claims::claims;
 use twofold::job::recording::Data;
 use twofold::job::simulate::simulate;
 use twofold::job::spec::*;
 use twofold::job::sweep::Rows;
-use twofold::paper::census::{CensusRun, MotionKind, PANELS, tally};
-use twofold::paper::claims::claims;
-use twofold::paper::{Reading, figures};
+use twofold::paper::figures;
 use twofold::system::filippov::two_fold;
 use twofold::system::{Definition, System};
 
@@ -36,7 +37,7 @@ fn runs(name: &str) -> Vec<CensusRun> {
 fn with_singularity() -> Vec<CensusRun> {
     PANELS[..3]
         .iter()
-        .flat_map(|p| figures::census::runs(p.name, Reading::Reconstructed).unwrap())
+        .flat_map(|p| twofold::jeffrey_2013::census::runs(p.name, Reading::Reconstructed).unwrap())
         .collect()
 }
 
@@ -105,7 +106,7 @@ fn the_controls_are_the_runs_of_fig_7_with_one_change() {
     let paper = figures::named("fig7")
         .pictures
         .into_iter()
-        .find(|p| p.reading == Some(Reading::Reconstructed))
+        .find(|p| p.reading == Some(Reading::Reconstructed.into()))
         .unwrap();
     for (name, system, switch) in [
         (SHIFTED, shifted(), SwitchSpec::tanh(1e-3)),

@@ -16,14 +16,15 @@ use twofold::analyse::passage::Predicted;
 use twofold::analyse::{Crossing, Direction};
 use twofold::integrate::delay::{History, Inside};
 use twofold::integrate::{Kick, KickLaw, Schedule, StepCap, Tolerance};
+use twofold::jeffrey_2013::Reading;
+use twofold::jeffrey_2013::delay;
+use twofold::jeffrey_2013::study::claims::claims;
+use twofold::jeffrey_2013::study::similarity::{Rule, Similar, WAYS};
 use twofold::job::recording::Data;
 use twofold::job::simulate::simulate;
 use twofold::job::spec::*;
 use twofold::job::{Executor, Run};
 use twofold::num::elementary::{exp, ln};
-use twofold::paper::claims::claims;
-use twofold::paper::similarity::{Rule, Similar, WAYS};
-use twofold::paper::{Reading, figures};
 use twofold::system::{Caricature, Definition, System, Transition};
 
 fn spec(alpha: f64, switch: SwitchSpec, method: Method, tolerance: f64, t_end: f64) -> RunSpec {
@@ -305,23 +306,19 @@ fn growth_in_a_passage_is_of_order_one_in_inner_units() {
 /// carried in.
 #[test]
 fn committed_growth_has_the_powers_of_the_chatters_phase() {
-    let growth = figures::delay::growth().unwrap();
+    let growth = delay::growth().unwrap();
     let are = |powers: [(f64, f64); 3], expected: [f64; 3], within: f64| {
         let near = powers.iter().zip(expected).all(|((power, _), e)| (power - e).abs() < within);
         assert!(near, "{powers:?} and not {expected:?}");
         assert!(powers.iter().all(|(_, error)| *error > 0.0 && *error < within), "{powers:?}");
     };
-    are(figures::delay::sharp_powers(&growth, "sharp"), [-1.0, 0.0, 0.0], 0.05);
-    are(figures::delay::sharp_powers(&growth, "relay"), [-0.5, 0.0, -0.5], 0.03);
+    are(delay::sharp_powers(&growth, "sharp"), [-1.0, 0.0, 0.0], 0.05);
+    are(delay::sharp_powers(&growth, "relay"), [-0.5, 0.0, -0.5], 0.03);
     // The smooth rule: smoothing's powers, and order one in inner units.
     let law = Predicted::of(-1.2, -1.4);
     let smoothing = [law.across(), law.along(), law.carried()];
-    are(
-        figures::delay::smooth_powers(&growth, figures::delay::SMALL, figures::delay::SMALL_EPS),
-        smoothing,
-        0.15,
-    );
-    are(figures::delay::smooth_powers(&growth, figures::delay::LARGE, 1e-2), [-0.5, 0.0, 0.0], 0.1);
+    are(delay::smooth_powers(&growth, delay::SMALL, delay::SMALL_EPS), smoothing, 0.15);
+    are(delay::smooth_powers(&growth, delay::LARGE, 1e-2), [-0.5, 0.0, 0.0], 0.1);
 }
 
 /// The page of the delayed switch gives the powers and growths of the committed data.
@@ -330,11 +327,10 @@ fn the_page_says_what_the_growth_is() {
     let page =
         std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/delay.md")).unwrap();
     let words = page.split_whitespace().collect::<Vec<_>>().join(" ");
-    let growth = figures::delay::growth().unwrap();
-    let [sharp, relay] = ["sharp", "relay"].map(|r| figures::delay::sharp_powers(&growth, r));
-    let small =
-        figures::delay::smooth_powers(&growth, figures::delay::SMALL, figures::delay::SMALL_EPS);
-    let large = figures::delay::smooth_powers(&growth, figures::delay::LARGE, 1e-2);
+    let growth = delay::growth().unwrap();
+    let [sharp, relay] = ["sharp", "relay"].map(|r| delay::sharp_powers(&growth, r));
+    let small = delay::smooth_powers(&growth, delay::SMALL, delay::SMALL_EPS);
+    let large = delay::smooth_powers(&growth, delay::LARGE, 1e-2);
     for (powers, digits) in [(sharp, 3), (relay, 3), (small, 2), (large, 2)] {
         for (power, error) in powers {
             let said = format!("{power:.digits$} ± {error:.digits$}").replace('-', "−");
@@ -372,17 +368,17 @@ fn the_page_says_what_the_growth_is() {
 /// while the phase of each exit does. One exit of a distribution is 0.0043.
 #[test]
 fn committed_exits_have_a_limit_distribution() {
-    let exits = figures::delay::exits().unwrap();
-    let gaps = ["sharp", "relay"].map(|rule| figures::delay::exit_gaps(&exits, rule));
+    let exits = delay::exits().unwrap();
+    let gaps = ["sharp", "relay"].map(|rule| delay::exit_gaps(&exits, rule));
     assert!(gaps[0].iter().chain(&gaps[1][1..]).all(|gap| *gap < 0.01), "{gaps:?}");
-    let first = [1e-3, 1e-5].map(|delay| figures::delay::one_period(&exits, "sharp", delay)[0][1]);
+    let first = [1e-3, 1e-5].map(|delay| delay::one_period(&exits, "sharp", delay)[0][1]);
     assert!((first[0] - first[1]).abs() > 10.0, "{first:?}");
 }
 
 /// Rows of each committed table, computed anew: to the digits that they have.
 #[test]
 fn committed_data_come_out_the_same() {
-    let [growth, exits, _, runs] = figures::delay::DATA.map(|(_, text)| text);
+    let [growth, exits, _, runs] = delay::DATA.map(|(_, text)| text);
     let rules = [
         ("sharp,NaN,1.0000e-2", LateRule::Sharp { delay: 1e-2 }),
         ("relay,NaN,1.0000e-2", LateRule::Relay { band: 1e-2 }),
@@ -410,7 +406,7 @@ fn committed_data_come_out_the_same() {
 #[test]
 fn the_effect_is_in_some_ways_similar_to_hysteresis() {
     let mut reads = Reads::by("delay::the_effect_is_in_some_ways_similar_to_hysteresis");
-    let scores = figures::delay::all_scores().unwrap();
+    let scores = delay::all_scores().unwrap();
     let is_similar = |way: usize| {
         let chosen =
             scores.iter().filter(|s| s.0 == way && s.2 == Rule::Delayed && s.3 == Rule::Literal);

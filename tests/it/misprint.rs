@@ -4,10 +4,10 @@
 use crate::claims::Reads;
 use nalgebra::vector;
 use twofold::integrate::{Schedule, StepCap, Tolerance};
+use twofold::jeffrey_2013::Reading;
 use twofold::job::recording::Data;
 use twofold::job::simulate::simulate;
 use twofold::job::spec::*;
-use twofold::paper::Reading;
 use twofold::system::caricature::MinusSign;
 use twofold::system::filippov::{Visibility, sliding_field, two_fold};
 

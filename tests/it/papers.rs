@@ -6,6 +6,9 @@ use std::path::Path;
 
 use assert_cmd::Command;
 use tempfile::TempDir;
+use twofold::folder::{Embedded, Folder};
+use twofold::jeffrey_2013::Reading;
+use twofold::paper::{ParameterReading, figures};
 
 fn paper(arguments: &[&str], folder: &Path) -> (i32, String, String) {
     let (action, rest) = arguments.split_first().expect("an action");
@@ -504,4 +507,56 @@ fn hostile_words_are_shown_as_they_are() {
             && page.contains("&lt;script&gt;"),
         "{page}"
     );
+}
+
+/// A paper calls its readings as it likes: a picture has the name, and the numbers that the reading
+/// and those that it extends give to parameters.
+#[test]
+fn a_reading_has_the_name_and_the_numbers_of_the_folder() {
+    const FILES: Embedded = &[
+        (
+            "paper.toml",
+            "format = 1
+            title = 'A'
+            authors = ['B']
+            year = 2000
+            summary = 'C'
+            run = { system = 'caricature' }
+            [readings.broad]
+            about = ''
+            run = { set = { alpha = 0.5, beta = 1e-4 } }
+            [readings.narrow]
+            about = ''
+            extends = 'broad'
+            run = { set = { alpha = 0.25 } }",
+        ),
+        (
+            "figures/fig1.toml",
+            "title = 'A'
+            caption = 'B'
+            [[panel]]
+            label = 'a'
+            draw = 'halves'
+            run = { start = [0.2, 0, -1], eps = 1e-3, t-end = 10, section = 'y=0' }",
+        ),
+    ];
+    let folder = Folder::embedded("paper", FILES).unwrap();
+    let pictures = &folder.figures[0].pictures;
+    let reading = |alpha: f64, name: &str| ParameterReading {
+        name: name.to_owned(),
+        parameters: vec![("alpha".to_owned(), alpha), ("beta".to_owned(), 1e-4)],
+    };
+    let found: Vec<_> = pictures.iter().map(|p| (p.name.as_str(), p.reading.clone())).collect();
+    assert_eq!(
+        found,
+        [
+            ("fig1-broad", Some(reading(0.5, "broad"))),
+            ("fig1-narrow", Some(reading(0.25, "narrow")))
+        ]
+    );
+    // Those of Jeffrey (2013) are the two that its studies know.
+    for picture in figures::all().iter().flat_map(|f| &f.pictures) {
+        let known = picture.reading_name().and_then(Reading::named);
+        assert_eq!(picture.reading, known.map(Into::into), "{}", picture.name);
+    }
 }

@@ -4,7 +4,8 @@ use std::fs;
 use std::path::Path;
 
 use crate::claims::Reads;
-use twofold::paper::{capture, census, figures, verdict_table};
+use twofold::jeffrey_2013::study::{capture, census, verdict_table};
+use twofold::paper::figures;
 use twofold::record::Manifest;
 
 fn text(path: &str) -> String {
@@ -184,10 +185,10 @@ fn futures_come_back_as_often_as_the_findings_say() {
     use twofold::integrate::filippov::EventKind;
     use twofold::integrate::filippov::ExitRule;
     use twofold::integrate::{Schedule, StepCap, Tolerance};
+    use twofold::jeffrey_2013::Reading;
     use twofold::job::recording::Data;
     use twofold::job::simulate::simulate;
     use twofold::job::spec::*;
-    use twofold::paper::Reading;
     for (reading, back) in [(Reading::Reconstructed, 40), (Reading::Printed, 35)] {
         let funnel = FunnelSpec {
             shortest: 0.1,
@@ -225,10 +226,10 @@ fn futures_come_back_as_often_as_the_findings_say() {
         reads.read("3.6", &quantity, found as f64 / futures.len() as f64);
         assert_eq!((found, futures.len()), (back, 40), "{word}");
         // Fig. 4 says so on its face.
-        let fig4 = figures::fig4::figure()
+        let fig4 = twofold::jeffrey_2013::fig4::figure()
             .pictures
             .into_iter()
-            .find(|p| p.reading == Some(reading))
+            .find(|p| p.reading == Some(reading.into()))
             .unwrap();
         let said = format!("{back} of 40 futures come back within 300;");
         assert!(fig4.panels[0].title.starts_with(&said), "{}", fig4.panels[0].title);

@@ -1,13 +1,14 @@
 //! The census by methods that resolve the layer: docs/resolved.md says what figures/resolved says.
 //! `TWOFOLD_UPDATE=1 cargo test --test it resolved::` writes the texts anew.
 
+use twofold::jeffrey_2013::Reading;
+use twofold::jeffrey_2013::study::census::{CensusPanel, PANELS};
+use twofold::jeffrey_2013::study::claims::claims;
+use twofold::jeffrey_2013::study::effects::LogRank;
+use twofold::jeffrey_2013::study::resolved::{self, Belongs, Compared, compared};
+use twofold::jeffrey_2013::study::{capture, census};
 use twofold::job::encode::from_csv;
 use twofold::job::table::{Entry, Table};
-use twofold::paper::census::{CensusPanel, PANELS};
-use twofold::paper::claims::claims;
-use twofold::paper::effects::LogRank;
-use twofold::paper::resolved::{self, Belongs, Compared, compared};
-use twofold::paper::{Reading, capture, census};
 
 use crate::capture::{come_out_the_same, page_says, share_no_start, table};
 use crate::census::path;

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use twofold_analyse::attractor::{Evidence, Verdict};
 
-/// The paper's claim about a section (figs 7-9).
+/// The paper's claim about a section.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Claim {

@@ -35,7 +35,7 @@ pub fn sheet(
             "our reconstruction: the paper gives the form of the equations, not their coefficients",
         );
     }
-    for line in wording::small_print(picture.reading, &runs) {
+    for line in wording::small_print(picture.reading_name(), &runs) {
         sheet = sheet.footer(line);
     }
     let notes = verdict_notes(picture, verdicts)?;
@@ -82,11 +82,11 @@ fn dress(mut sheet: Sheet, picture: &Picture, spec: &Hash, data: &Hash) -> Sheet
         .title(picture.title.as_ref())
         .provenance("Software", concat!("twofold ", env!("CARGO_PKG_VERSION")))
         .provenance("Picture", &picture.name)
-        .provenance("Reading", picture.reading.map_or("none", |r| r.word()))
+        .provenance("Reading", picture.reading_name().unwrap_or("none"))
         .provenance("Method", methods(picture))
         .provenance("Spec-SHA256", spec.as_str())
         .provenance("Data-SHA256", data.as_str());
-    if let Some(reading) = picture.reading {
+    if let Some(reading) = &picture.reading {
         sheet = sheet.subtitle(wording::reading(reading));
     }
     if !picture.alterations.is_empty() {
@@ -195,7 +195,7 @@ fn verdict_notes(
             format!("this run {}", outcome(verdict)),
         ];
         if let Some(repeats) = &panel.repeats {
-            let Support { support, runs } = (repeats.count)(&repeats.panel, repeats.reading)?;
+            let Support { support, runs } = (repeats.count)(&repeats.panel)?;
             notes.push(format!("{support} of {runs} runs agree"));
         }
         Ok(notes)
@@ -372,7 +372,7 @@ fn returns(futures: &[Future]) -> String {
     )
 }
 
-/// A trajectory between two points of the set, through the singularity (section 3 of the paper).
+/// A trajectory between two points of the set, through the singularity.
 struct Connection {
     points: Vec<[f64; 3]>,
     /// Times from the first point to the two-fold, and from there to the last one.
@@ -525,7 +525,7 @@ fn crossings(data: &Data) -> &[Crossing] {
     }
 }
 
-/// A coordinate's name as it is printed.
+/// A coordinate's name in a picture.
 fn greek(name: &str) -> &str {
     match name {
         "omega" => "ω",

@@ -3,59 +3,34 @@
 //! A [`Figure`] is a list of pictures, a picture a list of panels, a panel a question
 //! ([`RunSpec`]). The way of every figure is the same: questions -> [`pipeline`] (put to an
 //! [`Executor`](twofold_job::Executor) in parallel, each computed once) -> answers -> [`drawing`]
-//! -> bytes -> files. The figures themselves stand in a paper's folder or in
-//! `figures/NAME/figure.rs`: every number of the paper's caption, and nothing else.
-//!
+//! -> bytes -> files. The figures themselves stand in a paper's folder, or in a crate of the
+//! paper's own: every number of a caption, and nothing else.
 #![forbid(unsafe_code)]
 // tests compare with tolerances, not with hashes
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
 
-// Tests try the paper's own figures. Their files call the library by its public name and paths.
-#[cfg(test)]
-extern crate self as twofold;
-#[cfg(test)]
-#[allow(missing_docs)]
-#[path = "../../../figures/figures.rs"]
-pub mod figures;
-#[cfg(test)]
-#[rustfmt::skip]
-use {
-    crate as paper, twofold_analyse as analyse, twofold_integrate as integrate, twofold_job as job,
-        twofold_job::record, twofold_num as num,
-    twofold_render as render, twofold_system as system,
-};
-
-pub mod audit;
-pub mod capture;
-pub mod census;
 pub mod claim;
-pub mod claims;
 pub mod compare;
 pub mod draw;
 pub mod drawing;
-pub mod effects;
+pub mod html;
 pub mod pipeline;
 pub mod plots;
-pub mod report;
-pub mod resolved;
 pub mod reuse;
-pub mod similarity;
 pub mod study;
 pub mod verdict;
-pub mod verdict_table;
 pub mod wording;
 
 use std::borrow::Cow;
-use std::sync::{Arc, LazyLock};
+use std::sync::Arc;
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 pub use plots::Plots;
 pub use study::Study;
 use twofold_integrate::filippov::ExitRule;
 use twofold_job::JobError;
 use twofold_job::spec::{Method, RunSpec, SwitchSpec};
-use twofold_system::Caricature;
 use verdict::Claim;
 
 /// A figure of the paper.
@@ -72,10 +47,10 @@ pub struct Figure {
 /// One picture file.
 #[derive(Clone, Debug)]
 pub struct Picture {
-    /// File name without extension, "fig7-printed".
+    /// File name without extension: the figure's and the reading's name, "fig7-first".
     pub name: String,
     /// The parameter reading, if the figure has readings.
-    pub reading: Option<Reading>,
+    pub reading: Option<ParameterReading>,
     /// The heading.
     pub title: Cow<'static, str>,
     /// The caption, in our own words.
@@ -104,16 +79,14 @@ pub struct FigurePanel {
     pub repeats: Option<Repeats>,
 }
 
-/// Counts the runs that repeat a panel of this name in a reading.
-pub type Count = fn(&str, Reading) -> Result<Support, JobError>;
+/// Counts the runs that repeat a panel of this name.
+pub type Count = fn(&str) -> Result<Support, JobError>;
 
 /// The runs that repeat a panel, counted when the panel is drawn.
 #[derive(Clone, Debug)]
 pub struct Repeats {
-    /// The panel, "7(i)".
+    /// The panel, as the repeated runs call it.
     pub panel: String,
-    /// The reading.
-    pub reading: Reading,
     /// Counts the runs.
     pub count: Count,
 }
@@ -169,101 +142,13 @@ pub struct Camera {
     pub elevation: f64,
 }
 
-/// The two readings of the paper's parameters, always shown side by side.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Reading {
-    /// As printed. Its late motion is always one stable periodic orbit.
-    Printed,
-    /// One digit of alpha changed. It gives the paper's story.
-    Reconstructed,
-}
-
-impl Reading {
-    /// Both, in the order in which they are shown.
-    pub const ALL: [Reading; 2] = [Reading::Printed, Reading::Reconstructed];
-
-    /// The word used in file names and small print.
-    pub fn word(self) -> &'static str {
-        match self {
-            Reading::Printed => "printed",
-            Reading::Reconstructed => "reconstructed",
-        }
-    }
-
-    /// Its alpha and beta, as the paper's folder has them.
-    pub fn parameters(self) -> [f64; 2] {
-        READINGS[self as usize]
-    }
-
-    /// The caricature with this reading's re-injection.
-    pub fn caricature(self) -> Caricature {
-        let [alpha, beta] = self.parameters();
-        Caricature::with_reinjection(alpha, beta)
-    }
-}
-
-/// Alpha and beta of each reading: `[readings]` of `papers/jeffrey-2013/paper.toml`.
-static READINGS: LazyLock<[[f64; 2]; 2]> = LazyLock::new(|| {
-    let paper: toml::Table = twofold_papers::jeffrey_2013("paper.toml")
-        .parse()
-        .expect("the embedded file is well formed: a test reads it");
-    Reading::ALL.map(|reading| {
-        ["alpha", "beta"].map(|name| {
-            paper["readings"][reading.word()]["run"]["set"][name]
-                .as_float()
-                .expect("a reading sets both: a test reads it")
-        })
-    })
-});
-
-impl Figure {
-    /// A figure with one study per reading, printed first.
-    pub fn studied_in_both_readings(
-        id: &'static str,
-        title: &'static str,
-        caption: &str,
-        studies: [Study; 2],
-    ) -> Self {
-        let (id, title) = (Cow::from(id), Cow::from(title));
-        let pictures = Reading::ALL
-            .into_iter()
-            .zip(studies)
-            .map(|(reading, study)| Picture {
-                name: format!("{id}-{}", reading.word()),
-                reading: Some(reading),
-                title: title.clone(),
-                caption: caption.to_owned(),
-                view: View::Study(study),
-                panels: Vec::new(),
-                alterations: Vec::new(),
-            })
-            .collect();
-        Figure { id, title, pictures }
-    }
-
-    /// A figure with one picture of runs per reading.
-    pub fn in_both_readings(
-        id: &'static str,
-        title: &'static str,
-        view: View,
-        caption: impl Fn(Reading) -> String,
-        panels: impl Fn(Reading) -> Vec<FigurePanel>,
-    ) -> Self {
-        let (id, title) = (Cow::from(id), Cow::from(title));
-        let pictures = Reading::ALL
-            .map(|reading| Picture {
-                name: format!("{id}-{}", reading.word()),
-                reading: Some(reading),
-                title: title.clone(),
-                caption: caption(reading),
-                view: view.clone(),
-                panels: panels(reading),
-                alterations: Vec::new(),
-            })
-            .into();
-        Figure { id, title, pictures }
-    }
+/// A reading of a paper's parameters: one of `[readings]` of its folder.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ParameterReading {
+    /// Its name.
+    pub name: String,
+    /// The numbers that it gives to parameters, in the order in which they are shown.
+    pub parameters: Vec<(String, f64)>,
 }
 
 impl FigurePanel {
@@ -304,6 +189,11 @@ pub struct Alterations {
 }
 
 impl Picture {
+    /// The name of its reading, if it has one.
+    pub fn reading_name(&self) -> Option<&str> {
+        self.reading.as_ref().map(|reading| reading.name.as_str())
+    }
+
     /// Applies what the user asked for.
     pub fn alter(&mut self, alterations: &Alterations) {
         let mut suffix = String::new();

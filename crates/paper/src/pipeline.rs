@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::verdict::{self, PanelVerdict, judge};
-use super::{Picture, Reading, View, drawing};
+use super::{Picture, View, drawing};
 use twofold_integrate::Statistics;
 use twofold_job::question::question_hash;
 use twofold_job::record::{FileError, Hash, PanelEntry, PictureEntry, VerdictEntry};
@@ -32,7 +32,7 @@ pub struct PictureRecord {
     /// The heading.
     pub title: String,
     /// The parameter reading.
-    pub reading: Option<Reading>,
+    pub reading: Option<String>,
     /// The caption.
     pub caption: String,
     /// Differences from the published picture; empty if there are none.
@@ -97,7 +97,7 @@ pub struct PanelRecord {
     pub stop: Stop,
     /// Work done.
     pub statistics: Statistics,
-    /// The largest number of steps between restarts; NDSolve's default limit is 10,000.
+    /// The largest number of steps between restarts.
     pub most_steps_in_segment: u64,
 }
 
@@ -271,7 +271,7 @@ pub fn compute_with_tables(
     let record = PictureRecord {
         hashes,
         title: picture.title.clone().into_owned(),
-        reading: picture.reading,
+        reading: picture.reading_name().map(str::to_owned),
         caption: picture.caption.clone(),
         alterations: picture.alterations.clone(),
         panels,

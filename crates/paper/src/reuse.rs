@@ -55,7 +55,7 @@ impl Question for Drawn<'_> {
             parts(self.0).into_iter().map(|(part, q)| (part, question_hash(&*q))).collect();
         let said: Vec<_> = panels
             .iter()
-            .map(|p| (&p.title, &p.claim, p.repeats.as_ref().map(|r| (&r.panel, r.reading))))
+            .map(|p| (&p.title, &p.claim, p.repeats.as_ref().map(|r| &r.panel)))
             .collect();
         let view = match view {
             // The function that draws, by its offset from another one, since a program's address
@@ -141,18 +141,85 @@ impl<'a> ReusablePictures<'a> {
 #[cfg(test)]
 mod tests {
     use std::fs;
-    use twofold_job::Executor;
+    use std::sync::Arc;
 
     use super::*;
     use crate::pipeline::compute_with_tables;
-    use crate::{Reading, Study, figures};
+    use crate::{FigurePanel, ParameterReading, Study};
+    use twofold_job::spec::{Method, MethodSpec, Observation, RunSpec, SwitchSpec};
+    use twofold_job::{Column, Entry, Executor, Table};
     use twofold_render::Sheet;
-    use twofold_render::sheet::ColumnWidth;
+    use twofold_render::sheet::{Axis, ColumnWidth, LineStyle, PlanePanel};
+    use twofold_render::style;
+    use twofold_system::System;
+
+    /// The two ends of a line.
+    #[derive(Debug)]
+    struct Ends;
+
+    impl Question for Ends {
+        fn kind(&self) -> &'static str {
+            "ends"
+        }
+
+        fn json(&self) -> Value {
+            json!({})
+        }
+
+        fn compute(&self, _: &dyn Ask, _: &dyn Monitor) -> Result<Answer, JobError> {
+            let mut table = Table::new("line", ["x", "y"].map(Column::numbers));
+            for end in [0.0, 1.0] {
+                table.push([end, end].map(Entry::Number));
+            }
+            Ok(Answer::of_tables(vec![table]))
+        }
+    }
+
+    /// A picture of a line.
+    fn of_a_study() -> Picture {
+        let study = Study {
+            questions: || vec![Arc::new(Ends)],
+            draw: |answers| {
+                let table = &answers[0].tables[0];
+                let ends = table.numbers("x").iter().zip(table.numbers("y"));
+                let panel = PlanePanel::new(Axis::linear("", 0.0, 1.0), Axis::linear("", 0.0, 1.0))
+                    .line(ends.map(|(x, y)| [*x, *y]).collect(), LineStyle::new(style::INK, 1.0));
+                Sheet::new(ColumnWidth::Single, 1, "").panel("", "", panel)
+            },
+        };
+        Picture {
+            name: "line".into(),
+            reading: None,
+            title: "A line".into(),
+            caption: "A line.".into(),
+            view: View::Study(study),
+            panels: Vec::new(),
+            alterations: Vec::new(),
+        }
+    }
+
+    /// A picture of two runs.
+    fn of_runs() -> Picture {
+        let run = RunSpec {
+            system: System::builtin("two-fold").unwrap(),
+            switch: SwitchSpec::tanh(1e-3),
+            start: vec![0.2, 0.0, -1.0],
+            t_end: 1.0,
+            method: MethodSpec::ndsolve_defaults(Method::Dopri5),
+            schedule: Default::default(),
+            observe: Observation::Section { coordinate: 1, value: 0.0 },
+        };
+        Picture {
+            view: View::Section { horizontal: 0, vertical: 2 },
+            panels: ["i", "ii"].map(|label| FigurePanel::new(label, "a run", run.clone())).into(),
+            ..of_a_study()
+        }
+    }
 
     /// Titles, labels and claims of panels of runs are part of the question.
     #[test]
     fn another_run_title_claim_or_view_is_another_picture() {
-        let picture = figures::fig4::figure().pictures.remove(0);
+        let picture = of_runs();
         let asked = |p: &Picture| key(&Drawn(p));
         let changes: [&dyn Fn(&mut Picture); 6] = [
             &|p| p.panels[0].title.push('.'),
@@ -170,9 +237,9 @@ mod tests {
         assert_eq!(asked(&picture.clone()), asked(&picture));
     }
 
-    /// Makes the first figure into `folder` as the command line does, and remembers it.
+    /// Makes the picture of a line into `folder` as the command line does, and remembers it.
     fn made(reusable: &ReusablePictures<'_>, folder: &Path) -> (Picture, PictureRecord) {
-        let picture = figures::fig1::figure().pictures.remove(0);
+        let picture = of_a_study();
         let put = |file: &str, bytes: &[u8]| twofold_job::record::write(&folder.join(file), bytes);
         let computed =
             compute_with_tables(&picture, &Executor::quiet(), &mut |file, bytes| put(file, bytes))
@@ -191,7 +258,7 @@ mod tests {
         let place = tempfile::tempdir().unwrap();
         let store = Store::new(place.path().join("store"));
         let reusable = ReusablePictures::of(&store).unwrap();
-        let folder = place.path().join("fig1");
+        let folder = place.path().join("line");
         let (picture, record) = made(&reusable, &folder);
         let found = reusable.find(&picture, &folder).expect("nothing has changed");
         assert_eq!(found.record, record);
@@ -228,7 +295,7 @@ mod tests {
     fn nothing_of_another_program_or_question_is_reused() {
         let place = tempfile::tempdir().unwrap();
         let store = Store::new(place.path().join("store"));
-        let folder = place.path().join("fig1");
+        let folder = place.path().join("line");
         let other = ReusablePictures { store: &store, program: Hash::of(b"another program") };
         let (picture, record) = made(&other, &folder);
         assert!(other.find(&picture, &folder).is_some());
@@ -238,13 +305,13 @@ mod tests {
         assert!(ours.find(&picture, &folder).is_some());
         assert_eq!(other.find(&picture, &folder), None, "ours has taken its place");
 
-        let View::Study(study) = picture.view else { panic!("figure 1 is a study") };
+        let View::Study(study) = picture.view else { panic!("it is a study") };
         let changes: [&dyn Fn(&mut Picture); 8] = [
             &|p| p.alterations.push("seed 2".into()),
             &|p| p.title = "something else".into(),
             &|p| p.caption.push('.'),
-            &|p| p.name.push_str("-printed"),
-            &|p| p.reading = Some(Reading::Printed),
+            &|p| p.name.push_str("-other"),
+            &|p| p.reading = Some(ParameterReading { name: "a".into(), parameters: Vec::new() }),
             &|p| {
                 p.view =
                     View::Study(Study { draw: |_| Sheet::new(ColumnWidth::Single, 1, ""), ..study })
@@ -263,7 +330,7 @@ mod tests {
     /// A remembered answer equals that of drawing the picture anew.
     #[test]
     fn the_answer_is_that_of_the_question() {
-        let picture = figures::fig1::figure().pictures.remove(0);
+        let picture = of_a_study();
         let executor = Executor::quiet();
         let drawn = Drawn(&picture).compute(&executor, &()).unwrap();
         let record = compute(&picture, &executor).unwrap().record;

@@ -8,8 +8,8 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+use super::Picture;
 pub use super::claim::Claim as SectionClaim;
-use super::{Picture, Reading};
 use twofold_analyse::attractor::Evidence;
 use twofold_analyse::divider::Shared;
 use twofold_job::{AnyQuestion, Ask, Classification, JobError, PathComparison};
@@ -20,12 +20,11 @@ use twofold_num::fit::mean;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Claim {
-    /// About a section (figs 7-9).
+    /// About a section.
     Section(SectionClaim),
-    /// "Less organisation" than in the next panel (6(i) against 6(ii)).
+    /// Less organisation than in the next panel.
     LessOrganisedThanNext,
-    /// "Changes in structure sensitive to random noise": this panel and the next differ (6(iii),
-    /// 6(iv)).
+    /// This panel and the next differ in structure.
     DiffersFromNext,
 }
 
@@ -39,7 +38,7 @@ pub struct PanelVerdict {
     /// The picture's name.
     pub picture: String,
     /// The figure's reading.
-    pub reading: Option<Reading>,
+    pub reading: Option<String>,
     /// The panel's label.
     pub panel: String,
     /// The method.
@@ -83,22 +82,22 @@ pub enum Grounds {
 }
 
 impl Claim {
-    /// The claim in words.
-    pub fn text(self) -> String {
+    /// The claim in words, about a panel and the next one.
+    fn text(self, panel: &str, next: &str) -> String {
         match self {
             Claim::Section(claim) => claim.to_string(),
-            Claim::LessOrganisedThanNext => "less organised than (ii)".into(),
-            Claim::DiffersFromNext => "(iii) and (iv) differ".into(),
+            Claim::LessOrganisedThanNext => format!("less organised than ({next})"),
+            Claim::DiffersFromNext => format!("({panel}) and ({next}) differ"),
         }
     }
 }
 
-/// Runs from neighbouring starts by which 6(i) and 6(ii) are compared.
+/// Runs from neighbouring starts by which the organisation of two panels is compared.
 const NEIGHBOURS: usize = 12;
 /// Distance between those starts.
 const NEIGHBOUR_SHIFT: f64 = 1e-10;
-/// 6(i) is less organised than 6(ii) if the means are so many standard errors of their difference
-/// apart.
+/// A panel is less organised than the next if the means are so many standard errors of their
+/// difference apart.
 const CLEARLY: f64 = 2.0;
 
 /// The comparisons of a panel with the next one from neighbouring starts, the paper's first.
@@ -196,13 +195,14 @@ pub fn judge(picture: &Picture, executor: &dyn Ask) -> Result<Vec<PanelVerdict>,
                 )
             }
         };
+        let next = picture.panels.get(i + 1).map_or("", |next| next.label.as_str());
         verdicts.push(PanelVerdict {
             picture: picture.name.clone(),
-            reading: picture.reading,
+            reading: picture.reading_name().map(str::to_owned),
             panel: panel.label.clone(),
             method: panel.run.method.name.name().to_owned(),
             claim,
-            claim_text: claim.text(),
+            claim_text: claim.text(&panel.label, next),
             found,
             agrees,
             because,

@@ -1,6 +1,6 @@
 //! Words and numbers for people: small print, in the renderer's rich-text markup.
 
-use super::Reading;
+use super::ParameterReading;
 use twofold_integrate::filippov::{ExitRule, Side, SlidingLaw};
 use twofold_integrate::{Kick, StepCap};
 use twofold_job::spec::{MethodSpec, RunSpec, SwitchSpec};
@@ -8,10 +8,18 @@ use twofold_render::markup;
 pub use twofold_render::number::number;
 use twofold_system::{Compiled, Relaxation, System, Transition};
 
-/// "reconstructed reading: *α* = 0.1, *β* = 10^{-5}".
-pub fn reading(reading: Reading) -> String {
-    let c = reading.caricature();
-    format!("{} reading: *α* = {}, *β* = {}", reading.word(), number(c.alpha), number(c.beta))
+/// "first reading: *α* = 0.1, *β* = 10^{-5}".
+pub fn reading(reading: &ParameterReading) -> String {
+    let parameters = parameters(reading);
+    let colon = if parameters.is_empty() { "" } else { ": " };
+    format!("{} reading{colon}{parameters}", reading.name)
+}
+
+/// "*α* = 0.1, *β* = 10^{-5}".
+pub fn parameters(reading: &ParameterReading) -> String {
+    let said =
+        |(name, value): &(String, f64)| format!("{} = {}", markup::name(name), number(*value));
+    reading.parameters.iter().map(said).collect::<Vec<_>>().join(", ")
 }
 
 /// The system and its parameters.
@@ -172,7 +180,7 @@ fn kicks(kick: &Kick) -> String {
 
 /// Settings that all runs of a picture have in common and those that differ, one line per subject,
 /// for its foot.
-pub fn small_print(reading: Option<Reading>, runs: &[&RunSpec]) -> Vec<String> {
+pub fn small_print(reading: Option<&str>, runs: &[&RunSpec]) -> Vec<String> {
     let all = |say: &dyn Fn(&RunSpec) -> Option<String>, join: &str| {
         let mut said: Vec<String> = Vec::new();
         for text in runs.iter().filter_map(|r| say(r)) {
@@ -184,7 +192,7 @@ pub fn small_print(reading: Option<Reading>, runs: &[&RunSpec]) -> Vec<String> {
     };
     let mut lines: Vec<Vec<String>> = vec![
         vec![
-            reading.map_or(String::new(), |r| format!("{} reading", r.word())),
+            reading.map_or(String::new(), |name| format!("{name} reading")),
             all(&|r| Some(system(&r.system)), "; "),
             all(&|r| Some(format!("*t* = 0 … {}", number(r.t_end))), "; "),
         ],

@@ -9,9 +9,10 @@ use super::chosen;
 use crate::cli::progress::Progress;
 use crate::cli::speak::print_json;
 use crate::cli::{CliError, Exit, in_pool, print};
+use crate::jeffrey_2013::study::verdict_table;
 use crate::job::Executor;
+use crate::paper::figures;
 use crate::paper::pipeline::{compute, questions};
-use crate::paper::{figures, verdict_table};
 use crate::record::manifest::VERSION;
 use crate::record::{self, Manifest};
 

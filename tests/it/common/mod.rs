@@ -9,6 +9,7 @@ use std::sync::OnceLock;
 
 use twofold::cli;
 use twofold::integrate::Schedule;
+use twofold::jeffrey_2013::reading::in_both_readings;
 use twofold::job::Executor;
 use twofold::job::spec::*;
 use twofold::paper::verdict::{Claim, SectionClaim};
@@ -18,7 +19,7 @@ use twofold::record::{Manifest, PictureEntry};
 
 /// Two pictures of two panels, as fig. 7 but short.
 pub fn small_figure(t_end: f64) -> Figure {
-    Figure::in_both_readings(
+    in_both_readings(
         "fig7",
         "A small figure",
         View::Section { horizontal: 0, vertical: 2 },

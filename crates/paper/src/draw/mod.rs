@@ -1,4 +1,4 @@
-//! Drawings of answers: sketches and surfaces made of plain data.
+//! Drawings of answers, and surfaces, made of plain data.
 //!
 //! ```
 //! use twofold_paper::draw::surface;
@@ -12,5 +12,4 @@
 pub mod level;
 pub mod plot;
 pub mod scan;
-pub mod sketch;
 pub mod surface;

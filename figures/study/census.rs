@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::Reading;
 use super::claims::Rules;
+use crate::Reading;
 use twofold_analyse::counts::{Homogeneity, goodman, homogeneity, wilson};
 use twofold_job::record::Manifest;
 use twofold_job::table::{Column, Entry, Table};

@@ -2,7 +2,7 @@
 //! `papers/jeffrey-2013/sentences.toml`, embedded.
 //!
 //! ```
-//! let claims = twofold_paper::claims::claims();
+//! let claims = twofold_jeffrey_2013::study::claims::claims();
 //! assert!(claims.sentence.iter().any(|s| s.id == "7.2" && s.quote.contains("period three")));
 //! ```
 

@@ -3,9 +3,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Reading;
 use super::census::{self, CensusPanel, CensusRun, Probability, Said};
 use super::claims::Rules;
+use crate::Reading;
 use twofold_job::table::{Column, Entry, Table};
 use twofold_num::elementary::{exp10, log10};
 use twofold_num::random::RandomStream;

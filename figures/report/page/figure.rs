@@ -2,13 +2,13 @@
 
 use std::fmt::Write as _;
 
-use super::super::html::{data_address, escape, identifier, rich};
 use super::super::model::*;
 use super::Links;
 use super::parts::*;
-use crate::compare::Comparison;
-use crate::wording;
 use twofold_job::record::{Layer, listed};
+use twofold_paper::compare::Comparison;
+use twofold_paper::html::{data_address, escape, identifier, rich};
+use twofold_paper::wording;
 
 pub(super) fn figure(html: &mut String, figure: &FigureReport, links: Links) {
     let id = figure_id(figure);

@@ -2,11 +2,11 @@
 
 use std::fmt::Write as _;
 
-use super::super::html::{escape, identifier, rich};
 use super::super::model::*;
 use super::parts::*;
 use crate::Reading;
-use crate::wording;
+use twofold_paper::html::{escape, identifier, rich};
+use twofold_paper::wording;
 
 pub(super) fn summary(html: &mut String, report: &Report) {
     let s = &report.summary;
@@ -24,8 +24,8 @@ pub(super) fn summary(html: &mut String, report: &Report) {
          against what the run shows by one rule, the same for both readings; a claim “differs” \
          when the run shows something else, not \
          when the run is wrong.</p>\n</div>",
-        rich(&parameters(Reading::Printed)),
-        rich(&parameters(Reading::Reconstructed)),
+        rich(&wording::parameters(&Reading::Printed.into())),
+        rich(&wording::parameters(&Reading::Reconstructed.into())),
     );
     if !report.problems.is_empty() {
         put!(html, "<div class=\"notice\"><p>Not everything could be read or found:</p>\n<ul>");
@@ -40,7 +40,7 @@ pub(super) fn summary(html: &mut String, report: &Report) {
             Some(r) => format!(
                 "{}<br/>{}",
                 capitalised(&format!("{} reading", r.word())),
-                rich(&parameters(r))
+                rich(&wording::parameters(&r.into()))
             ),
             None => "Figures with one reading".to_owned(),
         };
@@ -111,12 +111,6 @@ pub(super) fn summary(html: &mut String, report: &Report) {
     );
     claims(html, report);
     put!(html, "</section>");
-}
-
-/// "*α* = 10^{-3}, *β* = 10^{-5}": the reading without its name.
-pub(super) fn parameters(reading: Reading) -> String {
-    let text = wording::reading(reading);
-    text.split_once(": ").map_or(text.clone(), |(_, p)| p.to_owned())
 }
 
 /// A line of the table of claims: one claim, what each reading shows.

@@ -9,14 +9,15 @@ use serde_json::Value;
 
 use super::model::*;
 use super::{prose, space};
-use crate::compare;
-use crate::pipeline::{PanelRecord, TableRecord, pixel_hash};
-use crate::wording;
-use crate::{Camera, Figure, Reading};
+use crate::Reading;
 use twofold_job::Table;
 use twofold_job::encode::from_csv;
 use twofold_job::record::{FileBytes, FileError, Hash, Layer, Manifest, PictureEntry, files};
 use twofold_job::spec::Method;
+use twofold_paper::compare;
+use twofold_paper::pipeline::{PanelRecord, TableRecord, pixel_hash};
+use twofold_paper::wording;
+use twofold_paper::{Camera, Figure};
 use twofold_render::{Pixels, Shrink, decode_png, encode_preview, shrunk};
 
 /// The record beside a picture. Verdicts are read loosely: their evidence may hold numbers that

@@ -4,13 +4,13 @@
 
 use std::fmt::Write as _;
 
-use super::Reading;
 use super::capture::time;
 use super::census::{
     self, CensusPanel, CensusRun, MotionKind, PANELS, p_in_words, percent, supporting, tally,
 };
 use super::claims::Rules;
 use super::effects::{self, LogRank};
+use crate::Reading;
 use twofold_analyse::counts::{homogeneity, wilson};
 use twofold_job::table::{Entry, Table};
 
@@ -216,8 +216,8 @@ fn short(p: f64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::claims::claims;
     use super::*;
-    use crate::claims::claims;
 
     #[test]
     fn whose_an_outcome_is() {

@@ -19,9 +19,9 @@ use std::fmt::Write as _;
 use sha2::{Digest, Sha256};
 
 use self::parts::{figure_id, figure_name};
-use super::html::{address, base64, escape};
 use super::model::*;
 use super::names;
+use twofold_paper::html::{address, base64, escape};
 
 const STYLE: &str = include_str!("../page.css");
 const SCRIPT: &str = include_str!("../page.js");

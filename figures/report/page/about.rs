@@ -3,10 +3,10 @@
 use std::fmt::Write as _;
 
 use super::super::archive::{PROCEEDINGS, RELEASE_DATE};
-use super::super::html::escape;
 use super::super::model::*;
 use super::super::{names, prose, rules};
 use super::parts::*;
+use twofold_paper::html::escape;
 
 /// Section with the findings, in sentences.
 pub(super) fn findings(html: &mut String, report: &Report) {

@@ -5,8 +5,9 @@ use serde_json::{Value, json};
 use super::model::Report;
 use twofold_analyse::attractor::Thresholds;
 
-/// Rules by which a claim is held against a finding: [`Claim::score`](crate::claim::Claim::score),
-/// and the two kinds of claim about paths in space.
+/// Rules by which a claim is held against a finding:
+/// [`Claim::score`](twofold_paper::claim::Claim::score), and the two kinds of claim about paths in
+/// space.
 pub const CLAIMS: [(&str, &str); 6] = [
     (
         "periodic, period k",
@@ -104,7 +105,7 @@ pub fn thresholds(report: &Report) -> (Vec<(String, String, &'static str)>, bool
         .collect();
     let own = json!(Thresholds::default());
     let values = used.first().copied().unwrap_or(&own);
-    let rules = &crate::claims::claims().rules;
+    let rules = &crate::study::claims::claims().rules;
     let fixed = json!({ "shown_from": rules.shown_from, "end": rules.end });
     let rows = THRESHOLDS.iter().filter_map(|(name, meaning)| {
         let value = values.get(name).or_else(|| fixed.get(name))?;

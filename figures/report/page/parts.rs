@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
-use super::super::html::{escape, identifier};
 use super::super::model::*;
 use crate::Reading;
+use twofold_paper::html::{escape, identifier};
 
 /// "Figure 7" for fig7, the folder's name with a capital for others.
 pub(super) fn figure_name(id: &str) -> String {

@@ -3,11 +3,11 @@
 
 use nalgebra::vector;
 
-use super::super::surface;
 use super::{lines_of, lines_table};
 use twofold_integrate::filippov::{ExitRule, FilippovOptions, Mode, Side, Trajectory, run};
 use twofold_job::JobError;
 use twofold_job::table::Table;
+use twofold_paper::draw::surface;
 use twofold_render::Sheet;
 use twofold_render::number::number;
 use twofold_render::sheet::{

@@ -4,11 +4,11 @@
 
 use std::fmt::Write as _;
 
-use super::Reading;
 use super::audit::{self, Cell, Sweeps};
 use super::census::{self, CensusRun, MotionKind, PANELS, tally};
 use super::claims::Rules;
 use super::effects::{self, Estimate, LogRank, Time};
+use crate::Reading;
 use twofold_analyse::counts::wilson;
 use twofold_job::table::{Column, Entry, Table};
 use twofold_num::elementary::{exp10, log10};

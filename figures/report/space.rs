@@ -7,10 +7,10 @@
 
 use serde_json::{Value, json};
 
-use super::html::base64;
-use crate::draw::surface;
-use crate::{Camera, Figure, View};
 use twofold_job::Table;
+use twofold_paper::draw::surface;
+use twofold_paper::html::base64;
+use twofold_paper::{Camera, Figure, View};
 use twofold_render::number::number;
 use twofold_render::sheet::{SpacePanel, range_of};
 use twofold_render::{clip_polygon, markup, style, ticks};
@@ -320,7 +320,7 @@ mod tests {
 
     #[test]
     fn only_figures_in_space_have_views() {
-        let figures = crate::figures::all();
+        let figures = crate::all();
         let known: Vec<&str> =
             figures.iter().map(|f| &*f.id).filter(|id| camera(&figures, id).is_some()).collect();
         assert_eq!(known, ["fig4"]);

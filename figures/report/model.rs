@@ -5,10 +5,10 @@ use serde_json::Value;
 
 use super::space::SpaceView;
 use crate::Reading;
-use crate::compare::Comparison;
 use twofold_integrate::Statistics;
 use twofold_job::record::{Hash, Layer, PictureEntry};
 use twofold_job::spec::RunSpec;
+use twofold_paper::compare::Comparison;
 
 /// Version of the report's JSON.
 pub const VERSION: u32 = 1;

@@ -1,5 +1,5 @@
-//! Digests the figures' own code and data, on which the answers depend that a figure computes
-//! itself (src/study.rs).
+//! Digests the figures' code and data, on which the answers depend that a figure computes by itself
+//! (computed.rs).
 
 use std::path::Path;
 
@@ -10,18 +10,20 @@ fn main() -> std::io::Result<()> {
 }
 
 fn figures() -> std::io::Result<String> {
-    let root = Path::new("../..");
-    if !root.join("figures/fig1").is_dir() {
+    let root = Path::new("..");
+    if !root.join("papers/jeffrey-2013").is_dir() {
         // A published package: its version names the sources.
         return Ok(format!("version {}", env!("CARGO_PKG_VERSION")));
     }
     let mut sources = twofold_digest::Sources::default();
     // Pages and comparisons are made of answers; hashes are what answers are compared with.
-    let above = ["crates/paper/src/report/", "crates/paper/src/compare/"];
-    sources.add(root, "crates/paper/src", |file| !above.iter().any(|a| file.starts_with(a)))?;
-    let inputs = [".rs", ".csv", ".toml"];
+    let above = ["figures/report/", "crates/paper/src/compare/", "crates/paper/src/html.rs"];
+    let above = |file: &str| above.iter().any(|a| file.starts_with(a));
+    sources.add(root, "crates/paper/src", |file| !above(file))?;
+    let (inputs, programs) = ([".rs", ".csv", ".toml"], ["/main.rs", "/build.rs"]);
     sources.add(root, "figures", |file| {
-        inputs.iter().any(|e| file.ends_with(e)) && !file.ends_with("/main.rs")
+        let is = |ends: &[&str]| ends.iter().any(|e| file.ends_with(e));
+        is(&inputs) && !is(&programs) && !above(file)
     })?;
     // Rules and readings of the paper; what its figures ask is in their questions.
     sources.add(root, "papers/jeffrey-2013", |file| {

@@ -3,8 +3,8 @@
 
 use twofold_analyse::counts::wilson;
 
-use super::Reading;
 use super::claims::claims;
+use crate::Reading;
 
 /// The switching rule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

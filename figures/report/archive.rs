@@ -4,9 +4,9 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 
 use super::assemble::{MadeFile, media_type};
-use super::html::address;
 use super::model::{Report, indented};
 use super::names;
+use twofold_paper::html::address;
 use twofold_render::read_provenance;
 
 /// Date of the release, as CITATION.cff has it. RO-Crate asks for a date of publication; a clock
@@ -15,6 +15,9 @@ pub const RELEASE_DATE: &str = "2026-11-21";
 
 /// Address of the program's documentation, as in Cargo.toml.
 const DOCUMENTATION: &str = "https://docs.rs/twofold-dynamics";
+
+/// The program in a line.
+const SOFTWARE: &str = "A paper's figures, claims and verdicts, and the report about them";
 
 /// The licence of program and pictures, either of two: address, name, what it allows in a line.
 const LICENCES: [(&str, &str, &str); 2] = [
@@ -93,7 +96,7 @@ pub fn archive(report: &Report, made: &[MadeFile], added: &[(&str, &[u8])]) -> V
             "name": "twofold",
             "version": env!("CARGO_PKG_VERSION"),
             "softwareVersion": env!("CARGO_PKG_VERSION"),
-            "description": env!("CARGO_PKG_DESCRIPTION"),
+            "description": SOFTWARE,
             "programmingLanguage": "Rust",
             "author": { "@id": "#authors" },
             "license": LICENCES.map(|(id, _, _)| json!({ "@id": id })),

@@ -7,7 +7,7 @@
 //! same bytes: no clock, no path of the machine.
 //!
 //! ```
-//! use twofold_paper::report::{Links, MadeFile, Program, assemble, page};
+//! use twofold_jeffrey_2013::report::{Links, MadeFile, Program, assemble, page};
 //! // No record vouches for this file, so it counts for nothing.
 //! let file = MadeFile::of("own/table.csv".into(), b"t,x\n".to_vec());
 //! let report = assemble(&[file], &[], &Program { figures: &[], findings: "", odds: "" });
@@ -17,7 +17,6 @@
 
 mod archive;
 mod assemble;
-mod html;
 mod model;
 mod page;
 mod prose;
@@ -26,7 +25,6 @@ mod space;
 
 pub use archive::{RELEASE_DATE, archive};
 pub use assemble::{MadeFile, Program, assemble};
-pub use html::escape;
 pub use model::*;
 pub use page::{Links, page};
 pub use space::SpaceView;

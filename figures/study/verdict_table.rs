@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::Reading;
+use crate::Reading;
 use twofold_job::record::{Manifest, PanelEntry, VerdictEntry};
 
 /// Stands before the table.
