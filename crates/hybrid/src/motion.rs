@@ -444,6 +444,8 @@ struct Follower<'a> {
     /// Of each watched expression whose contact has opened, and that is zero to rounding since, by
     /// how much it may be beyond zero; else zero.
     released: Vec<f64>,
+    /// Whether each watched expression had no speed where it left zero.
+    tangent: Vec<bool>,
     /// The watched expression that leaves zero in the present step, with its rounding there.
     leaves: Option<(usize, f64)>,
     /// Of each guard whose zero was slid upon until now, by how much the speeds of its two sides
@@ -515,7 +517,12 @@ pub fn follow_watched(
 /// # Errors
 /// If the equations are not complete, or the motion is not decided there.
 pub fn starts_on_an_event(model: &Model, options: &Options) -> Result<bool, HybridError> {
-    Ok(Follower::new(model, options)?.fresh_watch.iter().any(|fresh| *fresh))
+    let follower = Follower::new(model, options)?;
+    let asked = |event: usize| {
+        model.definition().events()[event].from.is_none_or(|mode| mode == follower.config.mode)
+    };
+    let fresh = follower.fresh_watch.iter().zip(&follower.event_of);
+    Ok(fresh.into_iter().any(|(fresh, event)| *fresh && event.is_none_or(asked)))
 }
 
 /// [`follow_watched`], and whether the motion at a finished run's end rests: whether it goes on for
@@ -761,6 +768,7 @@ impl<'a> Follower<'a> {
             held: vec![false; watched],
             fresh_guard: vec![false; guards],
             fresh_watch: vec![false; watched],
+            tangent: vec![false; watched],
             released: vec![0.0; watched],
             leaves: None,
             left: vec![0.0; guards],
@@ -799,8 +807,17 @@ impl<'a> Follower<'a> {
             options,
         };
         follower.settle_afresh(&[])?;
+        if !follower.sliding.is_empty() {
+            follower.variables[..n].copy_from_slice(&follower.x);
+            follower.variables[n] = follower.t;
+            let mut field = vec![0.0; n];
+            follower.compiled.field.evaluate(&follower.variables, &mut field);
+            if !field.iter().all(|f| f.is_finite()) {
+                return Err(follower.left_domain(t0, &follower.x.clone()));
+            }
+        }
         for watched in 0..follower.watch_side.len() {
-            follower.begin_watching(watched, false);
+            follower.begin_watching(watched, false, false);
         }
         follower.new_conditions(model.definition());
         follower.rest_at_start();
@@ -1011,6 +1028,10 @@ impl<'a> Follower<'a> {
                 }
                 self.keep(&mut step);
                 continue;
+            }
+            // Sliding ends, and goes on behind a switch, on its surface.
+            if !self.sliding.is_empty() {
+                self.project();
             }
             quiet = if progress { 0 } else { quiet + 1 };
             if quiet > 40 {

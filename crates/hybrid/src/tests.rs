@@ -1729,6 +1729,114 @@ fn last(text: &str, t_end: f64) -> f64 {
     *end(text, t_end).last().unwrap()
 }
 
+/// What leaves zero without a speed, or with one that only rounding makes, is no event at once: an
+/// oscillator let go, a ball laid down, friction and a diode as automata, whose modes begin where
+/// force and friction, or both voltages, are equal.
+#[test]
+fn events_that_are_left_without_a_speed_wait() {
+    let osc = "states = ['x', 'v', 'n']\nstart = [1, 0, 0]\nf = ['v', '-x', '0']\n\
+        [[event]]\nwhen = 'x - 1'\nset = { n = 'n + 1' }";
+    let up = "states = ['x', 'v', 'n']\nstart = [0, 1, 0]\nf = ['v', '-x', '0']\n\
+        [[event]]\nwhen = 'v - 1'\ndirection = 'up'\nset = { n = 'n + 1' }";
+    let laid = |g: &str| {
+        format!(
+            "states = ['x', 'v', 'n']\nstart = [0, 0, 0]\nf = ['v', '-{g}', '0']\n\
+             [[event]]\nwhen = 'x'\ndirection = 'down'\nset = {{ n = 'n + 1' }}\n\
+             [[event]]\nevery = 1\nset = {{ x = '0', v = '0' }}"
+        )
+    };
+    let friction = |force: &str| {
+        format!(
+            "states = ['v', 'x']\nstart = [0, 0]\n[let]\nF = '{force}*sin(t)'\n\
+             [modes.stick]\nf = ['0', '0']\n[modes.fwd]\nf = ['F-1', 'v']\n\
+             [modes.back]\nf = ['F+1', 'v']\n\
+             [[event]]\nwhen = 'F > 1'\nfrom = 'stick'\nmode = 'fwd'\n\
+             [[event]]\nwhen = 'F < -1'\nfrom = 'stick'\nmode = 'back'\n\
+             [[event]]\nwhen = 'v'\ndirection = 'down'\nfrom = 'fwd'\nmode = 'stick'\n\
+             set = {{ v = '0' }}\n\
+             [[event]]\nwhen = 'v'\ndirection = 'up'\nfrom = 'back'\nmode = 'stick'\n\
+             set = {{ v = '0' }}"
+        )
+    };
+    let one = "states = ['v', 'x']\nstart = [0, 0]\nf = ['1.2*sin(t) - sign(v)', 'v']";
+    let diode = "states = ['i']\nstart = [0]\n[modes.on]\nf = ['(sin(t)-i)/0.5']\n\
+        [modes.off]\nf = ['0']\n\
+        [[event]]\nwhen = 'i'\ndirection = 'down'\nfrom = 'on'\nmode = 'off'\nset = { i = '0' }\n\
+        [[event]]\nwhen = 'sin(t)'\ndirection = 'up'\nfrom = 'off'\nmode = 'on'";
+    for method in Method::ALL {
+        let last = |text: &str, t_end: f64| *end_of(text, t_end, method).unwrap().last().unwrap();
+        assert_eq!(last(osc, 3.0), 0.0, "{method:?}");
+        assert_eq!(last(up, 3.0), 0.0, "{method:?}");
+        for g in ["0.3", "1", "9.81"] {
+            assert_eq!(last(&laid(g), 10.5), 0.0, "{method:?} {g}");
+        }
+        for force in ["1.2", "1.4", "1.05"] {
+            let equation = one.replace("1.2", force);
+            near(last(&friction(force), 60.3), last(&equation, 60.3), 1e-9);
+        }
+        // SciPy's DOP853 at 1e-13, piece by piece.
+        near(last(diode, 46.0), 0.9013732587, 1e-8);
+        near(
+            last(
+                &diode.replace("'sin(t)'", "'sin(t) > 0'").replace("direction = 'up'\n", ""),
+                46.0,
+            ),
+            0.9013732587,
+            1e-8,
+        );
+    }
+}
+
+/// A clip meets its end while the motion slides on a level of a curved step, or on a surface that
+/// turns: methods with other steps agree on where they come to.
+#[test]
+fn sliding_goes_on_behind_a_switch_of_something_else() {
+    let level = "states = ['x', 'y']\nstart = [1.1, 0.15]\n\
+        f = ['0.5*cos(3*t) - 0.7*floor(2*(x^2+y^2-1)) - x', \
+             '-x - 1.5*clip(5*(y-0.5*cos(2*t)),-1,1) - 0.2*x*y']";
+    let turning = "states = ['x', 'y']\nstart = [-0.8, -0.6]\n\
+        f = ['-y + 1.5*clip(5*(x+y-sin(3*t)),-1,1) + 1', \
+             '-0.4 - 2*sign(y+x*sin(t)) + 0.5*cos(3*t)']";
+    for method in Method::ALL {
+        for (text, want) in
+            [(level, [0.60245048133, -0.55249675990]), (turning, [-4.07864258807, 2.37751067623])]
+        {
+            let found = end_of(text, 8.0, method).unwrap();
+            near(found[0], want[0], 1e-8);
+            near(found[1], want[1], 1e-8);
+        }
+    }
+}
+
+/// No motion slides where the fields have no value.
+#[test]
+fn nothing_slides_outside_of_a_domain() {
+    for f in ["-sign(x) + ln(x - 0.1)", "sign(x) + sqrt(x - 0.1)"] {
+        let text = format!("states = ['x']\nstart = [0]\nf = ['{f}']");
+        for method in Method::ALL {
+            let error = end_of(&text, 3.0, method).unwrap_err();
+            assert!(error.contains("leaves the domain"), "{error}");
+        }
+    }
+}
+
+/// Sliding on a moving surface ends where it moves faster than both fields, to second order: at
+/// cos t = -a on x = sin t, for x' = -a sign(x - sin t).
+#[test]
+fn sliding_leaves_a_moving_surface() {
+    for method in Method::ALL {
+        for (a, rtol) in
+            [(0.5, 1e-9), (0.5, 1e-10), (0.5, 1e-12), (0.6, 1e-10), (0.7, 1e-10), (0.9, 1e-10)]
+        {
+            let text = format!("states = ['x']\nstart = [0]\nf = ['-{a}*sign(x - sin(t))']");
+            let options = Options { t_end: 2.8, rtol, method, ..Options::default() };
+            let outcome = follow(&model(&text), &options, &mut |_| true).unwrap();
+            let leaves = f64::acos(-a);
+            near(outcome.x[0], leaves.sin() - a * (2.8 - leaves), 1e-7);
+        }
+    }
+}
+
 /// Dips of a smooth function that are far narrower than a step: pulses, events, sliding between two
 /// surfaces.
 #[test]

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 use twofold_analyse::branch::{self, BranchOptions, End, Newton, Orbit, ReturnMap, Trouble};
 use twofold_analyse::floquet::Returned;
 use twofold_hybrid::motion::tangent::{Return, closed_orbit, once_around};
-use twofold_hybrid::motion::{Record, starts_on_an_event};
+use twofold_hybrid::motion::{Outcome, Record, starts_on_an_event};
 use twofold_hybrid::rests::rests;
 use twofold_hybrid::{Ending, HybridError, Model, Options, follow};
 use twofold_integrate::Monitor;
@@ -102,7 +102,15 @@ impl Question for GeneralOrbit {
                 }
             }
         }
-        let found = closed_orbit(&model, &options, &self.after)?;
+        let strobe = match self.after {
+            Return::Period(period) => Strobe::new(&model, &mut options, period)?,
+            Return::Crossings(_) => None,
+        };
+        let mut found = closed_orbit(&model, &options, &self.after)?;
+        let found_here = found.x.clone();
+        if let Some(strobe) = &strobe {
+            found.x = strobe.reached(&model, &options, found.x)?;
+        }
         let mut answer = Answer::of_tables(Vec::new())
             .with_fact("states", &model.coordinates())
             .with_fact("point", &found.x)
@@ -126,9 +134,9 @@ impl Question for GeneralOrbit {
             Some(start) => size(start),
             None => model.start().ok().flatten().map_or(0.0, |start| size(&start)),
         };
-        let now = size(&found.x);
+        let now = size(&found_here);
         let size = [now, began, 1.0].into_iter().find(|s| *s > ROUNDED * began && *s > 0.0);
-        let guess: Vec<f64> = found.x.into_iter().chain([0.0]).collect();
+        let guess: Vec<f64> = found_here.into_iter().chain([0.0]).collect();
         let first = branch::closed_orbit(&map, &guess, along.from, newton)
             .map_err(|trouble| HybridError::NoOrbit(trouble.said))?;
         let width = (along.to - along.from).abs();
@@ -149,6 +157,10 @@ impl Question for GeneralOrbit {
         }
         for orbit in &mut found.orbits {
             orbit.point.pop();
+            if let Some(strobe) = &strobe {
+                let model = at(&model, along, orbit.parameter)?;
+                orbit.point = strobe.reached(&model, &map.options, orbit.point.clone())?;
+            }
             if let Return::Crossings(_) = self.after {
                 // The one along the field is none of the orbit's.
                 orbit.multipliers.pop();
@@ -157,6 +169,61 @@ impl Question for GeneralOrbit {
         answer.tables.extend(branch_tables(&along.parameter, &model.coordinates(), &found));
         Ok(answer.with_fact("end", &found.end))
     }
+}
+
+/// The moment at which periods are counted, where an event comes then: what is zero at a start is
+/// not met there, so that each period would lose the event. Orbits are sought a little later, and
+/// followed on to this moment.
+struct Strobe {
+    /// Time from the later start on until the moment comes again.
+    left: f64,
+}
+
+impl Strobe {
+    /// Moves the start behind the event, if one is there.
+    fn new(model: &Model, options: &mut Options, period: f64) -> Result<Option<Self>, HybridError> {
+        for times in 0..=LONGER {
+            let later = f64::from(times) * LONGER_BY * period;
+            let mut moved = options.clone();
+            if times > 0 {
+                let end = part(model, options, later)?;
+                (moved.start, moved.mode) = (Some(end.x), end.mode);
+                moved.t_start += later;
+            }
+            if starts_on_an_event(model, &moved)? {
+                continue;
+            }
+            if times > 0 {
+                // The event that was lost at the beginning may lead to another mode.
+                let end = part(model, &moved, period)?;
+                (moved.start, moved.mode) = (Some(end.x), end.mode);
+            }
+            *options = moved;
+            return Ok((times > 0).then_some(Self { left: period - later }));
+        }
+        Ok(None)
+    }
+
+    /// The state at the moment, of an orbit with this state at the later start.
+    fn reached(
+        &self,
+        model: &Model,
+        options: &Options,
+        x: Vec<f64>,
+    ) -> Result<Vec<f64>, HybridError> {
+        let from = Options { start: Some(x), ..options.clone() };
+        Ok(part(model, &from, self.left)?.x)
+    }
+}
+
+/// Motion for a time, without rows.
+fn part(model: &Model, options: &Options, time: f64) -> Result<Outcome, HybridError> {
+    let options = Options {
+        t_end: options.t_start + time,
+        record: Record::Times { every: f64::INFINITY },
+        ..options.clone()
+    };
+    follow(model, &options, &mut |_| true)
 }
 
 /// The system at a value of the parameter.
@@ -458,6 +525,27 @@ mod tests {
             assert!(word == "period-doubling" && (at - right).abs() <= within, "{at} {within}");
             assert!(within < 1e-6, "{within}");
         }
+    }
+
+    /// An event at the moment at which periods are counted is in each of them: x' = -x and one more
+    /// where sin 2 pi t rises through zero has x = 1/(e - 1) before it, and the multiplier 1/e; a
+    /// diode has a current that is set to zero once a period.
+    #[test]
+    fn an_event_at_the_counted_moment_is_not_lost() {
+        let strobe = "states = ['x']\nstart = [0]\nf = ['-x']\n[[event]]\n\
+            when = 'sin(2*pi*t)'\ndirection = 'up'\nset = { x = 'x + 1' }";
+        let found = branch(strobe, 1.0, 20.0, None);
+        let point: Vec<f64> = found.fact("point").unwrap();
+        let multipliers: Vec<[f64; 2]> = found.fact("multipliers").unwrap();
+        assert!((point[0] - 1.0 / 1.0_f64.exp_m1()).abs() < 1e-9, "{point:?}");
+        assert!((multipliers[0][0] - (-1.0_f64).exp()).abs() < 1e-8, "{multipliers:?}");
+        let diode = "states = ['i']\nstart = [0]\n[modes.on]\nf = ['(sin(2*pi*t)-i)/0.5']\n\
+            [modes.off]\nf = ['0']\n[[event]]\nwhen = 'i'\ndirection = 'down'\nfrom = 'on'\n\
+            mode = 'off'\nset = { i = '0' }\n[[event]]\nwhen = 'sin(2*pi*t)'\n\
+            direction = 'up'\nfrom = 'off'\nmode = 'on'";
+        let multipliers: Vec<[f64; 2]> =
+            branch(diode, 1.0, 20.0, None).fact("multipliers").unwrap();
+        assert_eq!(multipliers, [[0.0, 0.0]]);
     }
 
     /// x = sqrt(p - 1) of p x - x^3 turns at p = 1, where x = 0 crosses it.

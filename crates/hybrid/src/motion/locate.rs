@@ -6,6 +6,10 @@ use super::*;
 /// its expression's terms times its bend.
 const MAY_HIDE: f64 = 1e3;
 
+/// The speed of a surface that sliding has just left is zero there: what a step's interpolant makes
+/// of it is less than this share of the speeds on its two sides.
+const TANGENT: f64 = 1e-3;
+
 impl Follower<'_> {
     /// First condition met in a step, with its place and all others in the same part of the step;
     /// `last` takes the values at the end of the search.
@@ -78,11 +82,12 @@ impl Follower<'_> {
                 found.extend((theta <= 1.0).then_some((theta, *sought)));
                 return Some(end);
             }
-            let first = if change == 0.0 {
-                first_of_polynomial(v, *side)
-            } else {
-                let (begin, f) = (b[0], |theta| at_fraction(&b, theta) - theta * change);
-                first_behind_tangent(*side, 0.0, 1.0, &mut |theta| f(theta) - begin)
+            let first = match change {
+                None => first_of_polynomial(v, *side),
+                Some(change) => {
+                    let (begin, f) = (b[0], |theta| at_fraction(&b, theta) - theta * change);
+                    first_behind_tangent(*side, 0.0, 1.0, &mut |theta| f(theta) - begin)
+                }
             };
             found.extend(first.map(|theta| (theta, *sought)));
             Some(end)
@@ -91,23 +96,31 @@ impl Follower<'_> {
     }
 
     /// Puts the values, at [`PLACES`] of a time `h`, of a function that has just left zero, or that
-    /// rounding has beyond it, to zero at the beginning. Returns the change in that time by the
-    /// slope there, if only rounding makes this slope: the function leaves zero to second order.
-    fn begin_at_zero(&mut self, sought: Sought, side: f64, h: f64, v: &mut [f64; 5]) -> f64 {
-        if !(self.is_fresh(sought) || v[0] * side < 0.0) {
-            return 0.0;
+    /// rounding has beyond it, to zero at the beginning. If it leaves zero to second order, returns
+    /// the change in that time by the slope there that rounding or the step's error makes, as far
+    /// as it leads away from its side.
+    fn begin_at_zero(
+        &mut self,
+        sought: Sought,
+        side: f64,
+        h: f64,
+        v: &mut [f64; 5],
+    ) -> Option<f64> {
+        let fresh = self.is_fresh(sought);
+        if !(fresh || v[0] * side < 0.0) {
+            return None;
         }
         v[0] = 0.0;
         let change = slope_at_beginning(v);
-        if !(change * side < 0.0) {
-            return 0.0;
+        let left = if fresh { self.left(sought) } else { 0.0 };
+        let tangent = self.is_tangent(sought) || change.abs() < TANGENT * h * left;
+        if !(tangent || change * side < 0.0) {
+            return None;
         }
-        let Some(place) = self.place_of(sought) else { return 0.0 };
+        let place = self.place_of(sought)?;
         let terms = self.rates(&self.config.clone()).1.terms;
-        if change.abs() > SMALLEST_SLOPE * h * terms[place].max(self.left(sought)) {
-            return 0.0;
-        }
-        change
+        let slope = SMALLEST_SLOPE * terms[place].max(self.left(sought));
+        (tangent || change.abs() <= h * slope).then_some(side * (side * change).min(0.0))
     }
 
     /// The place in a step of this length where a flight that rounding hides ends, as its parabola
@@ -151,6 +164,11 @@ impl Follower<'_> {
         }
     }
 
+    /// Whether what is sought left zero without a speed.
+    fn is_tangent(&self, sought: Sought) -> bool {
+        matches!(sought, Sought::Watched(i) if self.is_fresh(sought) && self.tangent[i])
+    }
+
     /// Adds the first zero of each function's Taylor series; returns the values at the step's end
     /// where there is a series.
     fn find_in_series(
@@ -175,6 +193,9 @@ impl Follower<'_> {
             let begins = (self.is_fresh(*sought) && !far && allowance == 0.0).then(|| {
                 let terms =
                     self.place_of(*sought).and_then(|place| terms.get(place)).unwrap_or(&0.0);
+                if self.is_tangent(*sought) {
+                    return f64::INFINITY;
+                }
                 SMALLEST_SLOPE * step.h * terms.max(self.left(*sought))
             });
             let one = [(*sought, *side)];
@@ -219,11 +240,10 @@ impl Follower<'_> {
                 let allowance = self.allowance(*sought, *side);
                 v.iter_mut().for_each(|v| *v += allowance);
                 let begins = from == 0.0 && allowance == 0.0;
-                let change = if begins {
-                    self.begin_at_zero(*sought, *side, to * step.h, &mut v) / to
-                } else {
-                    0.0
-                };
+                let change = begins
+                    .then(|| self.begin_at_zero(*sought, *side, to * step.h, &mut v))
+                    .flatten()
+                    .map(|change| change / to);
                 if v.iter().any(|v| v.is_nan()) {
                     // Weights of sliding where there are none: shorter steps find the place.
                     if matches!(sought, Sought::Leave { .. } | Sought::Repelling) {
@@ -251,13 +271,14 @@ impl Follower<'_> {
                     }
                     step.at(theta, &mut at);
                     self.measure(&one, step.t + theta * step.h, &at, &mut value);
-                    value[0] + allowance - theta * change
+                    value[0] + allowance - theta * change.unwrap_or(0.0)
                 };
-                let first = if change == 0.0 {
-                    first(v, *side, from, to, &mut f, 0)
-                } else {
-                    let begin = f(from);
-                    first_behind_tangent(*side, from, to, &mut |theta| f(theta) - begin)
+                let first = match change {
+                    None => first(v, *side, from, to, &mut f, 0),
+                    Some(_) => {
+                        let begin = f(from);
+                        first_behind_tangent(*side, from, to, &mut |theta| f(theta) - begin)
+                    }
                 };
                 found.extend(first.map(|theta| (theta, *sought)));
             }

@@ -137,7 +137,7 @@ impl Follower<'_> {
             let old = self.watch_side[i];
             self.watch_side[i] = -old;
             self.fresh_watch[i] = true;
-            self.released[i] = 0.0;
+            (self.released[i], self.tangent[i]) = (0.0, false);
         }
         jumps.iter().for_each(|(i, away)| self.fresh_watch[*i] = !away);
         fired.extend(self.new_conditions(definition));
@@ -160,6 +160,7 @@ impl Follower<'_> {
             self.contacts.retain(|c| c.watched != contact.watched);
             self.watch_side[contact.watched] = contact.above;
             self.fresh_watch[contact.watched] = true;
+            self.tangent[contact.watched] = false;
             let (compiled, rates) = self.rates(&self.config.clone());
             let speeds = rates.terms[compiled.active.len() + contact.watched];
             let e = &self.equation.watched[contact.watched];
@@ -306,7 +307,8 @@ impl Follower<'_> {
             let struck = self.keep_contacts(definition, &old);
             for i in 0..self.watch_side.len() {
                 if !self.contacts.iter().any(|c| c.watched == i) {
-                    self.begin_watching(i, watched.contains(&i));
+                    let met = self.event_of[i].is_some_and(|event| fired.contains(&event));
+                    self.begin_watching(i, watched.contains(&i), met);
                 }
             }
             for i in &watched {

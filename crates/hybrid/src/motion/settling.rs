@@ -1187,7 +1187,7 @@ impl Follower<'_> {
             }
             let away = value.abs() > 1e-12 * self.magnitude(&self.equation.watched[i]);
             let leaves = held[i] && !away && {
-                self.begin_watching(i, true);
+                self.begin_watching(i, true, false);
                 let ahead = std::mem::replace(&mut self.watch_side[i], side);
                 let left = self.left_watch[i];
                 if left != 0.0 { left * side < 0.0 } else { ahead == -side }
@@ -1200,10 +1200,11 @@ impl Follower<'_> {
         found
     }
 
-    /// Finds the side of a watched expression; `zero`: it is zero here, whatever rounding says.
-    pub(super) fn begin_watching(&mut self, i: usize, zero: bool) {
+    /// Finds the side of a watched expression; `zero`: it is zero here, whatever rounding says;
+    /// `met`: its own event has just acted, so that its speed is that event's, however small.
+    pub(super) fn begin_watching(&mut self, i: usize, zero: bool, met: bool) {
         let place = self.compiled.active.len() + i;
-        self.released[i] = 0.0;
+        (self.released[i], self.tangent[i]) = (0.0, false);
         if !zero {
             let value = self.watched_values()[place];
             if value.abs() > 1e-14 * self.magnitude(&self.equation.watched[i]) {
@@ -1226,15 +1227,27 @@ impl Follower<'_> {
                 slope += change;
                 terms += change.abs();
             }
-            if slope.abs() > 1e-11 * terms {
+            if met && slope.abs() > 1e-11 * terms {
                 self.watch_side[i] = slope.signum();
                 return;
             }
         }
-        let config = self.config.clone();
-        let (_, rates) = self.rates(&config);
+        let (_, mut rates) = self.rates_of_second_order(&self.config.clone());
+        let (slope, bend) = (rates.first_or_zero(place), rates.second[place]);
+        if !met && slope.abs() <= self.rounding_of_slope(i, bend) {
+            rates.first[place] = 0.0;
+        }
+        self.tangent[i] = !met && rates.first_or_zero(place) == 0.0;
         let direction = rates.direction(place);
         self.watch_side[i] = if direction == 0.0 { self.side_ahead(place) } else { direction };
+    }
+
+    /// By how much the speed of a watched expression that bends so may be off where its time is: as
+    /// much as it changes in some roundings of the time, and in those of the time in which the
+    /// expression would move by its size.
+    fn rounding_of_slope(&self, i: usize, bend: f64) -> f64 {
+        let size = self.magnitude(&self.equation.watched[i]);
+        64.0 * f64::EPSILON * self.t.abs() * bend.abs() + 1e-13 * (2.0 * size * bend.abs()).sqrt()
     }
 
     /// The side to which a watched value of third order or more leaves zero: it grows by more than

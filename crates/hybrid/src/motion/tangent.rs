@@ -938,7 +938,7 @@ fn turn(
     }
     let mut follower = Follower::new(model, &settings)?;
     if on_section && matches!(after, Return::Crossings(_)) {
-        follower.begin_watching(follower.equation.watched.len() - 1, true);
+        follower.begin_watching(follower.equation.watched.len() - 1, true, false);
     }
     let unit = |j: usize| {
         let mut v = vec![0.0; n];
