@@ -4,17 +4,17 @@
 
 use std::sync::Arc;
 
-use twofold::job::sweep::Rows;
-use twofold::job::table::Table;
-use twofold::job::{AnyQuestion, JobError};
-use twofold::num::elementary::sqrt;
+use crate::Reading;
+use crate::computed::Computed;
 use crate::study::audit::{self, Candidate, Cell, PRIORS};
 use crate::study::capture;
 use crate::study::census;
 use crate::study::claims::claims;
-use crate::computed::Computed;
+use twofold::job::sweep::Rows;
+use twofold::job::table::Table;
+use twofold::job::{AnyQuestion, JobError};
+use twofold::num::elementary::sqrt;
 use twofold::paper::wording::number;
-use crate::Reading;
 use twofold::paper::{Figure, Picture, Study, Support, View};
 use twofold::record::Hash;
 use twofold::render::sheet::*;

@@ -3,12 +3,12 @@
 
 use std::sync::Arc;
 
+use crate::computed::Computed;
+use crate::reading::{Reading, studied_in_both_readings};
+use crate::study::census::{self, MotionKind};
 use twofold::job::sweep::Rows;
 use twofold::job::table::{Column, Entry, Table};
 use twofold::job::{AnyQuestion, JobError};
-use crate::study::census::{self, MotionKind};
-use crate::computed::Computed;
-use crate::reading::{Reading, studied_in_both_readings};
 use twofold::paper::{Figure, Study};
 use twofold::record::Hash;
 use twofold::render::sheet::*;

@@ -4,13 +4,13 @@
 
 use std::sync::Arc;
 
+use crate::computed::Computed;
+use crate::reading::{Reading, studied_in_both_readings};
+use crate::study::census::{self, Data, Found, MotionKind, Shorter};
+use crate::study::claims::claims;
 use twofold::job::sweep::Rows;
 use twofold::job::table::Table;
 use twofold::job::{AnyQuestion, JobError};
-use crate::study::census::{self, Data, Found, MotionKind, Shorter};
-use crate::study::claims::claims;
-use crate::computed::Computed;
-use crate::reading::{Reading, studied_in_both_readings};
 use twofold::paper::{Figure, Study, Support};
 use twofold::record::Hash;
 use twofold::render::sheet::*;

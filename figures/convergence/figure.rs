@@ -4,13 +4,13 @@
 
 use std::sync::Arc;
 
+use crate::reading::{Reading, studied_in_both_readings};
 use twofold::analyse::limit::{AfterVisitQuestion, ConvergenceQuestion, observed_rate};
 use twofold::integrate::filippov::{FilippovOptions, FunnelGrid};
 use twofold::job::table::{Entry, Table};
 use twofold::job::{AfterVisit, AnyQuestion, SmoothingLimit};
 use twofold::num::elementary::exp10;
 use twofold::paper::wording::number;
-use crate::reading::{Reading, studied_in_both_readings};
 use twofold::paper::{Figure, Study};
 use twofold::render::sheet::*;
 use twofold::render::style;

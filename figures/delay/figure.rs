@@ -6,6 +6,10 @@
 use std::cmp::Ordering;
 use std::sync::Arc;
 
+use crate::Reading;
+use crate::computed::Computed;
+use crate::study::claims::claims;
+use crate::study::similarity::{self, Rule, Score, WAYS};
 use twofold::analyse::passage::Predicted;
 use twofold::integrate::Schedule;
 use twofold::integrate::delay::History;
@@ -14,11 +18,7 @@ use twofold::job::table::{Column, Table};
 use twofold::job::{Answer, AnyQuestion, JobError, Run};
 use twofold::num::elementary::{exp10, log10};
 use twofold::num::fit::line;
-use crate::study::claims::claims;
-use crate::study::similarity::{self, Rule, Score, WAYS};
-use crate::computed::Computed;
 use twofold::paper::wording::number;
-use crate::Reading;
 use twofold::paper::{Figure, Picture, Study, View};
 use twofold::record::Hash;
 use twofold::render::sheet::*;

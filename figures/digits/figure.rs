@@ -6,6 +6,7 @@
 
 use std::sync::Arc;
 
+use crate::reading::{Reading, studied_in_both_readings};
 use twofold::analyse::digits::{Contender, DigitsQuestion};
 use twofold::analyse::passage::{PassageQuestion, Predicted};
 use twofold::analyse::reference::SectionPlane;
@@ -16,7 +17,6 @@ use twofold::job::{Answer, AnyQuestion, MethodDigits, TwoFoldPassage};
 use twofold::num::elementary::{exp10, log10};
 use twofold::num::fit::line;
 use twofold::paper::wording::number;
-use crate::reading::{Reading, studied_in_both_readings};
 use twofold::paper::{Figure, Study};
 use twofold::render::sheet::*;
 use twofold::render::style;

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use serde_json::json;
-use crate::sketch::assembly;
 use crate::computed::Computed;
+use crate::sketch::assembly;
+use serde_json::json;
 use twofold::paper::{Figure, Picture, Study, View};
 use twofold::system::Wheel;
 

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use serde_json::json;
-use crate::sketch::portrait;
 use crate::computed::Computed;
+use crate::sketch::portrait;
+use serde_json::json;
 use twofold::paper::{Figure, Picture, Study, View};
 
 /// The constants v, w < 0 with vw > 1: the paper's v+ and v-.

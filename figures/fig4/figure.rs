@@ -1,10 +1,10 @@
 //! Fig. 4: the mechanism of non-deterministic chaos, computed: a singularity with one way in, and
 //! its many ways out that come back.
 
+use crate::reading::{Reading, in_both_readings};
 use twofold::integrate::filippov::ExitRule;
 use twofold::integrate::{Schedule, StepCap, Tolerance};
 use twofold::job::spec::*;
-use crate::reading::{Reading, in_both_readings};
 use twofold::paper::{Camera, Figure, FigurePanel, View};
 
 /// The figure's specification.

@@ -4,6 +4,7 @@
 
 use std::sync::Arc;
 
+use crate::Reading;
 use twofold::analyse::passage::{PassageQuestion, Predicted};
 use twofold::integrate::{Kick, KickLaw, Schedule};
 use twofold::job::spec::SwitchSpec;
@@ -11,7 +12,6 @@ use twofold::job::{Answer, AnyQuestion, Leaving, Table, TwoFoldPassage};
 use twofold::num::elementary::{exp, exp10, ln, log10, sqrt};
 use twofold::num::fit::{line, median};
 use twofold::paper::wording::number;
-use crate::Reading;
 use twofold::paper::{Figure, Picture, Study, View};
 use twofold::render::sheet::*;
 use twofold::render::style;

@@ -4,9 +4,9 @@
 //! Each column is one of fig. 7's panels, each row a method. Same equations, same start, same
 //! tolerance.
 
+use crate::reading::in_both_readings;
 use twofold::integrate::Schedule;
 use twofold::job::spec::*;
-use crate::reading::in_both_readings;
 use twofold::paper::verdict::{Claim, SectionClaim};
 use twofold::paper::{Figure, FigurePanel, View};
 

@@ -9,10 +9,10 @@ mod problems;
 
 use std::sync::Arc;
 
+use crate::computed::Computed;
 use serde_json::{Value, json};
 use twofold::job::table::{Column, Entry, Table};
 use twofold::job::{AnyQuestion, JobError};
-use crate::computed::Computed;
 use twofold::paper::wording::number;
 use twofold::paper::{Figure, Picture, Study, View};
 use twofold::record::Hash;
