@@ -569,13 +569,13 @@ pub fn follow(
             arclength(map, &guess, p, (&du, dp), &scales, options.newton)
         };
         let widest = branch.orbits.iter().map(|o| o.extent).fold(0.0, f64::max);
+        let shrinks = |next: &Orbit| {
+            next.extent <= VANISHING * widest
+                && !(last.fills && next.fills && next.extent > GONE * widest)
+                && !is_loop(map, next)
+        };
         let next = match next {
-            Ok(next)
-                if !points
-                    && next.extent <= VANISHING * widest
-                    && !(last.fills && next.fills && next.extent > GONE * widest)
-                    && !is_loop(map, &next) =>
-            {
+            Ok(next) if !points && shrinks(&next) => {
                 let said = "the orbit shrinks to a point".to_owned();
                 Err(Trouble { obstacle: Obstacle::Point(next.point), said })
             }
