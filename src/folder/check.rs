@@ -204,11 +204,11 @@ pub struct Verdict {
 type Origin = Arc<(String, String)>;
 
 impl Claim {
-    /// Checks a claim as it is written; `known` says whether there is a panel or measure of a name.
-    pub(super) fn read(
+    /// Checks a claim as it is written; `known` gives the panel or measure of a name.
+    pub(super) fn read<'a>(
         origin: &Origin,
         claim: Spanned<ClaimFile>,
-        known: &dyn Fn(&Spanned<String>) -> Result<(), FolderError>,
+        known: &dyn Fn(&Spanned<String>) -> Result<&'a Source, FolderError>,
     ) -> Result<Self, FolderError> {
         let place = claim.span();
         let c = claim.into_inner();
@@ -252,8 +252,21 @@ impl Claim {
                 "leave it out".into(),
             ));
         }
-        known(&c.of)?;
-        c.and.as_ref().map_or(Ok(()), known)?;
+        let of = known(&c.of)?;
+        let and = c.and.as_ref().map(known).transpose()?;
+        let facts = [(&c.read, of), (&c.read, and.unwrap_or(of)), (&c.and_read, and.unwrap_or(of))];
+        for (path, source) in facts {
+            let Some(path) = path else { continue };
+            let name = path.get_ref().split('/').next().unwrap_or_default();
+            let facts = source.ask.facts();
+            if !facts.contains(&name) {
+                let help = nearest(name, facts)
+                    .map_or(format!("there are {}", facts.join(", ")), |near| {
+                        format!("did you mean `{near}`?")
+                    });
+                return Err(wrong(path.span(), format!("no answer has a fact `{name}`"), help));
+            }
+        }
         let missing = |what: &str| {
             wrong(place.clone(), format!("a check of {kind} needs {what}"), String::new())
         };
@@ -354,6 +367,13 @@ impl Claim {
                             .map_or(format!("there are {}", kinds.join(", ")), |near| {
                                 format!("did you mean `{near}`?")
                             }),
+                    ));
+                }
+                if !of.said.gives("along") {
+                    return Err(wrong(
+                        c.of.span(),
+                        format!("`{}` follows no branch", c.of.get_ref()),
+                        "give the orbit along = \"PARAMETER=FROM..TO\"".into(),
                     ));
                 }
                 Check::Bifurcation {

@@ -887,8 +887,7 @@ impl Folder {
                 let why = format!("there are two claims `{}`", claim.get_ref().id.get_ref());
                 return Err(FolderError::at(&origin, claim.get_ref().id.span(), why, None));
             }
-            let claim =
-                Claim::read(&origin, claim, &|name| self.source(&origin, name).map(|_| ()))?;
+            let claim = Claim::read(&origin, claim, &|name| self.source(&origin, name))?;
             self.claims.push(claim);
         }
         Ok(())

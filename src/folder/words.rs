@@ -59,6 +59,50 @@ pub enum Ask {
     Rests,
 }
 
+impl Ask {
+    /// The facts that an answer may have, of either form of a system.
+    pub fn facts(self) -> &'static [&'static str] {
+        match self {
+            Ask::Run => &[
+                "t",
+                "state",
+                "x",
+                "signs",
+                "steps",
+                "switches",
+                "events",
+                "rests",
+                "stopped_by",
+                "zeno",
+                "begins",
+                "inside",
+                "history",
+                "most_steps_in_segment",
+            ],
+            Ask::Orbit => &[
+                "states",
+                "point",
+                "period",
+                "multipliers",
+                "gap",
+                "end",
+                "residual",
+                "iterations",
+                "returns",
+                "rate",
+                "stability",
+                "largest_modulus",
+                "multiplier_error",
+                "rest",
+            ],
+            Ask::Lyapunov => {
+                &["exponent", "half_width", "sign", "exponents", "from", "to", "failure"]
+            }
+            Ask::Rests => &["rests", "states"],
+        }
+    }
+}
+
 /// Flags that say where an answer goes, and one that reads a whole run from elsewhere: not a
 /// question's.
 const NOT_ASKED: [&str; 5] = ["spec", "out", "format", "quiet", "help"];
@@ -131,6 +175,11 @@ fn add(flags: &mut Vec<Flag>, flag: Flag) {
 }
 
 impl Said {
+    /// Whether it gives this flag.
+    pub fn gives(&self, name: &str) -> bool {
+        self.flags.iter().any(|flag| flag.name == name)
+    }
+
     /// Whether the section that is asked for depends on the time.
     pub fn has_section_in_time(&self) -> bool {
         let is_time = |text: &String| {

@@ -125,11 +125,38 @@ fn a_claim_that_does_not_hold_differs() {
     change(&root, "claims.toml", "equals = 2.1972245773362196", "equals = 2.3");
     let (code, out, _) = paper(&["make", "--quiet"], &root);
     assert!(code == 0 && out.contains("period: differs: 2.197225 (2.3 in the paper"), "{out}");
-    change(&root, "claims.toml", "read = \"period\"", "read = \"perod\"");
+    change(&root, "claims.toml", "read = \"period\"", "read = \"period/0\"");
     let (code, out, _) = paper(&["make", "--quiet"], &root);
-    assert!(code == 3 && out.contains("no fact \"perod\""), "{out}");
+    assert!(code == 3 && out.contains("\"period/0\": there is no \"0\""), "{out}");
     let (code, _, said) = paper(&["bless", "--reason", "x", "--quiet"], &root);
     assert!(code == 3 && said.contains("what fails is not blessed"), "{said}");
+}
+
+/// Claims are refused that read a fact which no answer has: the list has those that answers have.
+#[test]
+fn all_facts_of_answers_may_be_read() {
+    use twofold::folder::words::Ask;
+    let asked = |command: &str, arguments: &str, ask: Ask| {
+        let out = Command::new(env!("CARGO_BIN_EXE_twofold"))
+            .arg(command)
+            .args(arguments.split(' '))
+            .args(["--format", "json", "--quiet"])
+            .output()
+            .unwrap();
+        let answer: serde_json::Value = serde_json::from_slice(&out.stdout)
+            .unwrap_or_else(|e| panic!("{e}: {command} {arguments}: {out:?}"));
+        for fact in answer["facts"].as_object().unwrap().keys() {
+            assert!(ask.facts().contains(&fact.as_str()), "{command} {arguments}: {fact}");
+        }
+    };
+    asked("run", "--system caricature --t-end 1", Ask::Run);
+    asked("run", "--system caricature --t-end 1 --switch relay --band 0.01", Ask::Run);
+    asked("run", "--system buck --t-end 0.001", Ask::Run);
+    asked("orbit", "--system stick-slip --section v=0", Ask::Orbit);
+    asked("orbit", "--system buck --period 400e-6 --settle 0.05 --along input=23..24", Ask::Orbit);
+    asked("lyapunov", "--system caricature --t-end 20", Ask::Lyapunov);
+    asked("lyapunov", "--system buck --t-end 0.01", Ask::Lyapunov);
+    asked("rests", "--system relay-hysteresis", Ask::Rests);
 }
 
 /// All crossings of a section of one state are one point, whatever the motion does.
@@ -255,7 +282,7 @@ fn papers_that_ship_are_reproduced() {
 fn what_is_wrong_in_a_folder_is_said_with_its_place() {
     let reading = "[readings.a]\nabout = \"\"\nextends = \"b\"\n[readings.b]\nabout \
         = \"\"\nextends = \"a\"\n[run]";
-    let cases: [(&str, &str, &str, &[&str]); 26] = [
+    let cases: [(&str, &str, &str, &[&str]); 28] = [
         (
             "paper.toml",
             "rtol = 1e-9",
@@ -379,6 +406,18 @@ fn what_is_wrong_in_a_folder_is_said_with_its_place() {
             "check = \"value\"\nof = \"cycle\"\nread = \"period\"\nequals = 2.1972245773362196",
             "check = \"bifurcation\"\nkind = \"foldd\"\nat = 1\nof = \"cycle\"",
             &["there is no bifurcation `foldd`", "did you mean `fold`?"],
+        ),
+        (
+            "claims.toml",
+            "check = \"value\"\nof = \"cycle\"\nread = \"period\"\nequals = 2.1972245773362196",
+            "check = \"bifurcation\"\nkind = \"fold\"\nat = 1\nof = \"cycle\"",
+            &["`cycle` follows no branch", "along = \"PARAMETER=FROM..TO\""],
+        ),
+        (
+            "claims.toml",
+            "read = \"period\"",
+            "read = \"perod\"",
+            &["no answer has a fact `perod`", "did you mean `period`?", "claims.toml"],
         ),
         (
             "figures/fig1.toml",

@@ -1729,9 +1729,9 @@ fn last(text: &str, t_end: f64) -> f64 {
     *end(text, t_end).last().unwrap()
 }
 
-/// What leaves zero without a speed, or with one that only rounding makes, is no event at once: an
-/// oscillator let go, a ball laid down, friction and a diode as automata, whose modes begin where
-/// force and friction, or both voltages, are equal.
+/// An expression that leaves zero without a speed, or with one that only rounding makes, is no
+/// event at once: an oscillator let go, a ball laid down, friction and a diode as automata, whose
+/// modes begin where force and friction, or both voltages, are equal.
 #[test]
 fn events_that_are_left_without_a_speed_wait() {
     let osc = "states = ['x', 'v', 'n']\nstart = [1, 0, 0]\nf = ['v', '-x', '0']\n\

@@ -31,6 +31,10 @@ pub struct GeneralOrbit {
 /// States that have settled at less than this share of their sizes at the start are at zero.
 const ROUNDED: f64 = 1e-6;
 
+/// A return may take so many times the steps of the first orbit of a branch, or of this number.
+const LONGEST: u64 = 100;
+const LEAST_STEPS: u64 = 1000;
+
 /// A settling that ends on an event is repeated so many times, by this share longer each time.
 const LONGER: u32 = 8;
 const LONGER_BY: f64 = 1.0 / 128.0;
@@ -120,6 +124,9 @@ impl Question for GeneralOrbit {
         let Some(along) = &self.along else { return Ok(answer) };
         at(&model, along, along.to)?;
         options.mode = found.mode;
+        // Newton's method may come to states from which there is no return, or one of days.
+        let usual = once_around(&model, &options, &self.after, &found_here)?.steps;
+        options.max_steps = options.max_steps.min(LONGEST * usual.max(LEAST_STEPS));
         let map = Map { model: &model, options, after: &self.after, along };
         let rtol = self.run.options.rtol;
         let newton = Newton {
@@ -245,7 +252,14 @@ struct Map<'a> {
 impl Map<'_> {
     fn tried(&self, u: &[f64], p: f64, options: &Options) -> Result<Returned, HybridError> {
         let n = u.len() - 1;
-        let turn = once_around(&at(self.model, self.along, p)?, options, self.after, &u[..n])?;
+        let model = at(self.model, self.along, p)?;
+        let turn = once_around(&model, options, self.after, &u[..n]).map_err(|e| match e {
+            HybridError::Budget { .. } => HybridError::NoOrbit(format!(
+                "the motion is not back in {LONGEST} times the steps of the first orbit: it \
+                    leaves, or the period grows without bound, as near a homoclinic orbit"
+            )),
+            other => other,
+        })?;
         if turn.mode != self.options.mode {
             let mode = |mode: usize| &self.model.definition().modes()[mode].name;
             let (from, to) = (mode(self.options.mode), mode(turn.mode));

@@ -65,8 +65,8 @@ pub fn solve_any(a: &[f64], b: &[f64], smallest: f64) -> Option<Vec<f64>> {
 }
 
 /// A solution of a x = b for `n` equations of which some say nothing new: by elimination with full
-/// pivoting, with zeros for the unknowns that are left open. `None` if the equations contradict each
-/// other, or no pivot is above `smallest`.
+/// pivoting, with zeros for the unknowns that are left open. `None` if the equations contradict
+/// each other, or no pivot is above `smallest`.
 ///
 /// ```
 /// use twofold_num::linear::solve_some;
@@ -113,7 +113,7 @@ pub fn solve_some(a: &[f64], b: &[f64], smallest: f64) -> Option<Vec<f64>> {
     x.iter().all(|x| x.is_finite()).then_some(x)
 }
 
-/// What is left of the right side beyond this share of it contradicts.
+/// Remainders of the right side beyond this share of it contradict.
 const CONTRADICTS: f64 = 1e-3;
 
 /// Iterations of the QR algorithm for one eigenvalue; some three are usual.

@@ -234,8 +234,8 @@ pub(super) struct Located {
     jumps: bool,
 }
 
-/// Zero of a test function, which gives its error, too, between two members: by regula falsi (the Illinois variant, Dowell &
-/// Jarratt 1971) along the chord.
+/// Zero of a test function, which gives its error, too, between two members: by regula falsi (the
+/// Illinois variant, Dowell & Jarratt 1971) along the chord.
 pub(super) fn locate(
     map: &dyn ReturnMap,
     a: &Orbit,

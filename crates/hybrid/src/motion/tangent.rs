@@ -884,9 +884,11 @@ pub struct Turn {
     pub size: f64,
     /// The diagonal of the box around the way.
     pub extent: f64,
-    /// What tells it from a way with other events: the number of switches and events, and the pieces
-    /// of resets that act, hashed.
+    /// A number that tells it from a way with other events: of switches and events, and of the
+    /// pieces of resets that act, hashed.
     pub itinerary: usize,
+    /// Steps on the way.
+    pub steps: u64,
 }
 
 /// Follows motion from `x` until it is back; of a section from the point on it that is next to `x`
@@ -1003,6 +1005,7 @@ fn turn(
         matrix,
         size: follower.size.iter().fold(0.0_f64, |most, s| most.max(*s)),
         extent: bounds.iter().map(|[low, high]| (high - low) * (high - low)).sum::<f64>().sqrt(),
+        steps: outcome.steps,
         itinerary: (outcome.switches + outcome.events).wrapping_add(pieces) as usize,
     })
 }
