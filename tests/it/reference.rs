@@ -8,6 +8,7 @@ use std::process::Command;
 
 use clap::Arg;
 use twofold::cli::commands::definition;
+use twofold::jeffrey_2013::study::claims::{Quantity, claims};
 
 const BEGIN: &str =
     "<!-- made by `TWOFOLD_UPDATE=1 cargo test --test it reference::`; do not edit -->";
@@ -307,6 +308,34 @@ fn functions() -> String {
         );
     }
     block
+}
+
+/// The paper's sentences with their outcomes; tests/it/claims.rs measures these.
+#[test]
+fn sentences_are_as_the_page_says() {
+    let mut block = String::from("| | the paper's words | outcome |\n|---|---|---|\n");
+    for sentence in &claims().sentence {
+        let word = |reads: &[&Quantity]| match reads.iter().filter(|r| r.holds).count() {
+            0 => "false",
+            n if n == reads.len() => "true",
+            _ => "true in part",
+        };
+        let reads: Vec<&Quantity> = sentence.reads.iter().collect();
+        let [printed, reconstructed] = ["printed", "reconstructed"].map(|reading| {
+            let end = format!(", {reading}");
+            let own: Vec<&Quantity> =
+                reads.iter().copied().filter(|r| r.quantity.ends_with(&end)).collect();
+            (!own.is_empty()).then(|| word(&own))
+        });
+        let outcome = match (&sentence.untested, printed, reconstructed) {
+            (Some(why), ..) => format!("not measured: {why}"),
+            (None, Some(a), Some(b)) if a != b => format!("{a} as printed, {b} as reconstructed"),
+            (None, None, Some(b)) => format!("{b} as reconstructed"),
+            _ => word(&reads).to_owned(),
+        };
+        let _ = writeln!(block, "| {} | {} | {} |", sentence.id, cell(&sentence.quote), outcome);
+    }
+    hold("docs/sentences.md", &[block]);
 }
 
 #[test]
