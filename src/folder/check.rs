@@ -217,15 +217,9 @@ impl Claim {
         };
         let Some((kind, takes)) = KINDS.iter().find(|(kind, _)| kind == c.check.get_ref()) else {
             let kinds = KINDS.map(|(kind, _)| kind);
-            let help = nearest(c.check.get_ref(), &kinds)
-                .map_or(format!("there are {}", kinds.join(", ")), |near| {
-                    format!("did you mean `{near}`?")
-                });
-            return Err(wrong(
-                c.check.span(),
-                format!("there is no check `{}`", c.check.get_ref()),
-                help,
-            ));
+            let given = c.check.get_ref();
+            let why = format!("there is no check `{given}`");
+            return Err(wrong(c.check.span(), why, one_of(given, &kinds)));
         };
         let given = [
             ("read", c.read.as_ref().map(Spanned::span)),
@@ -260,11 +254,8 @@ impl Claim {
             let name = path.get_ref().split('/').next().unwrap_or_default();
             let facts = source.ask.facts();
             if !facts.contains(&name) {
-                let help = nearest(name, facts)
-                    .map_or(format!("there are {}", facts.join(", ")), |near| {
-                        format!("did you mean `{near}`?")
-                    });
-                return Err(wrong(path.span(), format!("no answer has a fact `{name}`"), help));
+                let why = format!("no answer has a fact `{name}`");
+                return Err(wrong(path.span(), why, one_of(name, facts)));
             }
         }
         let missing = |what: &str| {
@@ -360,14 +351,8 @@ impl Claim {
                     c.kind.as_ref().ok_or_else(|| missing("`kind`, such as period-doubling"))?;
                 let kinds = Change::ALL.map(Change::word);
                 if !kinds.contains(&kind.get_ref().as_str()) {
-                    return Err(wrong(
-                        kind.span(),
-                        format!("there is no bifurcation `{}`", kind.get_ref()),
-                        nearest(kind.get_ref(), &kinds)
-                            .map_or(format!("there are {}", kinds.join(", ")), |near| {
-                                format!("did you mean `{near}`?")
-                            }),
-                    ));
+                    let why = format!("there is no bifurcation `{}`", kind.get_ref());
+                    return Err(wrong(kind.span(), why, one_of(kind.get_ref(), &kinds)));
                 }
                 if !of.said.gives("along") {
                     return Err(wrong(
@@ -549,6 +534,14 @@ fn start(source: &Source) -> Result<Vec<f64>, FolderError> {
             Err(source.said.complain("odds move the start of a run, and this has none; give start"))
         }
     }
+}
+
+/// Advice where a word is none of those that are known.
+fn one_of(word: &str, known: &[&str]) -> String {
+    nearest(word, known).map_or_else(
+        || format!("there are {}", known.join(", ")),
+        |near| format!("did you mean `{near}`?"),
+    )
 }
 
 /// The number that a claim reads of its first source.

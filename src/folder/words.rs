@@ -71,7 +71,6 @@ impl Ask {
                 "steps",
                 "switches",
                 "events",
-                "rests",
                 "stopped_by",
                 "zeno",
                 "begins",

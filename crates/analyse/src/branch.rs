@@ -8,7 +8,7 @@ mod changes;
 
 use serde::{Deserialize, Serialize};
 
-use changes::{changes, on_circle, turning};
+use changes::{alike, changes, on_circle, turning};
 
 use super::floquet::{Returned, multipliers_of};
 use twofold_num::elementary::{ln, sqrt};
@@ -668,8 +668,9 @@ fn note(
 ) {
     let last = &branch.orbits[branch.orbits.len() - 1];
     let others = last.events != next.events;
-    // One on the unit circle that was not there before is about to pass it, or will not.
-    if !others && on_circle(next) > on_circle(told) {
+    // One on the unit circle that was not there before is about to pass it, or will not. What
+    // others have done is said.
+    if !others && on_circle(next) > on_circle(told) && alike(told, next) {
         return;
     }
     let mut found = changes(map, if others { last } else { told }, next, scales, newton);

@@ -517,12 +517,24 @@ impl Equation {
     }
 
     /// Gives what decides between the pieces of an expression: whether conditions hold, signs, the
-    /// levels of steps, in the order in which they stand.
+    /// levels of steps, in the order in which they stand; of a term once.
     pub(crate) fn pieces(&self, e: &Expression, t: f64, x: &[f64], note: &mut dyn FnMut(i64)) {
+        self.pieces_beyond(e, (t, x), note, &mut HashSet::new());
+    }
+
+    fn pieces_beyond<'a>(
+        &'a self,
+        e: &'a Expression,
+        (t, x): (f64, &[f64]),
+        note: &mut dyn FnMut(i64),
+        seen: &mut HashSet<&'a str>,
+    ) {
         let value = |e: &Expression| self.value(e, t, x);
         let mut parts = e.parts();
         match e {
-            Expression::Name(name) => parts.extend(self.term(name)),
+            Expression::Name(name) => {
+                parts.extend(self.term(name).filter(|_| seen.insert(name)));
+            }
             Expression::Apply(General::If, list) => {
                 let holds = value(&list[0]) != 0.0;
                 note(i64::from(holds));
@@ -549,7 +561,9 @@ impl Equation {
             }
             _ => {}
         }
-        parts.into_iter().for_each(|part| self.pieces(part, t, x, note));
+        for part in parts {
+            self.pieces_beyond(part, (t, x), note, seen);
+        }
     }
 
     /// The value; terms are evaluated once each.

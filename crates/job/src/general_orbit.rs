@@ -135,14 +135,7 @@ impl Question for GeneralOrbit {
             rtol,
             iterations: ITERATIONS,
         };
-        // States that have come to a zero, to rounding, are as large as at the start.
-        let size = |x: &[f64]| x.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-        let began = match &self.run.options.start {
-            Some(start) => size(start),
-            None => model.start().ok().flatten().map_or(0.0, |start| size(&start)),
-        };
-        let now = size(&found_here);
-        let size = [now, began, 1.0].into_iter().find(|s| *s > ROUNDED * began && *s > 0.0);
+        let size = if map.has_points() { self.size_of_states(&found_here) } else { 0.0 };
         let guess: Vec<f64> = found_here.into_iter().chain([0.0]).collect();
         let first = branch::closed_orbit(&map, &guess, along.from, newton)
             .map_err(|trouble| HybridError::NoOrbit(trouble.said))?;
@@ -152,7 +145,7 @@ impl Question for GeneralOrbit {
             to: along.to,
             longest: 1.0 / along.steps as f64,
             most: along.most,
-            size: size.filter(|_| map.has_points()).unwrap_or(0.0),
+            size,
             newton,
         };
         let mut go_on = |orbit: &Orbit| {
@@ -175,6 +168,18 @@ impl Question for GeneralOrbit {
         }
         answer.tables.extend(branch_tables(&along.parameter, &model.coordinates(), &found));
         Ok(answer.with_fact("end", &found.end))
+    }
+}
+
+impl GeneralOrbit {
+    /// The largest size of a state at `x`; states that have come to zero, to rounding, are as large
+    /// as at the start, or as one if that is zero, too.
+    fn size_of_states(&self, x: &[f64]) -> f64 {
+        let largest = |x: &[f64]| x.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+        let suggested = || self.run.model.start().ok().flatten().unwrap_or_default();
+        let began = largest(&self.run.options.start.clone().unwrap_or_else(suggested));
+        let sizes = [largest(x), began, 1.0];
+        sizes.into_iter().find(|size| *size > ROUNDED * began).unwrap_or(1.0)
     }
 }
 

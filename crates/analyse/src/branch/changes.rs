@@ -35,6 +35,11 @@ fn without(o: &Orbit, neutral: usize) -> Vec<[f64; 2]> {
     left
 }
 
+/// Whether as many multipliers are surely outside of the circle.
+pub(super) fn alike(a: &Orbit, b: &Orbit) -> bool {
+    outside(&a.multipliers, a.multiplier_error) == outside(&b.multipliers, b.multiplier_error)
+}
+
 /// Number of multipliers beyond the circle and their error.
 fn outside(multipliers: &[[f64; 2]], error: f64) -> usize {
     multipliers.iter().filter(|m| modulus(**m) > 1.0 + error).count()
@@ -126,12 +131,11 @@ fn passages(
         // Of one that passes alone the product is smooth where the others meet.
         let side = real(a).filter(|side| single && real(b) == Some(*side));
         // One that leaves the circle of conserved quantities is beyond its error first.
-        let error = a.multiplier_error.max(b.multiplier_error);
         let on_it = [a, b].iter().any(|o| (modulus(kth(o)) - 1.0).abs() <= o.multiplier_error);
-        let circle = if on_it { 1.0 + 2.0 * error } else { 1.0 };
+        let beyond = if on_it { 2.0 * a.multiplier_error.max(b.multiplier_error) } else { 0.0 };
         let test: &dyn Fn(&Orbit) -> (f64, f64) = &|o| match side {
             Some(side) if !on_it => (product(o, side), sensitivity(o)),
-            _ => (modulus(kth(o)) - circle, o.multiplier_error),
+            _ => (modulus(kth(o)) - 1.0 - beyond, o.multiplier_error + beyond),
         };
         let at = locate(map, a, b, scales, newton, test);
         let near = at.as_ref().map_or(if modulus(kth(a)) > 1.0 { a } else { b }, |at| &at.orbit);
@@ -234,6 +238,11 @@ pub(super) struct Located {
     jumps: bool,
 }
 
+/// A zero is located to this share of the way between two members.
+const NARROW: f64 = 1e-9;
+/// A test function that is still so large there, and a hundred times its error, jumps.
+const LEAST_JUMP: f64 = 1e-4;
+
 /// Zero of a test function, which gives its error, too, between two members: by regula falsi (the
 /// Illinois variant, Dowell & Jarratt 1971) along the chord.
 pub(super) fn locate(
@@ -255,7 +264,7 @@ pub(super) fn locate(
         let share = sb - gb * (sb - sa) / (gb - ga);
         let orbit = member(map, a, b, share, scales, newton).ok()?;
         let (g, error) = test(&orbit);
-        let done = g.abs() <= error || (sb - sa).abs() <= 1e-9;
+        let done = g.abs() <= error || (sb - sa).abs() <= NARROW;
         let side = if g * gb > 0.0 { 1 } else { -1 };
         if side > 0 {
             (sb, gb) = (share, g);
@@ -274,7 +283,7 @@ pub(super) fn locate(
     }
     let (orbit, share, g) = nearest?;
     let error = g.abs() + test(&orbit).1;
-    let jumps = (sb - sa).abs() <= 1e-9 && g.abs() > 1e-4f64.max(100.0 * test(&orbit).1);
+    let jumps = (sb - sa).abs() <= NARROW && g.abs() > LEAST_JUMP.max(100.0 * test(&orbit).1);
     Some(Located { orbit, share, slope, error, jumps })
 }
 
