@@ -49,8 +49,8 @@ const CRATES: [(&str, &[&str], &[&str]); 14] = [
     ),
 ];
 
-/// The package that holds only data and is embedded below the figures, with the crate that does. No
-/// crate below them may name a paper.
+/// The package of data that a crate below the figures embeds, and that crate. No crate below them
+/// may name a paper.
 const DATA: [(&str, &str); 1] = [("systems", "system")];
 
 /// Crates that no crate below the command may name: flags and terminals.
