@@ -270,7 +270,7 @@ pub enum HybridError {
     },
     /// Switches accumulate.
     #[error(
-        "switches at {surfaces} accumulate at t = {t} (error at most {error:e}), state {x:?}, and \
+        "switches at {surfaces} accumulate at t = {t} (error at most {error:.1e}), state {x:?}, and \
             nothing says how motion goes on: end the run before that time (--t-end), or describe \
             what holds there by an [[event]]",
         t = Short(*t)
@@ -429,6 +429,8 @@ struct Follower<'a> {
     /// Whether some of the functions slid upon stay at zero where the others do.
     dependent: bool,
     contacts: Vec<Contact>,
+    /// Whether each guard is held at zero by contacts.
+    guard_held: Vec<bool>,
     /// Whether the motion has come to a point that it does not leave.
     rests: bool,
     /// Whether the last step's error was the rounding of the time.
@@ -444,8 +446,12 @@ struct Follower<'a> {
     /// Of each watched expression whose contact has opened, and that is zero to rounding since, by
     /// how much it may be beyond zero; else zero.
     released: Vec<f64>,
-    /// Whether each watched expression had no speed where it left zero.
+    /// Whether each watched expression had no speed where it left zero, and each guard.
     tangent: Vec<bool>,
+    tangent_guard: Vec<bool>,
+    /// Guards that are zero to rounding where motion begins: their speeds are known to rounding,
+    /// too.
+    touching: Vec<bool>,
     /// The watched expression that leaves zero in the present step, with its rounding there.
     leaves: Option<(usize, f64)>,
     /// Of each guard whose zero was slid upon until now, by how much the speeds of its two sides
@@ -506,9 +512,61 @@ pub fn follow_watched(
     observe: &mut dyn FnMut(&Point) -> bool,
     reached: &dyn Fn(f64) -> bool,
 ) -> Result<Outcome, HybridError> {
+    let mut found = follow_once(model, options, observe, reached);
+    let again = |t: f64, events: u64| error_of_accumulation(model, options, reached, t, events);
+    if let Ok(Outcome { ending: Ending::Zeno { t, error, .. }, events, .. }) = &mut found {
+        *error += again(*t, *events).unwrap_or(f64::INFINITY);
+    }
+    if let Err(HybridError::Accumulation { t, error, x, surfaces }) = found {
+        return Err(match again(t, 0) {
+            Some(more) => HybridError::Accumulation { t, error: error + more, x, surfaces },
+            None => HybridError::Stuck {
+                t,
+                x,
+                why: format!(
+                    "switches at {surfaces} come ever faster, but not so at ten times the \
+                        tolerance: give a smaller one (--rtol), or another method (--method)"
+                ),
+            },
+        });
+    }
+    found
+}
+
+fn follow_once(
+    model: &Model,
+    options: &Options,
+    observe: &mut dyn FnMut(&Point) -> bool,
+    reached: &dyn Fn(f64) -> bool,
+) -> Result<Outcome, HybridError> {
     let mut follower = Follower::new(model, options)?;
     follower.reached = Some(reached);
     follower.run_whole(observe).map(|(outcome, _)| outcome)
+}
+
+/// By how much integration and rounding may have moved the time `t` at which a run accumulates:
+/// three times as far as ten times the tolerance moves it, and a rounding of the time for each
+/// event. None if nothing accumulates then.
+fn error_of_accumulation(
+    model: &Model,
+    options: &Options,
+    reached: &dyn Fn(f64) -> bool,
+    t: f64,
+    events: u64,
+) -> Option<f64> {
+    let coarser = Options {
+        rtol: 10.0 * options.rtol,
+        atol: options.atol.map(|atol| 10.0 * atol),
+        record: Record::Times { every: f64::INFINITY },
+        ..options.clone()
+    };
+    let other = match follow_once(model, &coarser, &mut |_| true, reached) {
+        Ok(Outcome { ending: Ending::Zeno { t, .. }, .. }) => t,
+        Err(HybridError::Accumulation { t, .. }) => t,
+        _ => return None,
+    };
+    let rounding = 4.0 * f64::EPSILON * t.abs() * events as f64;
+    Some(3.0 * (t - other).abs() + rounding)
 }
 
 /// Whether an event's expression is zero, to rounding, where a motion with these options starts.
@@ -762,6 +820,7 @@ impl<'a> Follower<'a> {
             separate: None,
             dependent: false,
             contacts: Vec::new(),
+            guard_held: vec![false; guards],
             rests: false,
             noisy: false,
             watch_side: vec![0.0; watched],
@@ -769,6 +828,8 @@ impl<'a> Follower<'a> {
             fresh_guard: vec![false; guards],
             fresh_watch: vec![false; watched],
             tangent: vec![false; watched],
+            tangent_guard: vec![false; guards],
+            touching: vec![false; guards],
             released: vec![0.0; watched],
             leaves: None,
             left: vec![0.0; guards],
@@ -819,8 +880,8 @@ impl<'a> Follower<'a> {
         for watched in 0..follower.watch_side.len() {
             follower.begin_watching(watched, false, false);
         }
+        follower.rest_at_start()?;
         follower.new_conditions(model.definition());
-        follower.rest_at_start();
         Ok(follower)
     }
 
@@ -893,7 +954,7 @@ impl<'a> Follower<'a> {
                 self.after(before)?;
                 continue;
             }
-            self.open_pulled();
+            self.open_pulled()?;
             step.t = self.t;
             step.x.copy_from_slice(&self.x);
             self.rhs(step.t, &step.x, &mut room);
@@ -1045,9 +1106,14 @@ impl<'a> Follower<'a> {
             let ending = match clock.next().filter(|time| *time - self.t <= rounding) {
                 Some(time) => {
                     self.t = time;
+                    self.meet_here(&mut met);
                     self.on_time(&mut clock, &definition, &met, observe)?
                 }
                 None => {
+                    // What is zero to rounding where sliding ends decides how motion goes on.
+                    if met.iter().any(|m| matches!(m, Sought::Leave { .. } | Sought::Repelling)) {
+                        self.meet_here(&mut met);
+                    }
                     let before = self.before(&met)?;
                     let ending = self.meet(&definition, &met, &[], observe)?;
                     if ending.is_none() {
@@ -1068,7 +1134,9 @@ impl<'a> Follower<'a> {
         let active = self.compiled.active.iter().enumerate();
         let resting: Vec<(usize, usize)> = active
             .map(|(place, guard)| (place, *guard))
-            .filter(|(_, guard)| self.equation.rests(*guard, &self.config))
+            .filter(|(_, guard)| {
+                self.equation.rests(*guard, &self.config) && !self.guard_held[*guard]
+            })
             .collect();
         if resting.is_empty() {
             return false;
@@ -1083,6 +1151,7 @@ impl<'a> Follower<'a> {
             if values[place].abs() > small {
                 config.sides[guard] = values[place].signum();
                 self.fresh_guard[guard] = true;
+                self.tangent_guard[guard] = false;
             }
         }
         let leaves = config != self.config;
@@ -1211,23 +1280,67 @@ impl<'a> Follower<'a> {
         Ok(ending)
     }
 
-    /// Watched expressions that are zero to rounding and about to pass it.
+    /// Guards and watched expressions that are zero to rounding and about to pass it.
     fn met_here(&mut self) -> Vec<Sought> {
-        let config = self.config.clone();
-        let near: Vec<usize> = (0..self.watch_side.len())
-            .filter(|i| self.watch_side[*i] != 0.0 && !self.fresh_watch[*i])
-            .filter(|i| {
-                let e = &self.equation.watched[*i];
-                self.equation.value(e, self.t, &self.x).abs() <= 1e-14 * self.magnitude(e)
-            })
-            .collect();
+        let active = self.compiled.active.iter().enumerate();
+        let moves = |guard: usize| !self.slides[guard] && !self.fresh_guard[guard];
+        // Each with its place, the way to its zero, and whether it is on that zero.
+        let mut near: Vec<(Sought, usize, f64)> = Vec::new();
+        for (place, guard) in active.filter(|(_, guard)| moves(**guard)) {
+            let (guard, side) = (*guard, self.config.sides[*guard]);
+            if self.equation.rests(guard, &self.config) || self.side_of(guard).is_some() {
+                continue;
+            }
+            let whole = self.equation.guards[guard].whole;
+            let upper = whole && self.boundary(guard) != side;
+            let way = if upper || !whole && side < 0.0 { 1.0 } else { -1.0 };
+            near.push((Sought::Guard { guard, upper }, place, way));
+        }
+        for i in 0..self.watch_side.len() {
+            let e = &self.equation.watched[i];
+            let (side, value) = (self.watch_side[i], self.equation.value(e, self.t, &self.x));
+            if side != 0.0 && !self.fresh_watch[i] && value.abs() <= 1e-14 * self.magnitude(e) {
+                near.push((Sought::Watched(i), self.compiled.active.len() + i, -side));
+            }
+        }
         if near.is_empty() {
             return Vec::new();
         }
-        let (compiled, rates) = self.rates(&config);
-        let passes =
-            |i: &usize| rates.direction(compiled.active.len() + i) * self.watch_side[*i] < 0.0;
-        near.into_iter().filter(passes).map(Sought::Watched).collect()
+        let (_, mut rates) = self.rates_of_second_order(&self.config.clone());
+        let mut direction = Vec::new();
+        for (sought, place, _) in &near {
+            let e = match *sought {
+                Sought::Watched(i) => &self.equation.watched[i],
+                Sought::Guard { guard, .. } => &self.equation.guards[guard].expression,
+                _ => continue,
+            };
+            if rates.first[*place].abs() <= self.rounding_of_slope(e, rates.second[*place]) {
+                rates.first[*place] = 0.0;
+            }
+            direction.push(rates.direction(*place));
+        }
+        if !self.sliding.is_empty() {
+            let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; self.n]);
+            self.rhs(t, &x, &mut field);
+            let along = Self::along(&self.compiled, &self.variables, &field);
+            for ((_, place, _), direction) in near.iter().zip(&mut direction) {
+                if along[*place].abs() > SMALLEST_SLOPE * rates.terms[*place] {
+                    *direction = along[*place].signum();
+                }
+            }
+        }
+        let mut passes = direction.iter();
+        near.retain(|(_, _, way)| passes.next().is_some_and(|direction| direction * way > 0.0));
+        near.into_iter().map(|(sought, ..)| sought).collect()
+    }
+
+    /// Adds to what is met at this moment what is zero here to rounding and about to pass it.
+    fn meet_here(&mut self, met: &mut Vec<Sought>) {
+        for sought in self.met_here() {
+            if !met.contains(&sought) {
+                met.push(sought);
+            }
+        }
     }
 
     fn emit(&self, t: f64, event: Option<&str>, observe: &mut dyn FnMut(&Point) -> bool) -> bool {

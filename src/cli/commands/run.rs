@@ -203,11 +203,13 @@ pub(super) fn said_how_it_ended(run: &GeneralRun, answer: &Answer) -> Exit {
         // Motion can rest on the surface of an event that sets a state; a mode has none.
         let mut events = run.model.definition().events().iter();
         let sets = events.any(|e| e.name == name && e.mode.is_none() && !e.set.is_empty());
+        let known = match zeno["error"].as_f64() {
+            Some(error) => format!("error at most {error:.1e}"),
+            None => "at ten times the tolerance it does not; give a smaller --rtol".to_owned(),
+        };
         complain(&format!(
-            "{name} happens infinitely often before t = {} (error at most {}), where the run \
-                ends{}",
+            "{name} happens infinitely often before t = {} ({known}), where the run ends{}",
             zeno["t"],
-            zeno["error"],
             if sets { "; after_zeno = \"stick\" lets it rest there" } else { "" },
         ));
     }

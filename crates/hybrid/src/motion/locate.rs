@@ -166,7 +166,12 @@ impl Follower<'_> {
 
     /// Whether what is sought left zero without a speed.
     fn is_tangent(&self, sought: Sought) -> bool {
-        matches!(sought, Sought::Watched(i) if self.is_fresh(sought) && self.tangent[i])
+        let tangent = match sought {
+            Sought::Watched(i) => self.tangent[i],
+            Sought::Guard { guard, .. } => self.tangent_guard[guard],
+            _ => false,
+        };
+        tangent && self.is_fresh(sought)
     }
 
     /// Adds the first zero of each function's Taylor series; returns the values at the step's end

@@ -62,7 +62,7 @@ impl Follower<'_> {
                 rule => slid.iter().for_each(|g| leave.push((*g, rule == Exit::Plus))),
             }
         }
-        self.open(opened);
+        self.open(opened)?;
         self.left.fill(0.0);
         self.left_watch.fill(0.0);
         if !leave.is_empty() {
@@ -93,6 +93,7 @@ impl Follower<'_> {
             for (guard, plus) in &leave {
                 config.sides[*guard] = if *plus { self.high(*guard) } else { self.low(*guard) };
                 self.fresh_guard[*guard] = true;
+                self.tangent_guard[*guard] = false;
                 zero.retain(|g| g != guard);
             }
             self.ask_new(&mut config);
@@ -155,7 +156,10 @@ impl Follower<'_> {
     }
 
     /// Ends contacts.
-    fn open(&mut self, contacts: Vec<Contact>) {
+    fn open(&mut self, contacts: Vec<Contact>) -> Result<(), HybridError> {
+        if contacts.is_empty() {
+            return Ok(());
+        }
         for contact in contacts {
             self.contacts.retain(|c| c.watched != contact.watched);
             self.watch_side[contact.watched] = contact.above;
@@ -170,13 +174,14 @@ impl Follower<'_> {
                 + 64.0 * f64::EPSILON * self.magnitude(e);
             self.trains[contact.event] = Train::default();
         }
+        self.hold_guards()
     }
 
     /// Ends contacts at which a force that has jumped pulls.
-    pub(super) fn open_pulled(&mut self) {
+    pub(super) fn open_pulled(&mut self) -> Result<(), HybridError> {
         const PULLS: f64 = 1e-12;
         if self.contacts.is_empty() {
-            return;
+            return Ok(());
         }
         let list: Vec<(Sought, f64)> =
             (0..self.contacts.len()).map(|place| (Sought::Release(place), 1.0)).collect();
@@ -187,7 +192,7 @@ impl Follower<'_> {
         let pulled =
             self.contacts.iter().zip(&pushes).filter(|(_, push)| **push < -PULLS * largest);
         let pulled: Vec<Contact> = pulled.map(|(contact, _)| *contact).collect();
-        self.open(pulled);
+        self.open(pulled)
     }
 
     /// Whether a mixture by order ends although no surface is left: a fast surface ceases to
@@ -305,6 +310,7 @@ impl Follower<'_> {
                 self.settle_afresh(&zero)?;
             }
             let struck = self.keep_contacts(definition, &old);
+            self.hold_guards()?;
             for i in 0..self.watch_side.len() {
                 if !self.contacts.iter().any(|c| c.watched == i) {
                     let met = self.event_of[i].is_some_and(|event| fired.contains(&event));
@@ -378,6 +384,10 @@ impl Follower<'_> {
                 }
             }
             let sticks = event.sticks && self.stick(definition, i, t);
+            if sticks {
+                self.hold_guards()?;
+                newly.extend(self.new_conditions(definition));
+            }
             if !sticks {
                 if !quiet {
                     self.t = t;
@@ -492,7 +502,7 @@ impl Follower<'_> {
     }
 
     /// A start at rest on a surface on which motion may stick, pressed against it, stays there.
-    pub(super) fn rest_at_start(&mut self) {
+    pub(super) fn rest_at_start(&mut self) -> Result<(), HybridError> {
         let definition = self.model.definition().clone();
         let config = self.config.clone();
         for i in 0..self.watch_side.len() {
@@ -511,9 +521,10 @@ impl Follower<'_> {
                 self.fresh_watch[i] && rates.first[place].abs() <= 1e-14 * rates.terms[place];
             if rests && rates.second[place] * into > 0.0 {
                 self.stick(&definition, event, self.t);
-                return;
+                return self.hold_guards();
             }
         }
+        Ok(())
     }
 
     /// Keeps the contacts that a reset or a new mode leaves at rest. Returns the events of those

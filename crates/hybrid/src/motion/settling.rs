@@ -3,6 +3,7 @@
 use std::cell::Cell;
 use std::collections::HashMap;
 
+use twofold_num::Elementary as _;
 use twofold_system::expression::{Function, General};
 
 use super::*;
@@ -40,8 +41,20 @@ impl Follower<'_> {
                     None => self.equation.value(e, self.t, &self.x).abs(),
                 }
             }
+            Expression::Div(a, b) => {
+                let by = self.equation.value(b, self.t, &self.x).abs();
+                self.magnitude_by(e, self.magnitude(a) / by)
+            }
+            Expression::Power(a, n) => {
+                let power = self.slope_at(a).power(*n);
+                self.magnitude_by(e, power.partials[0].abs() * self.magnitude(a))
+            }
             // One of several numbers, at a place where it may change to another.
             Expression::Call(Function::Abs, a) => self.magnitude(a),
+            Expression::Call(function, a) if !matches!(function, Function::Sqrt) => {
+                let slope = function.apply(self.slope_at(a)).partials[0].abs();
+                self.magnitude_by(e, slope * self.magnitude(a))
+            }
             Expression::Apply(General::Min | General::Max | General::Clip, list) => {
                 list.iter().map(|e| self.magnitude(e)).fold(0.0, f64::max)
             }
@@ -50,6 +63,18 @@ impl Follower<'_> {
             }
             other => self.equation.value(other, self.t, &self.x).abs(),
         }
+    }
+
+    /// The larger one of an expression's size and of what its arguments' rounding is measured by, if
+    /// that is a number.
+    fn magnitude_by(&self, e: &Expression, arguments: f64) -> f64 {
+        let own = self.equation.value(e, self.t, &self.x).abs();
+        if arguments.is_finite() { own.max(arguments) } else { own }
+    }
+
+    /// An expression's value, as the variable that a function is differentiated by.
+    fn slope_at(&self, e: &Expression) -> Dual<f64, 1> {
+        Dual { value: self.equation.value(e, self.t, &self.x), partials: [1.0] }
     }
 
     /// The size of the terms that an expression is a sum of, as they are now.
@@ -93,7 +118,9 @@ impl Follower<'_> {
                 continue;
             }
             match self.side_of(guard) {
+                None if self.guard_held[guard] => self.config.sides[guard] = 0.0,
                 Some(side) => {
+                    self.guard_held[guard] = false;
                     self.config.sides[guard] = side;
                     // A reset took it away from zero.
                     self.fresh_guard[guard] = false;
@@ -103,11 +130,14 @@ impl Follower<'_> {
                     self.config.sides[guard] =
                         self.low(guard) + if self.equation.guards[guard].whole { 1.0 } else { 0.0 };
                     at_zero.push(guard);
+                    self.touching[guard] = true;
                 }
             }
         }
         self.adopt(self.config.clone(), Vec::new());
-        self.settle(&at_zero)?;
+        let settled = self.settle(&at_zero);
+        self.touching.fill(false);
+        settled?;
         let values = self.watched_values();
         let has_none =
             |guard: &usize| self.compiled.place(*guard).is_some_and(|place| values[place].is_nan());
@@ -366,6 +396,7 @@ impl Follower<'_> {
         let mut zero: Vec<usize> =
             zero.iter().copied().filter(|g| self.compiled.place(*g).is_some()).collect();
         self.add_what_is_zero(&mut zero);
+        zero.retain(|guard| !self.guard_held[*guard]);
         if zero.is_empty() {
             let config = self.config.clone();
             self.adopt(config, Vec::new());
@@ -387,8 +418,13 @@ impl Follower<'_> {
             let rates_of = |follower: &mut Self, config: Configuration| {
                 let own = follower.equation.compiled(&config);
                 let asked: Vec<bool> = zero.iter().map(|g| own.place(*g).is_some()).collect();
-                let (compiled, rates) = follower.rates_with(&config, &others(&zero, &asked));
+                let also = others(&zero, &asked);
+                let several = zero.len() > 1 || follower.touching[zero[0]];
+                let (compiled, mut rates) = follower.rates_to_order(&config, &also, several);
                 let place: Vec<Option<usize>> = zero.iter().map(|g| compiled.place(*g)).collect();
+                if several {
+                    follower.drop_noise(&config, &compiled, &zero, &mut rates);
+                }
                 (config, place, rates, asked)
             };
             let made = rates_of(follower, config);
@@ -456,7 +492,9 @@ impl Follower<'_> {
                     for i in (0..k).filter(|i| *i != j) {
                         coupled[i * k + j] |= from[i].zip(to[i]).is_none_or(|(a, b)| {
                             let scale = low.terms[a] + high.terms[b];
+                            let still = low.first_or_zero(a) == 0.0 && high.first_or_zero(b) == 0.0;
                             (low.first[a] - high.first[b]).abs() > 1e-12 * scale
+                                || still && low.direction(a) != high.direction(b)
                         });
                     }
                 }
@@ -686,8 +724,11 @@ impl Follower<'_> {
                         base[i] + added().sum::<f64>(),
                         added().fold(base[i].abs(), |a, v| a + v.abs()),
                     );
-                    // A rate that is zero to rounding counts as zero.
-                    goes(i, if rate.abs() <= 1e-13 * size { 0.0 } else { rate })
+                    // A rate that is zero to rounding counts as zero; where one field is followed
+                    // alone its second derivative is known.
+                    let alone = weights.iter().all(|w| *w == 0.0);
+                    let zero = if alone { direction[i] } else { 0.0 };
+                    goes(i, if rate.abs() <= 1e-13 * size { zero } else { rate })
                 })
             });
             if let Some(ways) = open {
@@ -804,6 +845,13 @@ impl Follower<'_> {
                 }
             }
             self.fresh_guard[*guard] = true;
+            self.tangent_guard[*guard] = false;
+        }
+        if k > 1 || self.touching[zero[0]] {
+            let (_, place, rates, _) = vertex(self, &|i| ways[i] == Way::Plus);
+            for (guard, place) in zero.iter().zip(&place) {
+                self.tangent_guard[*guard] = place.is_some_and(|p| rates.first_or_zero(p) == 0.0);
+            }
         }
         self.ask_new(&mut config);
         self.follow_sides(&mut config, &zero);
@@ -1015,6 +1063,40 @@ impl Follower<'_> {
         Ok(())
     }
 
+    /// Puts speeds of the functions in `zero` that are only rounding to zero: where several meet, or
+    /// where motion begins, the state and the time are known to rounding alone.
+    fn drop_noise(
+        &self,
+        config: &Configuration,
+        compiled: &Compiled,
+        zero: &[usize],
+        rates: &mut Rates,
+    ) {
+        let variables = self.load(config);
+        let near: Vec<Range> = variables.iter().map(|v| Range::new(*v, 0.0)).collect();
+        let mut field = vec![Range::default(); self.n];
+        compiled.field.evaluate(&near, &mut field);
+        let gradients = compiled.gradients(&variables);
+        for guard in zero {
+            let Some(place) = compiled.place(*guard) else { continue };
+            let along = compiled.touches[place].iter().zip(&gradients[place]);
+            let of_field: f64 = along
+                .filter(|(variable, slope)| **variable < self.n && **slope != 0.0)
+                .map(|(variable, slope)| slope.abs() * field[*variable].radius())
+                .sum();
+            let of_time = if self.touching[*guard] {
+                let e = &self.equation.guards[*guard].expression;
+                self.rounding_of_slope(e, rates.second[place])
+            } else {
+                0.0
+            };
+            let noise = if of_field.is_finite() { of_field.max(of_time) } else { of_time };
+            if rates.first[place].abs() <= noise {
+                rates.first[place] = 0.0;
+            }
+        }
+    }
+
     /// Surfaces by their places among `guards` in the order of the rule; those that it does not
     /// name are missing.
     pub(super) fn order_of(&self, guards: &[usize]) -> Vec<usize> {
@@ -1149,6 +1231,64 @@ impl Follower<'_> {
         }
     }
 
+    /// Finds the switching functions that contacts hold at zero: their gradients are sums of those
+    /// of the contacts' expressions and of these' speeds. They rest there, neither above nor below,
+    /// until the contact opens.
+    pub(super) fn hold_guards(&mut self) -> Result<(), HybridError> {
+        let before = self.guard_held.clone();
+        self.guard_held.fill(false);
+        if !self.contacts.is_empty() {
+            let (n, t, x) = (self.n, self.t, self.x.clone());
+            let mut field = vec![0.0; n];
+            self.rhs(t, &x, &mut field);
+            let span = self.options.t_end - self.options.t_start;
+            let scaled = |mut row: Vec<f64>| {
+                for (slope, size) in row.iter_mut().zip(self.size.iter().chain([&span])) {
+                    *slope *= if *size > 0.0 { *size } else { 1.0 };
+                }
+                row
+            };
+            let gradients = self.compiled.gradients(&self.variables);
+            let gradient = |place: usize| {
+                let mut row = vec![0.0; n + 1];
+                let along = self.compiled.touches[place].iter().zip(&gradients[place]);
+                along.for_each(|(variable, slope)| row[*variable] = *slope);
+                scaled(row)
+            };
+            let active = self.compiled.active.len();
+            let by: Vec<Vec<f64>> = (0..n).map(|i| self.second_along(&field, Some(i))).collect();
+            let surfaces: Vec<Vec<f64>> = self
+                .contacts
+                .iter()
+                .map(|contact| active + contact.watched)
+                .flat_map(|place| {
+                    let speed = by.iter().map(|by| by[place]).chain([0.0]).collect();
+                    [gradient(place), scaled(speed)]
+                })
+                .collect();
+            for (place, guard) in self.compiled.active.iter().enumerate() {
+                let g = &self.equation.guards[*guard];
+                let small = 1e-12 * self.magnitude(&g.expression);
+                let value = self.equation.value(&g.expression, t, &x);
+                self.guard_held[*guard] = !g.whole
+                    && !self.slides[*guard]
+                    && value.abs() <= small
+                    && is_sum_of(&surfaces, gradient(place));
+            }
+        }
+        if self.guard_held == before {
+            return Ok(());
+        }
+        let mut config = self.config.clone();
+        let held = (0..before.len()).filter(|guard| self.guard_held[*guard]);
+        held.for_each(|guard| config.sides[guard] = 0.0);
+        self.ask_new(&mut config);
+        self.adopt(config, self.sliding.clone());
+        let free: Vec<usize> =
+            (0..before.len()).filter(|g| before[*g] && !self.guard_held[*g]).collect();
+        if free.is_empty() { Ok(()) } else { self.settle(&[&self.sliding[..], &free].concat()) }
+    }
+
     /// A watched expression passes zero, or comes to it and stays: a row of the section, or an
     /// event of this direction. Says whether more is wanted.
     pub(super) fn pass(
@@ -1234,7 +1374,7 @@ impl Follower<'_> {
         }
         let (_, mut rates) = self.rates_of_second_order(&self.config.clone());
         let (slope, bend) = (rates.first_or_zero(place), rates.second[place]);
-        if !met && slope.abs() <= self.rounding_of_slope(i, bend) {
+        if !met && slope.abs() <= self.rounding_of_slope(&self.equation.watched[i], bend) {
             rates.first[place] = 0.0;
         }
         self.tangent[i] = !met && rates.first_or_zero(place) == 0.0;
@@ -1242,11 +1382,14 @@ impl Follower<'_> {
         self.watch_side[i] = if direction == 0.0 { self.side_ahead(place) } else { direction };
     }
 
-    /// By how much the speed of a watched expression that bends so may be off where its time is: as
-    /// much as it changes in some roundings of the time, and in those of the time in which the
+    /// By how much the speed of an expression that bends so may be off where its time is: as much
+    /// as it changes in some roundings of the time, and in those of the time in which the
     /// expression would move by its size.
-    fn rounding_of_slope(&self, i: usize, bend: f64) -> f64 {
-        let size = self.magnitude(&self.equation.watched[i]);
+    pub(super) fn rounding_of_slope(&self, e: &Expression, bend: f64) -> f64 {
+        if !bend.is_finite() {
+            return 0.0;
+        }
+        let size = self.magnitude(e);
         64.0 * f64::EPSILON * self.t.abs() * bend.abs() + 1e-13 * (2.0 * size * bend.abs()).sqrt()
     }
 

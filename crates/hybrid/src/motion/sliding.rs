@@ -17,6 +17,10 @@ const PASSES: usize = 3;
 /// no rounding which field leads away, and the state changes by the square of it.
 const LITTLE: f64 = 1e-9;
 
+/// So far back in a step that speeds which vanish at its end are no rounding, and two places give
+/// the limit of weights by a line.
+const BACK: f64 = 1e-5;
+
 impl Follower<'_> {
     pub(super) fn load(&self, config: &Configuration) -> Vec<f64> {
         let n = self.n;
@@ -336,12 +340,31 @@ impl Follower<'_> {
     }
 
     /// The mixture that the rule makes of the fields on all sides, not-a-number where there is
-    /// none, those fields, and the rates of the functions slid upon.
+    /// none, those fields, and the rates of the functions slid upon. Where the speeds on both sides
+    /// of a surface vanish together, the mixture is its limit on the way from the step's beginning.
     pub(super) fn corner_mixture(
         &mut self,
         t: f64,
         x: &[f64],
     ) -> (Mixture, Vec<Vec<f64>>, Vec<Vec<f64>>) {
+        let (mut found, fields, rates) = self.mixture_at(t, x);
+        if t != self.t && !found.weights.iter().all(|w| w.is_finite()) {
+            let [near, far] = [BACK, 2.0 * BACK].map(|share| {
+                let there: Vec<f64> =
+                    x.iter().zip(&self.x).map(|(x, x0)| x + share * (x0 - x)).collect();
+                self.mixture_at(t + share * (self.t - t), &there).0
+            });
+            let weights = near.weights.iter().zip(&far.weights);
+            found.weights = weights.map(|(near, far)| 2.0 * near - far).collect();
+            let margins = near.margins.iter().zip(&far.margins);
+            found.margins = margins
+                .map(|(near, far)| std::array::from_fn(|i| 2.0 * near[i] - far[i]))
+                .collect();
+        }
+        (found, fields, rates)
+    }
+
+    fn mixture_at(&mut self, t: f64, x: &[f64]) -> (Mixture, Vec<Vec<f64>>, Vec<Vec<f64>>) {
         let n = self.n;
         let (mut fields, mut rates) = (Vec::new(), Vec::new());
         for (compiled, variables) in &mut self.corners {
@@ -414,8 +437,6 @@ impl Follower<'_> {
     /// Gives weights that are none, where the speeds on both sides of a surface vanish together,
     /// their limit on the way from the step's beginning.
     pub(super) fn complete(&mut self, t: f64, x: &[f64], weights: &mut [f64]) {
-        // So far back that what vanishes is no rounding, and two places give the limit by a line.
-        const BACK: f64 = 1e-5;
         if weights.iter().all(|w| w.is_finite()) || t == self.t {
             return;
         }
@@ -606,7 +627,8 @@ impl Follower<'_> {
         self.rates_to_order(config, &[], true)
     }
 
-    fn rates_to_order(
+    /// The same, with both.
+    pub(super) fn rates_to_order(
         &mut self,
         config: &Configuration,
         also: &[usize],
