@@ -544,9 +544,9 @@ fn follow_once(
     follower.run_whole(observe).map(|(outcome, _)| outcome)
 }
 
-/// By how much integration and rounding may have moved the time `t` at which a run accumulates:
-/// three times as far as ten times the tolerance moves it, and a rounding of the time for each
-/// event. None if nothing accumulates then.
+/// By how much integration and rounding may have moved the time `t` at which a run accumulates, by
+/// runs of another method with a tolerance near rounding or, where that does not come so far, of
+/// the same one with ten times the tolerance. None if nothing accumulates then.
 fn error_of_accumulation(
     model: &Model,
     options: &Options,
@@ -554,19 +554,22 @@ fn error_of_accumulation(
     t: f64,
     events: u64,
 ) -> Option<f64> {
-    let coarser = Options {
-        rtol: 10.0 * options.rtol,
-        atol: options.atol.map(|atol| 10.0 * atol),
-        record: Record::Times { every: f64::INFINITY },
-        ..options.clone()
+    const FINE: f64 = 1e-14;
+    let quiet = Options { record: Record::Times { every: f64::INFINITY }, ..options.clone() };
+    let method = if options.method == Method::Taylor { Method::Dopri5 } else { Method::Taylor };
+    let finer = Options { method, rtol: FINE, atol: None, ..quiet.clone() };
+    let atol = options.atol.map(|atol| 10.0 * atol);
+    let coarser = Options { rtol: 10.0 * options.rtol, atol, ..quiet };
+    let moved = |other: &Options| match follow_once(model, other, &mut |_| true, reached) {
+        Ok(Outcome { ending: Ending::Zeno { t: other, .. }, .. })
+        | Err(HybridError::Accumulation { t: other, .. }) => Some((t - other).abs()),
+        _ => None,
     };
-    let other = match follow_once(model, &coarser, &mut |_| true, reached) {
-        Ok(Outcome { ending: Ending::Zeno { t, .. }, .. }) => t,
-        Err(HybridError::Accumulation { t, .. }) => t,
-        _ => return None,
+    let integration = match moved(&finer) {
+        Some(moved) => 2.0 * moved,
+        None => 3.0 * moved(&coarser)?,
     };
-    let rounding = 4.0 * f64::EPSILON * t.abs() * events as f64;
-    Some(3.0 * (t - other).abs() + rounding)
+    Some(integration + 8.0 * f64::EPSILON * t.abs() * events as f64)
 }
 
 /// Whether an event's expression is zero, to rounding, where a motion with these options starts.
@@ -634,6 +637,10 @@ const FORGET_BY: f64 = 0.1;
 
 /// Steps between two words on the time reached.
 const STEPS_BETWEEN_WORDS: u64 = 64;
+
+/// So many steps that take a run less than this part of its time would not end.
+const STEPS_BETWEEN_LOOKS: u64 = 16384;
+const NO_TIME: f64 = 1e-12;
 
 /// Scale of each state's error in a step.
 fn scale_now(follower: &Follower, step: &Step, out: &mut Vec<f64>) {
@@ -880,7 +887,7 @@ impl<'a> Follower<'a> {
         for watched in 0..follower.watch_side.len() {
             follower.begin_watching(watched, false, false);
         }
-        follower.rest_at_start()?;
+        follower.rest_on_stops()?;
         follower.new_conditions(model.definition());
         Ok(follower)
     }
@@ -905,6 +912,7 @@ impl<'a> Follower<'a> {
         let mut h = 0.0;
         let mut quiet = 0;
         let mut last_met = f64::NEG_INFINITY;
+        let mut looked_at = (self.outcome.steps, self.t);
         if !matches!(self.options.record, Record::Section(_)) {
             if !self.emit(self.t, None, observe) {
                 return Ok(Ending::Interrupted);
@@ -940,6 +948,16 @@ impl<'a> Follower<'a> {
             {
                 return Ok(Ending::Interrupted);
             }
+            if self.outcome.steps >= looked_at.0 + STEPS_BETWEEN_LOOKS {
+                let before = std::mem::replace(&mut looked_at, (self.outcome.steps, self.t)).1;
+                if self.t - before <= NO_TIME * (self.options.t_end - self.options.t_start) {
+                    let why =
+                        "steps, events or switches follow each other without end in no time: \
+                        describe by one [[event]] what happens there, or give another --method"
+                            .into();
+                    return Err(HybridError::Stuck { t: self.t, x: self.x.clone(), why });
+                }
+            }
             if self.outcome.steps >= self.options.max_steps {
                 return Err(HybridError::Budget { steps: self.outcome.steps, t: self.t });
             }
@@ -961,7 +979,7 @@ impl<'a> Follower<'a> {
             step.k[0].copy_from_slice(&room);
             self.noise.fill(0.0);
             if !room.iter().all(|v| v.is_finite()) {
-                if self.comes_to_rest(self.t) {
+                if self.comes_to_rest(self.t, true) {
                     continue;
                 }
                 return Err(self.left_domain(step.t, &step.x));
@@ -971,7 +989,7 @@ impl<'a> Follower<'a> {
             }
             if self.options.method == Method::Taylor {
                 if let Err(error) = self.expand(&mut step) {
-                    if self.land_at_an_edge()? || self.comes_to_rest(self.t) {
+                    if self.land_at_an_edge()? || self.comes_to_rest(self.t, true) {
                         continue;
                     }
                     return Err(error);
@@ -993,7 +1011,7 @@ impl<'a> Follower<'a> {
             }
             let accepted = self.step_within(&mut step, wanted, &mut list);
             let Some(Accepted { length: wanted, error, parts, rejected }) = accepted else {
-                if self.land_at_an_edge()? || self.comes_to_rest(self.t) {
+                if self.land_at_an_edge()? || self.comes_to_rest(self.t, true) {
                     continue;
                 }
                 return Err(self.left_domain(self.t, &step.x.clone()));

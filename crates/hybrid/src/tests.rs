@@ -1858,6 +1858,124 @@ fn a_body_at_rest_on_a_stop_is_on_it() {
     near(found[2], 18.0 - 0.15 * left * left, 1e-10);
 }
 
+/// While the motion slides somewhere, what is equal is equal: flags, counters, whole parts; and so is
+/// what a root leaves at zero.
+#[test]
+fn equality_holds_beside_sliding() {
+    let beside = |condition: &str| {
+        format!(
+            "states = ['x', 'n', 'y', 'w']\nstart = [1, 1, 3.5, 0]\n\
+             f = ['-sign(x)', '0', '0', 'if({condition}, 1, 0)']"
+        )
+    };
+    let ends = beside("n >= 1").replace("-sign(x)", "-sign(x) + t/4");
+    let counter = "states = ['x', 'u', 'n']\nstart = [1, 0, 0]\n\
+        f = ['-sign(x)', 'if(n >= 2, 1, -0.1)', '0']\n\
+        [[event]]\nevery = 1\nset = { n = 'n + 1' }";
+    let tank = "states = ['h', 'w']\nstart = [1, 0]\nf = ['-sqrt(h)', 'if(h <= 0, 1, 0)']";
+    for method in Method::ALL {
+        let last = |text: &str| *end_of(text, 5.0, method).unwrap().last().unwrap();
+        for holds in ["n >= 1", "n <= 1", "floor(y) >= 3", "clip(y, -1, 2) >= 2", "sign(y) >= 1"] {
+            near(last(&beside(holds)), 5.0, 1e-9);
+        }
+        for fails in ["n > 1", "n < 1", "floor(y) > 3", "mod(n, 2) < 1"] {
+            near(last(&beside(fails)), 0.0, 1e-9);
+        }
+        near(last(&ends), 5.0, 1e-9);
+        near(end_of(counter, 5.5, method).unwrap()[1], 3.3, 1e-9);
+        // It runs empty at t = 2. The root of zero has no Taylor series.
+        if method != Method::Taylor {
+            near(last(tank), 3.0, 1e-6);
+        }
+    }
+}
+
+/// Functions with one zero have sides that belong together: what no side decides does not rest.
+#[test]
+fn functions_with_one_zero_are_no_two_surfaces() {
+    let text = "states = ['x', 'y']\nstart = [0, -0.76]\n\
+        f = ['sign(y*(1 + x^2))', '0.2 - sign(y)']";
+    let found = run(&model(text), 3.0).1;
+    assert!(matches!(found, Err(HybridError::Undecided { .. })), "{found:?}");
+}
+
+/// A block on a stop that friction holds, too, does not fall through when friction gives way; speeds
+/// that turn between impacts, and events that note the turns, accumulate with the impacts.
+#[test]
+fn stops_hold_beside_friction_and_other_events() {
+    let block = |restitution: &str, force: &str| {
+        format!(
+            "states = ['x', 'v']\nstart = [0, 0]\nf = ['v', '-0.5 + 0.5*{force} - 0.3*sign(v)']\n\
+             [[event]]\nwhen = 'x'\ndirection = 'down'\nset = {{ v = '-{restitution}*v' }}\n\
+             after_zeno = 'stick'"
+        )
+    };
+    let ball = |states: &str, start: &str, rest: &str| {
+        format!(
+            "states = {states}\nstart = {start}\n{rest}\n[[event]]\nname = 'floor'\n\
+             when = 'x'\ndirection = 'down'\nset = {{ v = '-0.5*v' }}\nafter_zeno = 'stick'"
+        )
+    };
+    let dragged = "f = ['v', '-1 - 0.3*sign(v)']";
+    let way = "f = ['v', '-1', 'abs(v)']";
+    let apex = "f = ['v', '-1', '0']\n[[event]]\nwhen = 'v'\ndirection = 'down'\nset = { n = 'x' }";
+    let counted = "f = ['v', '-1', '0']\n[[event]]\nwhen = 'x'\ndirection = 'down'\n\
+        set = { n = 'n + 1' }";
+    for method in Method::ALL {
+        for restitution in ["0", "0.3", "0.5"] {
+            for force in ["sin(0.3*t)", "sin(t)", "sin(1.7*t)", "sin(3*t)"] {
+                let end = end_of(&block(restitution, force), 12.0, method).unwrap();
+                assert_eq!(end, [0.0, 0.0], "{method:?} {restitution} {force}");
+            }
+        }
+        for (states, rest) in
+            [("['x', 'v']", dragged), ("['x', 'v', 'n']", way), ("['x', 'v', 'n']", apex)]
+        {
+            for start in ["0.2, 0.1", "1, 0", "0.5, 1", "1, 2"] {
+                let start = if states.contains('n') {
+                    format!("[{start}, 0]")
+                } else {
+                    format!("[{start}]")
+                };
+                let text = ball(states, &start, rest);
+                let end = end_of(&text, 12.0, method).unwrap();
+                assert!(end[0].abs() < 1e-11 && end[1] == 0.0, "{method:?} {text} {end:?}");
+            }
+        }
+        // Before and after the floor's event in the file.
+        let first = ball("['x', 'v', 'n']", "[1, 0, 0]", counted);
+        let n = *end_of(&first, 12.0, method).unwrap().last().unwrap();
+        assert!(n > 20.0 && end_of(&first, 12.0, method).unwrap()[1] == 0.0, "{method:?} {n}");
+    }
+}
+
+/// A clock strikes at the moment at which a pulse takes the surface away that is slid upon.
+#[test]
+fn a_pulse_and_a_clock_meet_on_a_surface() {
+    for every in ["1", "0.8", "0.5", "0.2"] {
+        let text = format!(
+            "states = ['x', 'k']\nstart = [0.5, 0]\n\
+             f = ['if(x < 0.81 or mod(t, 1) < 0.2, 1, -0.5)', '0']\n\
+             [[event]]\nevery = {every}\nset = {{ k = 'k + 1' }}"
+        );
+        for method in Method::ALL {
+            // 0.31 to the surface, a pulse of 0.2 a period up to 1.01, down at half the speed.
+            near(end_of(&text, 4.5, method).unwrap()[0], 0.86, 1e-12);
+        }
+    }
+}
+
+/// Beyond a level that is reached the field is zero on it.
+#[test]
+fn a_level_on_which_the_field_vanishes_is_stayed_on() {
+    for method in Method::ALL {
+        for start in ["-1.7", "-0.1", "-2.3", "-0.9", "-1.3"] {
+            let text = format!("states = ['y']\nstart = [{start}]\nf = ['-y - floor(y)']");
+            near(end_of(&text, 5.0, method).unwrap()[0], 0.0, 1e-15);
+        }
+    }
+}
+
 /// The bound on the time at which impacts accumulate holds the integration's errors, too: a spring
 /// that presses a ball down, v' = -1 - x, whose flights take 2 atan v.
 #[test]

@@ -37,7 +37,7 @@ impl Follower<'_> {
                 }
                 Sought::Leave { place, plus } => leave.push((self.sliding[place], plus)),
                 Sought::Repelling => {
-                    if self.comes_to_rest(self.t) {
+                    if self.comes_to_rest(self.t, false) {
                         return Ok(None);
                     }
                     ceases = true;
@@ -127,6 +127,9 @@ impl Follower<'_> {
                 accumulates = accumulates.or(found.map(|(t, error)| (guard, t, error)));
             }
         }
+        if switches {
+            self.rest_on_stops()?;
+        }
         let jumps = if switches { self.watch_jumps(&held, &passed) } else { Vec::new() };
         for (i, _) in &jumps {
             passed.push(*i);
@@ -142,8 +145,11 @@ impl Follower<'_> {
         }
         jumps.iter().for_each(|(i, away)| self.fresh_watch[*i] = !away);
         fired.extend(self.new_conditions(definition));
-        if let Some((guard, t, error)) = accumulates.filter(|_| fired.is_empty()) {
-            if self.comes_to_rest(t) {
+        // Switches that come ever faster with events, such as speeds that turn between impacts, end
+        // where these do.
+        let by_events = self.trains.iter().any(|train| train.shrinks(self.t));
+        if let Some((guard, t, error)) = accumulates.filter(|_| fired.is_empty() && !by_events) {
+            if self.comes_to_rest(t, false) {
                 return Ok(None);
             }
             if !self.comes_to_meeting()? {
@@ -270,7 +276,12 @@ impl Follower<'_> {
                 && (!event.set.is_empty() || event.mode.is_some());
             if resets {
                 let grain = if self.trains[*i].shrinks(self.t) { self.grain(*i) } else { 0.0 };
-                if let Some((t, error)) = self.trains[*i].note(self.t, grain) {
+                let found = self.trains[*i].note(self.t, grain);
+                // Others that accumulate with one on whose surface the motion may rest wait for it.
+                let mut all = definition.events().iter().zip(&self.trains);
+                let waits = !event.sticks
+                    && all.any(|(event, train)| event.sticks && train.shrinks(self.t));
+                if let Some((t, error)) = found.filter(|_| !waits) {
                     zeno = Some((*i, t, error));
                 }
             }
@@ -312,10 +323,17 @@ impl Follower<'_> {
             let struck = self.keep_contacts(definition, &old);
             self.hold_guards()?;
             for i in 0..self.watch_side.len() {
-                if !self.contacts.iter().any(|c| c.watched == i) {
-                    let met = self.event_of[i].is_some_and(|event| fired.contains(&event));
-                    self.begin_watching(i, watched.contains(&i), met);
+                let met = self.event_of[i].is_some_and(|event| fired.contains(&event));
+                // What the reset leaves alone is where it was, however near to zero.
+                let e = &self.equation.watched[i];
+                let now = self.equation.value(e, self.t, &self.x);
+                let is_away = !met && !self.fresh_watch[i] && now * self.watch_side[i] > 0.0;
+                if is_away && now == self.equation.value(e, self.t, &old)
+                    || self.contacts.iter().any(|c| c.watched == i)
+                {
+                    continue;
                 }
+                self.begin_watching(i, watched.contains(&i), met);
             }
             for i in &watched {
                 let Some(event) = self.event_of[*i] else { continue };
@@ -501,14 +519,23 @@ impl Follower<'_> {
         if bend > 0.0 { (8e3 * rounding / bend).sqrt() } else { 0.0 }
     }
 
-    /// A start at rest on a surface on which motion may stick, pressed against it, stays there.
-    pub(super) fn rest_at_start(&mut self) -> Result<(), HybridError> {
+    /// What lies without a speed at a surface on which motion may stick, and is pressed against it,
+    /// stays there.
+    pub(super) fn rest_on_stops(&mut self) -> Result<(), HybridError> {
         let definition = self.model.definition().clone();
         let config = self.config.clone();
         for i in 0..self.watch_side.len() {
             let Some(event) = self.event_of[i].filter(|e| definition.events()[*e].sticks) else {
                 continue;
             };
+            let asked = definition.events()[event].from.is_none_or(|mode| mode == config.mode);
+            if !asked || self.contacts.iter().any(|c| c.watched == i) {
+                continue;
+            }
+            let e = &self.equation.watched[i];
+            if self.equation.value(e, self.t, &self.x).abs() > 1e-12 * self.magnitude(e) {
+                continue;
+            }
             let When::Zero(_, direction) = definition.events()[event].when else { continue };
             let into = match direction {
                 Direction::Down => -1.0,
@@ -517,8 +544,9 @@ impl Follower<'_> {
             };
             let (compiled, rates) = self.rates(&config);
             let place = compiled.active.len() + i;
-            let rests =
-                self.fresh_watch[i] && rates.first[place].abs() <= 1e-14 * rates.terms[place];
+            let by = |i: usize| self.second_along(&rates.field, Some(i))[place].abs();
+            let speeds: f64 = (0..self.n).map(|i| by(i) * self.size[i]).sum();
+            let rests = rates.first[place].abs() <= 1e-14 * speeds.max(rates.terms[place]);
             if rests && rates.second[place] * into > 0.0 {
                 self.stick(&definition, event, self.t);
                 return self.hold_guards();
@@ -706,8 +734,8 @@ impl Follower<'_> {
 
     /// Whether the motion rests from `t` on at the point that it has come to: all functions that
     /// are nearly zero there are zero, a mixture of the fields around it vanishes, and none of the
-    /// fields leads away on its own side. If so the state is put there.
-    pub(super) fn comes_to_rest(&mut self, t: f64) -> bool {
+    /// fields leads away on its own side. If so the state is put there. `no_way`: no side leads on.
+    pub(super) fn comes_to_rest(&mut self, t: f64, no_way: bool) -> bool {
         if self.equation.depends_on_time() || self.equation.events_see_time() {
             return false;
         }
@@ -738,8 +766,11 @@ impl Follower<'_> {
         let fields: Vec<Vec<f64>> = (0..1 << near.len())
             .map(|vertex| velocity(&of_sides(vertex, self), &x, self))
             .collect();
-        // States that hardly move on any side until the run ends rest.
         let left = self.options.t_end - t;
+        if no_way && self.stops_at_equality(t, &x, &near, &fields, left) {
+            return true;
+        }
+        // States that hardly move on any side until the run ends rest.
         let fastest: Vec<f64> =
             (0..n).map(|i| fields.iter().fold(0.0_f64, |most, f| most.max(f[i].abs()))).collect();
         let moves: Vec<usize> = (0..n)
@@ -751,7 +782,9 @@ impl Follower<'_> {
         let parts: Vec<Vec<f64>> =
             fields.iter().map(|f| moves.iter().map(|i| f[*i] / fastest[*i]).collect()).collect();
         // If mixtures differ, only one that all surfaces hold is known to stay.
-        if settling::mixtures_differ(&parts) && !self.holds_still(&near, &moves) {
+        // Nor are all mixtures there of functions with one zero, whose sides belong together.
+        let all_there = || settling::independent(&self.gradients_of(&near));
+        if (settling::mixtures_differ(&parts) || !all_there()) && !self.holds_still(&near, &moves) {
             return false;
         }
         if !nearest_of_hull(&parts).iter().all(|v| v.abs() <= 1e-6) {
@@ -789,13 +822,57 @@ impl Follower<'_> {
         true
     }
 
+    /// Functions that the fields on no side move from their zero, as those of an empty tank, rest
+    /// there, and comparisons see equality, whatever else moves. Whether the motion goes on so.
+    fn stops_at_equality(
+        &mut self,
+        t: f64,
+        x: &[f64],
+        near: &[(usize, usize)],
+        fields: &[Vec<f64>],
+        left: f64,
+    ) -> bool {
+        let n = self.n;
+        let mut config = self.config.clone();
+        near.iter().for_each(|(_, guard)| config.sides[*guard] = 0.0);
+        let compiled = self.equation.compiled(&config);
+        let mut variables = self.load(&config);
+        variables[..n].copy_from_slice(x);
+        variables[n] = t;
+        let mut field = vec![0.0; n];
+        compiled.field.evaluate(&variables, &mut field);
+        let gradients = self.gradients_of(near);
+        let stands = |field: &[f64]| {
+            near.iter().zip(&gradients).all(|((_, guard), gradient)| {
+                let rate: f64 = gradient.iter().zip(field).map(|(g, f)| g * f).sum();
+                let size = self.magnitude(&self.equation.guards[*guard].expression);
+                rate.abs() * left <= 1e-8 * size
+            })
+        };
+        let finite = |field: &&Vec<f64>| field.iter().all(|f| f.is_finite());
+        if !(finite(&&field) && stands(&field) && fields.iter().filter(finite).all(|f| stands(f))) {
+            return false;
+        }
+        let sliding: Vec<usize> =
+            self.sliding.iter().copied().filter(|g| near.iter().all(|(_, o)| o != g)).collect();
+        (self.x, self.t) = (x.to_vec(), t);
+        let size = |i: usize| self.size[i].max(1e-3 * self.size.iter().fold(0.0, |a, b| b.max(a)));
+        self.rests = sliding.is_empty()
+            && self.contacts.is_empty()
+            && (0..n).all(|i| field[i].abs() * left <= 1e-8 * size(i));
+        self.adopt(config, sliding);
+        true
+    }
+
     /// The functions that are zero but for a millionth of the states, by place and guard.
     fn nearly_zero(&self, values: &[f64]) -> Vec<(usize, usize)> {
         let largest = self.size.iter().fold(0.0_f64, |most, s| most.max(*s));
         let active = self.compiled.active.iter().copied().enumerate();
         // On the wrong side of another a function may have no value.
         let near = |(place, guard): &(usize, usize)| {
-            !self.equation.guards[*guard].whole && !(values[*place].abs() > 1e-6 * largest)
+            !self.equation.guards[*guard].whole
+                && !self.equation.rests(*guard, &self.config)
+                && !(values[*place].abs() > 1e-6 * largest)
         };
         active.filter(near).collect()
     }

@@ -397,6 +397,21 @@ impl Follower<'_> {
             zero.iter().copied().filter(|g| self.compiled.place(*g).is_some()).collect();
         self.add_what_is_zero(&mut zero);
         zero.retain(|guard| !self.guard_held[*guard]);
+        if zero.len() == 1 {
+            // A speed that is only rounding may be a function that is zero, too.
+            let config = self.config.clone();
+            let (compiled, mut rates) = self.rates(&config);
+            if self.drop_noise(&config, &compiled, &zero, &mut rates) {
+                let is_new = |guard: &usize| {
+                    !zero.contains(guard)
+                        && !self.slides[*guard]
+                        && !self.guard_held[*guard]
+                        && self.side_of(*guard).is_none()
+                };
+                let new: Vec<usize> = self.compiled.active.iter().copied().filter(is_new).collect();
+                zero.extend(new);
+            }
+        }
         if zero.is_empty() {
             let config = self.config.clone();
             self.adopt(config, Vec::new());
@@ -407,7 +422,7 @@ impl Follower<'_> {
             zero.iter().map(|g| self.compiled.place(*g).map_or(f64::NAN, |p| values[p])).collect();
         let lows: Vec<f64> = zero.iter().map(|g| self.low(*g)).collect();
         let highs: Vec<f64> = zero.iter().map(|g| self.high(*g)).collect();
-        let some_rest = Cell::new(false);
+        let [some_rest, some_noise] = [Cell::new(false), Cell::new(false)];
         let vertex = |follower: &mut Self, plus: &dyn Fn(usize) -> bool| {
             let mut config = follower.config.clone();
             for (i, guard) in zero.iter().enumerate() {
@@ -419,11 +434,13 @@ impl Follower<'_> {
                 let own = follower.equation.compiled(&config);
                 let asked: Vec<bool> = zero.iter().map(|g| own.place(*g).is_some()).collect();
                 let also = others(&zero, &asked);
-                let several = zero.len() > 1 || follower.touching[zero[0]];
-                let (compiled, mut rates) = follower.rates_to_order(&config, &also, several);
+                let touching = zero.iter().any(|guard| follower.touching[*guard]);
+                let (compiled, mut rates) = follower.rates_to_order(&config, &also, touching);
                 let place: Vec<Option<usize>> = zero.iter().map(|g| compiled.place(*g)).collect();
-                if several {
+                if follower.drop_noise(&config, &compiled, &zero, &mut rates) {
+                    rates = follower.rates_to_order(&config, &also, true).1;
                     follower.drop_noise(&config, &compiled, &zero, &mut rates);
+                    some_noise.set(true);
                 }
                 (config, place, rates, asked)
             };
@@ -499,12 +516,21 @@ impl Follower<'_> {
                     }
                 }
             }
-            groups(k, |i, j| coupled[i * k + j])
+            let mut sets = groups(k, |i, j| coupled[i * k + j]);
+            // What the time alone moves is decided first: others may jump with it.
+            let by_time = |i: &usize| {
+                place0[*i].is_some_and(|p| compiled.touches[p].iter().all(|v| *v >= self.n))
+            };
+            sets.sort_by_key(|set| !set.iter().all(by_time));
+            sets
         };
         let mut ways = vec![Way::Plus; k];
         // A rule chooses among velocities although the fields are sums of what each side adds.
         let mut by_rule = false;
-        for set in &sets {
+        for (done, set) in sets.iter().enumerate() {
+            let mut decided = vec![false; k];
+            let before = sets[..done].iter().flatten();
+            before.for_each(|i| decided[*i] = ways[*i] == Way::Plus);
             if set.iter().all(|i| kept[zero[*i]]) {
                 set.iter().for_each(|i| ways[*i] = Way::Stay);
                 continue;
@@ -522,7 +548,10 @@ impl Follower<'_> {
             let mut cache: HashMap<Vec<bool>, Vertex> = Default::default();
             let mut at = |follower: &mut Self, plus: Vec<bool>| {
                 if !cache.contains_key(&plus) {
-                    let all = |i: usize| set.iter().position(|s| *s == i).is_some_and(|p| plus[p]);
+                    let all = |i: usize| match set.iter().position(|s| *s == i) {
+                        Some(p) => plus[p],
+                        None => decided[i],
+                    };
                     let made = vertex(follower, &all);
                     cache.insert(plus.clone(), made);
                 }
@@ -589,7 +618,8 @@ impl Follower<'_> {
                     (0..set.len()).filter(|i| assignment[*i] == Way::Stay).collect();
                 let plus: Vec<bool> = assignment.iter().map(|w| *w == Way::Plus).collect();
                 let on = |i: usize| set.iter().position(|s| *s == i).is_some_and(|p| plus[p]);
-                let jumped = self.jumped(&zero, &|i| if on(i) { highs[i] } else { lows[i] });
+                let high = |i: usize| on(i) || decided[i];
+                let jumped = self.jumped(&zero, &|i| if high(i) { highs[i] } else { lows[i] });
                 let misses = |p: usize| {
                     let stays = assignment[p] == Way::Stay;
                     jumped[set[p]].is_some_and(|up| stays || up != plus[p])
@@ -607,6 +637,11 @@ impl Follower<'_> {
                     let mut flipped = plus.clone();
                     flipped[*s] = true;
                     columns.push(at(self, flipped));
+                }
+                // One that stays a whole number on its upper side is none, either.
+                let whole = |s: &usize| self.equation.guards[zero[set[*s]]].whole;
+                if slides.iter().zip(&columns).any(|(s, column)| whole(s) && column.5[*s]) {
+                    return false;
                 }
                 for column in &columns {
                     asked.iter_mut().zip(&column.3).for_each(|(asked, there)| *asked |= there);
@@ -737,7 +772,7 @@ impl Follower<'_> {
             }
             let chosen = match found.as_slice() {
                 [] if self.options.intersection == Intersection::Undecided
-                    && self.comes_to_rest(self.t) =>
+                    && self.comes_to_rest(self.t, true) =>
                 {
                     return Ok(());
                 }
@@ -847,7 +882,7 @@ impl Follower<'_> {
             self.fresh_guard[*guard] = true;
             self.tangent_guard[*guard] = false;
         }
-        if k > 1 || self.touching[zero[0]] {
+        if k > 1 || some_noise.get() || self.touching[zero[0]] {
             let (_, place, rates, _) = vertex(self, &|i| ways[i] == Way::Plus);
             for (guard, place) in zero.iter().zip(&place) {
                 self.tangent_guard[*guard] = place.is_some_and(|p| rates.first_or_zero(p) == 0.0);
@@ -898,7 +933,7 @@ impl Follower<'_> {
         }
         if let Err(open) = self.no_side_is_left_open(&zero) {
             let undecided = self.options.intersection == Intersection::Undecided;
-            return if undecided && self.comes_to_rest(self.t) { Ok(()) } else { Err(open) };
+            return if undecided && self.comes_to_rest(self.t, true) { Ok(()) } else { Err(open) };
         }
         self.follow_jumps(&zero)
     }
@@ -1026,7 +1061,9 @@ impl Follower<'_> {
         if self.sliding.is_empty() {
             return Ok(());
         }
-        let open: Vec<usize> = zero.iter().copied().filter(|g| !self.sliding.contains(g)).collect();
+        // What rests at zero is equal there.
+        let open = |g: &usize| !self.sliding.contains(g) && !self.equation.rests(*g, &self.config);
+        let open: Vec<usize> = zero.iter().copied().filter(open).collect();
         let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; self.n]);
         self.rhs(t, &x, &mut field);
         for guard in open {
@@ -1063,17 +1100,20 @@ impl Follower<'_> {
         Ok(())
     }
 
-    /// Puts speeds of the functions in `zero` that are only rounding to zero: where several meet, or
-    /// where motion begins, the state and the time are known to rounding alone.
+    /// Puts speeds of the functions in `zero` that are only rounding to zero: the state and the time
+    /// are known to rounding alone. Whether there are any.
     fn drop_noise(
         &self,
         config: &Configuration,
         compiled: &Compiled,
         zero: &[usize],
         rates: &mut Rates,
-    ) {
+    ) -> bool {
+        let mut some = false;
         let variables = self.load(config);
-        let near: Vec<Range> = variables.iter().map(|v| Range::new(*v, 0.0)).collect();
+        let rounding = |i: usize| self.lately.get(i).map_or(0.0, |size| f64::EPSILON * size);
+        let near = variables.iter().enumerate().map(|(i, v)| Range::new(*v, rounding(i)));
+        let near: Vec<Range> = near.collect();
         let mut field = vec![Range::default(); self.n];
         compiled.field.evaluate(&near, &mut field);
         let gradients = compiled.gradients(&variables);
@@ -1091,10 +1131,12 @@ impl Follower<'_> {
                 0.0
             };
             let noise = if of_field.is_finite() { of_field.max(of_time) } else { of_time };
-            if rates.first[place].abs() <= noise {
+            if rates.first[place] != 0.0 && rates.first[place].abs() <= noise {
                 rates.first[place] = 0.0;
+                some = true;
             }
         }
+        some
     }
 
     /// Surfaces by their places among `guards` in the order of the rule; those that it does not
@@ -1456,6 +1498,11 @@ impl Follower<'_> {
 fn position_first(i: usize, first: &[[f64; 2]; 4], second: &[[f64; 2]; 4]) -> ([f64; 4], [f64; 4]) {
     let order = if i == 0 { [0, 1, 2, 3] } else { [0, 2, 1, 3] };
     (order.map(|f| second[f][i]), order.map(|f| first[f][1 - i]))
+}
+
+/// Whether none of these vectors is a sum of multiples of those before.
+pub(super) fn independent(rows: &[Vec<f64>]) -> bool {
+    (1..rows.len()).all(|i| !is_sum_of(&rows[..i], rows[i].clone()))
 }
 
 /// Whether a vector that is not zero is a sum of multiples of others, to rounding.
