@@ -222,6 +222,19 @@ impl Newton {
     }
 }
 
+/// Whether a point misses itself by more than the return's error, as one behind a fold does, where
+/// there is no orbit.
+fn misses(map: &dyn ReturnMap, u: &[f64], p: f64, r: &Returned, residual: f64) -> bool {
+    const ROUNDING: f64 = 1e-12;
+    if residual <= ROUNDING * r.extent {
+        return false;
+    }
+    map.roughly(u, p).is_ok_and(|rough| {
+        let apart: Vec<f64> = r.point.iter().zip(&rough.point).map(|(a, b)| a - b).collect();
+        residual > 2.0 * sized(&apart, r)
+    })
+}
+
 /// The size of a difference of states, each in units of the loop's size as it has it, times the
 /// loop's extent.
 fn sized(difference: &[f64], r: &Returned) -> f64 {
@@ -250,7 +263,10 @@ pub fn closed_orbit(
         let r = map.returned(&u, p, true)?;
         let difference: Vec<f64> = r.point.iter().zip(&u).map(|(a, b)| a - b).collect();
         let residual = sized(&difference, &r);
-        if settled(residual, before, newton.closed(map, &u, &r)?) {
+        let helps = residual > 0.0 && residual < 0.5 * before;
+        let closed = settled(residual, before, newton.closed(map, &u, &r)?);
+        let ends = closed && !(map.has_points() && helps);
+        if ends && !(map.has_points() && misses(map, &u, p, &r, residual)) {
             return orbit(map, u, p, r, residual, iterations);
         }
         before = residual;
@@ -258,10 +274,15 @@ pub fn closed_orbit(
         let mut matrix = less_identity(&r.derivative, n);
         matrix[axis * n + axis] = 1.0;
         let right: Vec<f64> = difference.iter().map(|d| -d).collect();
-        let step = solve_any(&matrix, &right, SINGULAR * largest(&matrix)).ok_or(
-            "the closed orbit is not isolated here: the return map has the multiplier 1 (a fold, \
-                or a conserved quantity)",
-        )?;
+        let step = match solve_any(&matrix, &right, SINGULAR * largest(&matrix)) {
+            Some(step) => step,
+            None if closed => return orbit(map, u, p, r, residual, iterations),
+            None => {
+                return Err("the closed orbit is not isolated here: the return map has the \
+                            multiplier 1 (a fold, or a conserved quantity)"
+                    .into());
+            }
+        };
         u.iter_mut()
             .zip(&step)
             .enumerate()
@@ -464,6 +485,8 @@ pub struct BranchOptions {
 
 /// Shortest step as a share of the longest.
 const SHORTEST: f64 = 1.0 / 16_384.0;
+/// Part of it down to which points of maps are followed.
+const NARROW: f64 = 1.0 / 256.0;
 /// Steps grow after at most so many Newton iterations, and shrink when more than [`MANY`] are
 /// needed.
 const FEW: usize = 3;
@@ -537,6 +560,8 @@ pub fn follow(
         parameter: (options.to - options.from).abs(),
     };
     let points = map.has_points();
+    // Of a flat return a fold is narrow beside the size of the state.
+    let shortest = SHORTEST * options.longest * if points { NARROW } else { 1.0 };
     // The last member whose multipliers are told from one on the unit circle.
     let mut told = first.clone();
     let towards = (options.to - options.from).signum();
@@ -579,12 +604,21 @@ pub fn follow(
                 let said = "the orbit shrinks to a point".to_owned();
                 Err(Trouble { obstacle: Obstacle::Point(next.point), said })
             }
+            // Farther from the guess than the step is long another branch may be.
+            Ok(next)
+                if points
+                    && !beyond
+                    && apart(&next.point, &guess, scales.state) > step
+                    && 0.5 * step >= shortest =>
+            {
+                Err("too long a step".into())
+            }
             Ok(next)
                 if !beyond
                     && (next.iterations > MANY
                         || jumps(last, &next)
                         || next.events != last.events)
-                    && 0.5 * step >= SHORTEST * options.longest =>
+                    && 0.5 * step >= shortest =>
             {
                 Err("too long a step".into())
             }
@@ -594,7 +628,7 @@ pub fn follow(
             Ok(next) => next,
             Err(trouble) => {
                 step *= 0.5;
-                if step < SHORTEST * options.longest {
+                if step < shortest {
                     if trouble.obstacle == Obstacle::Grazing
                         && let Some((next, hop)) =
                             behind_grazing(map, last, (&du, dp), &scales, options)
@@ -856,6 +890,11 @@ fn vanishing(map: &dyn ReturnMap, orbits: &[Orbit], missed: f64) -> Bifurcation 
     })
 }
 
+/// The distance of two states in this unit.
+fn apart(a: &[f64], b: &[f64], unit: f64) -> f64 {
+    sqrt(a.iter().zip(b).map(|(a, b)| (a - b) / unit).map(|d| d * d).sum())
+}
+
 /// Whether multipliers differ so much that changes between these orbits might be missed.
 fn jumps(a: &Orbit, b: &Orbit) -> bool {
     let pairs = a.multipliers.iter().zip(&b.multipliers);
@@ -877,6 +916,8 @@ fn arclength(
 ) -> Result<Orbit, Trouble> {
     let (n, axis) = (map.states(), map.axis());
     let (mut u, mut q, mut before) = (guess.to_vec(), p, f64::INFINITY);
+    // The iterations after which the orbit was closed.
+    let mut needed = None;
     for iterations in 0..=newton.iterations {
         let r = map.returned(&u, q, true)?;
         let difference: Vec<f64> = r.point.iter().zip(&u).map(|(a, b)| a - b).collect();
@@ -884,12 +925,18 @@ fn arclength(
         let along: f64 = (0..n).map(|i| du[i] * (u[i] - guess[i]) / scales.state).sum::<f64>()
             + dp * (q - p) / scales.parameter;
         let done = settled(residual, before, newton.closed(map, &u, &r)?) && along.abs() < 1e-6;
-        // With a multiplier near 1 a small residual may still be far from an orbit: Newton's method
-        // goes on as long as it helps.
+        // With a multiplier near 1 a small residual may still be far from an orbit, as all of a
+        // map's points behind a fold are: Newton's method goes on as long as it helps.
         let near_one = |m: &[f64; 2]| distance(*m, [1.0, 0.0]) < NEAR_ONE;
         let helps = residual > 0.0 && residual < 0.5 * before;
-        if done && !(helps && multipliers_of(&r.derivative, n, axis).iter().any(near_one)) {
-            return orbit(map, u, q, r, residual, iterations);
+        let goes_on =
+            map.has_points() || done && multipliers_of(&r.derivative, n, axis).iter().any(near_one);
+        if done && map.has_points() {
+            needed = needed.or(Some(iterations));
+        }
+        let ends = done && !(helps && goes_on);
+        if ends && !(map.has_points() && misses(map, &u, q, &r, residual)) {
+            return orbit(map, u, q, r, residual, needed.unwrap_or(iterations));
         }
         before = residual;
         // The derivative in the parameter by differences; its error only slows Newton's method

@@ -125,18 +125,20 @@ impl Question for GeneralOrbit {
         at(&model, along, along.to)?;
         options.mode = found.mode;
         // Newton's method may come to states from which there is no return, or one of days.
-        let usual = once_around(&model, &options, &self.after, &found_here)?.steps;
-        options.max_steps = options.max_steps.min(LONGEST * usual.max(LEAST_STEPS));
-        let map = Map { model: &model, options, after: &self.after, along };
+        let usual = once_around(&model, &options, &self.after, &found_here)?;
+        options.max_steps = options.max_steps.min(LONGEST * usual.steps.max(LEAST_STEPS));
+        let units = self.units(&usual.bounds);
+        let map = Map { model: &model, options, after: &self.after, along, units };
         let rtol = self.run.options.rtol;
+        let least = map.units.iter().copied().fold(f64::INFINITY, f64::min);
         let newton = Newton {
             closed: (CLOSED * rtol).max(LEAST_CLOSED),
-            atol: self.run.options.atol.unwrap_or(0.0),
+            atol: self.run.options.atol.unwrap_or(0.0) / least,
             rtol,
             iterations: ITERATIONS,
         };
-        let size = if map.has_points() { self.size_of_states(&found_here) } else { 0.0 };
-        let guess: Vec<f64> = found_here.into_iter().chain([0.0]).collect();
+        let size = if map.has_points() { 1.0 } else { 0.0 };
+        let guess = map.measured(&found_here);
         let first = branch::closed_orbit(&map, &guess, along.from, newton)
             .map_err(|trouble| HybridError::NoOrbit(trouble.said))?;
         let width = (along.to - along.from).abs();
@@ -156,7 +158,7 @@ impl Question for GeneralOrbit {
             answer.stop = Stop::Interrupted;
         }
         for orbit in &mut found.orbits {
-            orbit.point.pop();
+            orbit.point = map.state(&orbit.point);
             if let Some(strobe) = &strobe {
                 let model = at(&model, along, orbit.parameter)?;
                 orbit.point = strobe.reached(&model, &map.options, orbit.point.clone())?;
@@ -172,14 +174,32 @@ impl Question for GeneralOrbit {
 }
 
 impl GeneralOrbit {
-    /// The largest size of a state at `x`; states that have come to zero, to rounding, are as large
-    /// as at the start, or as one if that is zero, too.
-    fn size_of_states(&self, x: &[f64]) -> f64 {
-        let largest = |x: &[f64]| x.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    /// The unit of each state, a power of two: its size on a way with these bounds, or at the start
+    /// if it has come to zero since, to rounding. Of a state that is zero it is the largest one.
+    fn units(&self, bounds: &[[f64; 2]]) -> Vec<f64> {
         let suggested = || self.run.model.start().ok().flatten().unwrap_or_default();
-        let began = largest(&self.run.options.start.clone().unwrap_or_else(suggested));
-        let sizes = [largest(x), began, 1.0];
-        sizes.into_iter().find(|size| *size > ROUNDED * began).unwrap_or(1.0)
+        let start = self.run.options.start.clone().unwrap_or_else(suggested);
+        let sizes: Vec<f64> = bounds
+            .iter()
+            .enumerate()
+            .map(|(i, [low, high])| {
+                let (now, began) =
+                    (low.abs().max(high.abs()), start.get(i).map_or(0.0, |x| x.abs()));
+                if now > ROUNDED * began { now } else { began }
+            })
+            .collect();
+        let largest = sizes.iter().copied().fold(0.0, f64::max);
+        let unit = |size: &f64| {
+            let (mut unit, size) = (1.0, if *size > 0.0 { *size } else { largest });
+            while size >= 2.0 * unit {
+                unit *= 2.0;
+            }
+            while size < unit && size > 0.0 {
+                unit *= 0.5;
+            }
+            unit
+        };
+        sizes.iter().map(unit).collect()
     }
 }
 
@@ -252,13 +272,26 @@ struct Map<'a> {
     options: Options,
     after: &'a Return,
     along: &'a Along,
+    /// The unit in which each state is measured.
+    units: Vec<f64>,
 }
 
 impl Map<'_> {
+    /// A state in its units, and the one more that is zero.
+    fn measured(&self, x: &[f64]) -> Vec<f64> {
+        x.iter().zip(&self.units).map(|(x, unit)| x / unit).chain([0.0]).collect()
+    }
+
+    /// The state that is so in its units.
+    fn state(&self, u: &[f64]) -> Vec<f64> {
+        u.iter().zip(&self.units).map(|(u, unit)| u * unit).collect()
+    }
+
     fn tried(&self, u: &[f64], p: f64, options: &Options) -> Result<Returned, HybridError> {
         let n = u.len() - 1;
         let model = at(self.model, self.along, p)?;
-        let turn = once_around(&model, options, self.after, &u[..n]).map_err(|e| match e {
+        let x = self.state(u);
+        let turn = once_around(&model, options, self.after, &x).map_err(|e| match e {
             HybridError::Budget { .. } => HybridError::NoOrbit(format!(
                 "the motion is not back in {LONGEST} times the steps of the first orbit: it \
                     leaves, or the period grows without bound, as near a homoclinic orbit"
@@ -274,15 +307,18 @@ impl Map<'_> {
         }
         let mut derivative = vec![0.0; (n + 1) * (n + 1)];
         for (i, row) in turn.matrix.chunks(n).enumerate() {
-            derivative[i * (n + 1)..i * (n + 1) + n].copy_from_slice(row);
+            for (j, slope) in row.iter().enumerate() {
+                derivative[i * (n + 1) + j] = slope * self.units[j] / self.units[i];
+            }
         }
+        let lengths = turn.bounds.iter().zip(&self.units).map(|([low, high], u)| (high - low) / u);
+        let mut extent = lengths.map(|length| length * length).sum::<f64>().sqrt();
         // A point of a map has no extent: it is closed to a share of its size, or of one.
-        let mut extent = turn.extent;
         if self.has_points() {
             extent = u.iter().fold(extent, |most, x| most.max(x.abs()));
             extent = if extent > 0.0 { extent } else { 1.0 };
         }
-        let point: Vec<f64> = turn.end.into_iter().chain([0.0]).collect();
+        let point = self.measured(&turn.end);
         Ok(Returned {
             same: vec![point.clone()],
             point,
@@ -328,14 +364,16 @@ impl ReturnMap for Map<'_> {
     /// The nearest rest in a box around the point; the motion from it need not come back.
     fn rest(&self, u: &[f64], p: f64) -> Option<(Vec<f64>, Vec<[f64; 2]>)> {
         let model = at(self.model, self.along, p).ok()?;
-        let u = &u[..u.len() - 1];
-        let size = u.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-        let within: Vec<(f64, f64)> = u.iter().map(|x| (x - size, x + size)).collect();
-        let apart = |x: &[f64]| x.iter().zip(u).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
+        let largest = u.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+        let middle = self.state(u);
+        let around = middle.iter().zip(&self.units).map(|(x, unit)| (x, largest * unit));
+        let within: Vec<(f64, f64)> = around.map(|(x, size)| (x - size, x + size)).collect();
+        let apart =
+            |x: &[f64]| self.measured(x).iter().zip(u).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
         let found =
             rests(&model, &within).ok()?.into_iter().filter(|rest| rest.mode == self.options.mode);
         let nearest = found.min_by(|a, b| apart(&a.x).total_cmp(&apart(&b.x)))?;
-        Some((nearest.x.into_iter().chain([0.0]).collect(), nearest.eigenvalues))
+        Some((self.measured(&nearest.x), nearest.eigenvalues))
     }
 }
 
@@ -481,6 +519,72 @@ mod tests {
         assert_eq!(changes.len(), 1, "{changes:?}");
         assert!(changes[0].0 == "period-doubling");
         assert!((changes[0].1 - 0.75 * 0.49).abs() <= changes[0].2, "{changes:?}");
+    }
+
+    /// In any units of the states: the logistic map in 10^-9, Henon's with a second state of another
+    /// size, a driven flow beside a state 100 times as large.
+    #[test]
+    fn branches_do_not_depend_on_units() {
+        let one = |changes: Vec<(String, f64, f64)>, word: &str, right: f64| {
+            assert_eq!(changes.len(), 1, "{changes:?}");
+            assert_eq!(changes[0].0, word);
+            assert!(
+                (changes[0].1 - right).abs() <= changes[0].2 && changes[0].2 < 1e-6,
+                "{changes:?}"
+            );
+        };
+        let logistic = "states = ['x']\nstart = [3e-10]\nf = ['0']\n[parameters]\nr = 2.7\n\
+            [[event]]\nevery = 1\nset = { x = 'r*x*(1 - 1e9*x)' }";
+        let found = branch(logistic, 1.0, 300.0, along("r", 2.7, 3.3));
+        one(changes_of(&found, "r"), "period-doubling", 3.0);
+        for unit in ["1e-6", "1e-3", "1e3", "1e6"] {
+            let henon = format!(
+                "states = ['x', 'y']\nstart = [0.1, '0.1*{unit}']\nf = ['0', '0']\n\
+                 [parameters]\na = 0.2\n[[event]]\nevery = 1\n\
+                 set = {{ x = '1 - a*x^2 + y/{unit}', y = '0.3*x*{unit}' }}"
+            );
+            let found = branch(&henon, 1.0, 2000.0, along("a", 0.2, 0.6));
+            one(changes_of(&found, "a"), "period-doubling", 0.75 * 0.49);
+        }
+        let beside = "states = ['x', 'y']\nstart = [-1.3, 0]\n\
+            f = ['p + x - x^3', '-y + 1e3*sin(2*pi*t)']\n[parameters]\np = -0.6";
+        let changes = changes_of(&branch(beside, 1.0, 60.0, along("p", -0.6, 0.6)), "p");
+        assert_eq!(changes.len(), 2, "{changes:?}");
+        for ((word, at, within), sign) in changes.into_iter().zip([1.0, -1.0]) {
+            let right = sign * 2.0 / 27.0_f64.sqrt();
+            assert!(word == "fold" && (at - right).abs() <= within, "{at} {within}");
+        }
+    }
+
+    /// Behind its saddle-node at 1 + sqrt(8) the logistic map has no orbit of period 3, though each
+    /// point nearly comes back: the branch turns back there. Orbits of 16 turns double where their
+    /// multiplier is -1 (r of Newton's method in 40 digits).
+    #[test]
+    fn branches_end_at_folds_and_hold_their_values() {
+        let logistic = |start: f64| {
+            format!(
+                "states = ['x']\nstart = [{start}]\nf = ['0']\n[parameters]\nr = 3.8289\n\
+                 [[event]]\nevery = 1\nset = {{ x = 'r*x*(1 - x)' }}"
+            )
+        };
+        let fold = 1.0 + 8.0_f64.sqrt();
+        // All three points of the orbit.
+        for start in [0.514, 0.956, 0.16] {
+            for (from, to) in [(3.8289, 3.8279), (3.8286, 3.8283), (3.84, 3.82)] {
+                let found = branch(&logistic(start), 3.0, 3e4, along("r", from, to));
+                assert!(found.table("branch").unwrap().numbers("r").iter().all(|r| *r > fold));
+                let changes = changes_of(&found, "r");
+                assert_eq!(changes.len(), 1, "{start} {from} {changes:?}");
+                assert_eq!(changes[0].0, "fold");
+                assert!((changes[0].1 - fold).abs() <= changes[0].2, "{changes:?}");
+            }
+        }
+        let found = branch(&logistic(0.5), 16.0, 2e4, along("r", 3.5675, 3.569));
+        let changes = changes_of(&found, "r");
+        assert_eq!(changes.len(), 1, "{changes:?}");
+        assert_eq!(changes[0].0, "period-doubling");
+        assert!((changes[0].1 - 3.568759419543826).abs() <= changes[0].2, "{changes:?}");
+        assert!(changes[0].2 < 1e-9, "{changes:?}");
     }
 
     /// The multiplier of the piecewise linear map jumps from 1/2 to -3/2 or 3/2 where its fixed

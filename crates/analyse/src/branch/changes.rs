@@ -334,13 +334,15 @@ impl Located {
         let p = self.orbit.parameter;
         let beside =
             |by: f64| member(map, a, b, self.share + by, scales, newton).map(|o| o.parameter - p);
-        let (Ok(before), Ok(after)) = (beside(-0.5), beside(0.5)) else {
+        // Far from here members may be missing: a fold may be narrow beside the way.
+        let both = |by: f64| Some((by, beside(-by).ok()?, beside(by).ok()?));
+        let Some((by, before, after)) = [0.5, 0.125, 0.03, 0.01].into_iter().find_map(both) else {
             return self.transversal(Change::Branching);
         };
         if before * after <= 0.0 {
             return self.transversal(Change::Branching);
         }
-        // The parameter is largest or smallest: what it is off by over half of the way, in
+        // The parameter is largest or smallest: what it is off by over that part of the way, in
         // proportion to the square of the share that is left of it; and by how much it moves with
         // the error of the return.
         let size = 0.5 * (before.abs() + after.abs());
@@ -362,7 +364,7 @@ impl Located {
                 }
                 _ => f64::INFINITY,
             };
-        let uncertainty = 4.0 * size * left * left + 4.0 * off + 4.0 * f64::EPSILON * p.abs();
+        let uncertainty = size / (by * by) * left * left + 4.0 * off + 4.0 * f64::EPSILON * p.abs();
         Bifurcation {
             change: Change::Fold,
             parameter: p,

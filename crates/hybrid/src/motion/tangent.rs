@@ -882,8 +882,8 @@ pub struct Turn {
     pub matrix: Vec<f64>,
     /// The largest size of a state on the way.
     pub size: f64,
-    /// The diagonal of the box around the way.
-    pub extent: f64,
+    /// Bounds of each state on the way.
+    pub bounds: Vec<[f64; 2]>,
     /// A number that tells it from a way with other events: of switches and events, and of the
     /// pieces of resets that act, hashed.
     pub itinerary: usize,
@@ -1004,7 +1004,7 @@ fn turn(
         mode: outcome.mode,
         matrix,
         size: follower.size.iter().fold(0.0_f64, |most, s| most.max(*s)),
-        extent: bounds.iter().map(|[low, high]| (high - low) * (high - low)).sum::<f64>().sqrt(),
+        bounds,
         steps: outcome.steps,
         itinerary: (outcome.switches + outcome.events).wrapping_add(pieces) as usize,
     })
