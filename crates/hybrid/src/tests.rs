@@ -922,6 +922,37 @@ fn tangent_vectors_pass_switches_by_saltation_matrices() {
     }
 }
 
+/// Sliding in the transient takes nothing away from the attractor, and growth by a power of the time
+/// is not told from none.
+#[test]
+fn exponents_are_those_of_the_attractor() {
+    use crate::motion::tangent::exponents;
+    let text = "states = ['x', 'y']\nstart = [0.1, 1]\n\
+        f = ['if(t < 1, -2*sign(x), -x) + 0.1*y', '-0.5*y']";
+    let options = Options { t_end: 30.0, ..Options::default() };
+    let found = exponents(&model(text), &options, 5.0, 2).unwrap();
+    for (i, want) in [-0.5, -1.0].into_iter().enumerate() {
+        assert!((found.values[i] - want).abs() <= found.errors[i], "{found:?}");
+        assert!(found.errors[i] < 0.5, "{found:?}");
+    }
+    // Periods of a pendulum, and of an elastic ball, differ between neighbours.
+    let pendulum = "states = ['x', 'y']\nstart = [0, 0]\nf = ['y', '-sin(x)']";
+    let ball = "states = ['x', 'y']\nstart = [0, 0]\nf = ['y', '-1']\n[[event]]\nwhen = 'x'\n\
+        direction = 'down'\nset = { y = '-y' }";
+    for (text, starts, t_end) in [
+        (pendulum, [0.1466, 0.5, 1.3, 2.4, 2.9], 1000.0),
+        (pendulum, [0.1466, 0.5, 1.3, 2.4, 2.9], 200.0),
+        (ball, [0.5, 0.8, 1.1, 1.6, 2.0], 30.0),
+        (ball, [0.5, 0.8, 1.1, 1.6, 2.0], 10.0),
+    ] {
+        for start in starts {
+            let options = Options { start: Some(vec![start, 0.0]), t_end, ..Options::default() };
+            let found = exponents(&model(text), &options, 0.0, 1).unwrap();
+            assert!(found.values[0].abs() <= found.errors[0], "{start} {t_end} {found:?}");
+        }
+    }
+}
+
 /// Exponents whatever the units of the states; minus infinity where sliding or a reset takes a
 /// direction away, and nowhere else.
 #[test]

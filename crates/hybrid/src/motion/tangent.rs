@@ -708,7 +708,11 @@ impl Growth {
         let fitted = line(&points.collect::<Vec<_>>()).filter(|l| l.slope.abs() > l.slope_error);
         let slow = fitted.map_or(0.0, |l| (mean - l.intercept).abs());
         let method = TANGENT_TOLERANCE.max(options.rtol) * self.steps as f64 / length;
-        scatter.max((high - low) / length) + slow + method
+        let width = scatter.max((high - low) / length) + slow + method;
+        // Growth by less than one for each step may be that of a power of the time, as between
+        // neighbours that turn at different speeds.
+        let may_be_slow = mean > 0.0 && mean * length <= ln(self.steps as f64);
+        if may_be_slow { width.max(mean) } else { width }
     }
 
     /// Keeps a sample, and of too many every other one.
@@ -767,6 +771,37 @@ impl Follower<'_> {
             growth.units = units;
             let lost = left.iter().position(|l| l.before > 0.0 && !(l.after > 1e-13 * l.before));
             growth.told = growth.told.min(lost.unwrap_or(usize::MAX));
+            // What sliding took away in the transient may be there again.
+            if self.sliding.is_empty() && self.contacts.is_empty() {
+                fill_up(&mut tangents.vectors, &growth.units);
+            }
+        }
+    }
+}
+
+/// Puts unit vectors of the states, made orthonormal in these units to all others, in the place of
+/// vectors that are zero.
+fn fill_up(vectors: &mut [Vec<f64>], units: &[f64]) {
+    let product = |a: &[f64], b: &[f64]| -> f64 {
+        a.iter().zip(b).zip(units).map(|((a, b), unit)| (a * unit) * (b * unit)).sum()
+    };
+    for i in 0..vectors.len() {
+        if vectors[i].iter().any(|v| *v != 0.0) {
+            continue;
+        }
+        let candidates = (0..units.len()).map(|state| {
+            let mut new = vec![0.0; units.len()];
+            new[state] = 1.0 / units[state];
+            for other in vectors.iter().chain(vectors.iter()) {
+                let dot = product(other, &new);
+                new.iter_mut().zip(other).for_each(|(v, o)| *v -= dot * o);
+            }
+            let length = product(&new, &new).sqrt();
+            new.iter_mut().for_each(|v| *v /= length);
+            (length, new)
+        });
+        if let Some((_, new)) = candidates.max_by(|a, b| a.0.total_cmp(&b.0)) {
+            vectors[i] = new;
         }
     }
 }
