@@ -358,9 +358,10 @@ fn exponents_of_filippov_motion_are_those_of_the_same_system_with_signs() {
     let head = "states = ['x', 'y']\nstart = [1, 0.5]\n";
     let foci = "h = 'y'\nplus = ['0.1*x - y', 'x + 0.1*y']\nminus = ['-0.3*x - y', 'x - 0.3*y']\n";
     let foci_signs = "f = ['-y + x*(0.2*sign(y) - 0.1)', 'x + y*(0.2*sign(y) - 0.1)']\n";
-    let belt =
-        "h = 'y - c'\nplus = ['y', '-x - 0.4']\nminus = ['y', '-x + 0.4']\n[parameters]\nc = 1\n";
-    let belt_signs = "f = ['y', '-x - 0.4*sign(y - c)']\n[parameters]\nc = 0.5\n";
+    // Friction that falls with the speed, so that the block sticks in each period.
+    let belt = "h = 'y - c'\nplus = ['y', '-x - 0.4 + 0.2*(y - c)']\n\
+        minus = ['y', '-x + 0.4 + 0.2*(y - c)']\n[parameters]\nc = 1\n";
+    let belt_signs = "f = ['y', '-x - 0.4*sign(y - c) + 0.2*(y - c)']\n[parameters]\nc = 0.5\n";
     for (surfaces, signs, set, expected) in
         [(foci, foci_signs, &[][..], Some(-0.1)), (belt, belt_signs, &["--set", "c=0.5"][..], None)]
     {

@@ -961,7 +961,12 @@ fn arclength(
         let rounding = SINGULAR * largest(&matrix);
         let step = solve_any(&matrix, &right, rounding)
             .or_else(|| solve_some(&matrix, &right, rounding))
-            .ok_or("branches meet here: the branch's direction is not determined")?;
+            .ok_or(if map.has_points() {
+                "the branch's direction is not determined: branches meet here, or an event passes \
+                    the moment at which periods are counted (give another --t-start)"
+            } else {
+                "branches meet here: the branch's direction is not determined"
+            })?;
         u.iter_mut()
             .zip(&step)
             .enumerate()

@@ -359,18 +359,16 @@ pub struct Definition {
     pub(crate) tables: Vec<(String, TableEntry)>,
 }
 
-/// Whether a file in TOML or JSON defines a general system: it has a key that systems with one
-/// switch have not.
+/// Whether a file in TOML or JSON is read as a general system: it has a key that systems with one
+/// switch have not, or is neither, which the reader says with its place.
 pub fn is_general(text: &str, json: bool) -> bool {
     const KEYS: [&str; 4] = ["f", "event", "modes", "tables"];
     if json {
-        let value: Option<serde_json::Value> = serde_json::from_str(text).ok();
-        return value.is_some_and(|v| KEYS.iter().any(|k| v.get(k).is_some()));
+        let value: Result<serde_json::Value, _> = serde_json::from_str(text);
+        return value.map_or(true, |v| KEYS.iter().any(|k| v.get(k).is_some()));
     }
-    match toml::de::DeTable::parse(text) {
-        Ok(table) => KEYS.iter().any(|k| table.get_ref().get(*k).is_some()),
-        Err(_) => false,
-    }
+    let table = toml::de::DeTable::parse(text);
+    table.map_or(true, |table| KEYS.iter().any(|k| table.get_ref().get(*k).is_some()))
 }
 
 /// A step of the way to a place in a document.

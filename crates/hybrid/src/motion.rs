@@ -270,9 +270,9 @@ pub enum HybridError {
     },
     /// Switches accumulate.
     #[error(
-        "switches at {surfaces} accumulate at t = {t} (error at most {error:.1e}), state {x:?}, and \
-            nothing says how motion goes on: end the run before that time (--t-end), or describe \
-            what holds there by an [[event]]",
+        "switches at {surfaces} accumulate at t = {t} (error at most {error:.1e}), state {x:?}, \
+            and nothing says how motion goes on: end the run before that time (--t-end), or \
+            describe what holds there by an [[event]]",
         t = Short(*t)
     )]
     Accumulation {
@@ -1128,7 +1128,7 @@ impl<'a> Follower<'a> {
                     self.on_time(&mut clock, &definition, &met, observe)?
                 }
                 None => {
-                    // What is zero to rounding where sliding ends decides how motion goes on.
+                    // Functions that are zero to rounding where sliding ends decide with it.
                     if met.iter().any(|m| matches!(m, Sought::Leave { .. } | Sought::Repelling)) {
                         self.meet_here(&mut met);
                     }

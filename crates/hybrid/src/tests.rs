@@ -922,8 +922,8 @@ fn tangent_vectors_pass_switches_by_saltation_matrices() {
     }
 }
 
-/// Sliding in the transient takes nothing away from the attractor, and growth by a power of the time
-/// is not told from none.
+/// Sliding in the transient takes nothing away from the attractor, and growth by a power of the
+/// time is not told from none.
 #[test]
 fn exponents_are_those_of_the_attractor() {
     use crate::motion::tangent::exponents;
@@ -1854,7 +1854,7 @@ fn what_is_slid_upon_is_left_where_its_speeds_vanish() {
     }
 }
 
-/// What rests on a stop is neither above nor below it: comparisons see equality, and a sign is 0,
+/// A body at rest on a stop is neither above nor below it: comparisons see equality, a sign is 0,
 /// from the time 3 sqrt(2), at which its impacts accumulate, on.
 #[test]
 fn a_body_at_rest_on_a_stop_is_on_it() {
@@ -1889,8 +1889,8 @@ fn a_body_at_rest_on_a_stop_is_on_it() {
     near(found[2], 18.0 - 0.15 * left * left, 1e-10);
 }
 
-/// While the motion slides somewhere, what is equal is equal: flags, counters, whole parts; and so is
-/// what a root leaves at zero.
+/// While the motion slides somewhere, what is equal is equal: flags, counters, whole parts; and so
+/// is what a root leaves at zero.
 #[test]
 fn equality_holds_beside_sliding() {
     let beside = |condition: &str| {
@@ -1930,8 +1930,8 @@ fn functions_with_one_zero_are_no_two_surfaces() {
     assert!(matches!(found, Err(HybridError::Undecided { .. })), "{found:?}");
 }
 
-/// A block on a stop that friction holds, too, does not fall through when friction gives way; speeds
-/// that turn between impacts, and events that note the turns, accumulate with the impacts.
+/// A block on a stop that friction holds, too, does not fall through when friction gives way;
+/// speeds that turn between impacts, and events that note the turns, accumulate with the impacts.
 #[test]
 fn stops_hold_beside_friction_and_other_events() {
     let block = |restitution: &str, force: &str| {

@@ -521,8 +521,8 @@ mod tests {
         assert!((changes[0].1 - 0.75 * 0.49).abs() <= changes[0].2, "{changes:?}");
     }
 
-    /// In any units of the states: the logistic map in 10^-9, Henon's with a second state of another
-    /// size, a driven flow beside a state 100 times as large.
+    /// In any units of the states: the logistic map in 10^-9, Henon's with a second state of
+    /// another size, a driven flow beside a state 100 times as large.
     #[test]
     fn branches_do_not_depend_on_units() {
         let one = |changes: Vec<(String, f64, f64)>, word: &str, right: f64| {

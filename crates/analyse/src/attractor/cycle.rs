@@ -141,10 +141,13 @@ impl<'a> Turns<'a> {
     pub fn approach(&self, captured: &Captured) -> Option<Rate> {
         let n = self.points.len();
         let k = self.period;
+        // Points that come back exactly show no floor: it is the rounding of their numbers.
+        let size = self.centres.iter().flatten().fold(0.0_f64, |most, v| most.max(v.abs()));
+        let rounding = 16.0 * f64::EPSILON * size;
         let floor = captured.settled.map_or(0.0, |s| {
             let mut rest = self.distances[s + (n - s) / 2..].to_vec();
             rest.sort_by(f64::total_cmp);
-            3.0 * rest[(rest.len() - 1) * 9 / 10]
+            rounding.max(3.0 * rest[(rest.len() - 1) * 9 / 10])
         });
         // One value per turn: the root mean square over its phases, at the time of its middle.
         let mut turns = Vec::new();
@@ -779,6 +782,28 @@ mod tests {
         let rate = around(&at(&floored), &times, &[[0.0; 2]; 2], 10).approach(&settled).unwrap();
         assert!(
             (rate.per_time - 0.2 / 6.0).abs() < 1e-12 && rate.to == 10.0 + 3.0 * 35.0,
+            "{rate:?}"
+        );
+        // So is that of rounding, about a centre of size 1, though most points are on it.
+        let rounded: Vec<f64> = (0..100)
+            .map(|i| match i {
+                0..40 => exp(-f64::from(i)),
+                _ => {
+                    if i % 12 == 0 {
+                        2e-16
+                    } else {
+                        0.0
+                    }
+                }
+            })
+            .collect();
+        let points: Vec<Point> = rounded.iter().map(|d| [1.0 + d, 0.0]).collect();
+        let settled = Captured { from: 0, blocks: 0, settled: Some(20) };
+        let rate = Turns { distances: rounded, ..around(&points, &times, &[[1.0, 0.0]], 10) }
+            .approach(&settled)
+            .unwrap();
+        assert!(
+            (rate.per_time - 1.0 / 3.0).abs() < 1e-12 && rate.to < 10.0 + 3.0 * 36.0,
             "{rate:?}"
         );
         // A point on the centre ends the fit, and fewer than three turns are none.

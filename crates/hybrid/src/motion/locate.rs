@@ -107,7 +107,10 @@ impl Follower<'_> {
         v: &mut [f64; 5],
     ) -> Option<f64> {
         let fresh = self.is_fresh(sought);
-        if !(fresh || v[0] * side < 0.0) {
+        // Of the two ends of a whole part one is left.
+        let far = matches!(sought, Sought::Guard { guard, .. } if self.equation.guards[guard].whole)
+            && v[0] > 0.5;
+        if far || !(fresh || v[0] * side < 0.0) {
             return None;
         }
         v[0] = 0.0;

@@ -324,7 +324,7 @@ impl Follower<'_> {
             self.hold_guards()?;
             for i in 0..self.watch_side.len() {
                 let met = self.event_of[i].is_some_and(|event| fired.contains(&event));
-                // What the reset leaves alone is where it was, however near to zero.
+                // A function that the reset leaves alone is where it was, however near to zero.
                 let e = &self.equation.watched[i];
                 let now = self.equation.value(e, self.t, &self.x);
                 let is_away = !met && !self.fresh_watch[i] && now * self.watch_side[i] > 0.0;
@@ -519,8 +519,8 @@ impl Follower<'_> {
         if bend > 0.0 { (8e3 * rounding / bend).sqrt() } else { 0.0 }
     }
 
-    /// What lies without a speed at a surface on which motion may stick, and is pressed against it,
-    /// stays there.
+    /// A body that lies without a speed at a surface on which motion may stick, and is pressed
+    /// against it, stays there.
     pub(super) fn rest_on_stops(&mut self) -> Result<(), HybridError> {
         let definition = self.model.definition().clone();
         let config = self.config.clone();
@@ -851,6 +851,14 @@ impl Follower<'_> {
         };
         let finite = |field: &&Vec<f64>| field.iter().all(|f| f.is_finite());
         if !(finite(&&field) && stands(&field) && fields.iter().filter(finite).all(|f| stands(f))) {
+            return false;
+        }
+        // Not only at this point, as at a two-fold.
+        let before =
+            (std::mem::replace(&mut self.x, x.to_vec()), std::mem::replace(&mut self.t, t));
+        let stay = near.iter().all(|(_, guard)| self.stays_a_little(&config, *guard));
+        (self.x, self.t) = before;
+        if !stay {
             return false;
         }
         let sliding: Vec<usize> =

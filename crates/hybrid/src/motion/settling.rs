@@ -65,8 +65,8 @@ impl Follower<'_> {
         }
     }
 
-    /// The larger one of an expression's size and of what its arguments' rounding is measured by, if
-    /// that is a number.
+    /// The larger one of an expression's size and of what its arguments' rounding is measured by,
+    /// if that is a number.
     fn magnitude_by(&self, e: &Expression, arguments: f64) -> f64 {
         let own = self.equation.value(e, self.t, &self.x).abs();
         if arguments.is_finite() { own.max(arguments) } else { own }
@@ -325,7 +325,7 @@ impl Follower<'_> {
 
     /// Whether a function is zero, or of a whole part a whole number, and a short time of motion in
     /// this configuration later still.
-    fn stays_a_little(&mut self, config: &Configuration, guard: usize) -> bool {
+    pub(super) fn stays_a_little(&mut self, config: &Configuration, guard: usize) -> bool {
         let zero = if self.equation.guards[guard].whole { self.boundary(guard) } else { 0.0 };
         let size = self.magnitude(&self.equation.guards[guard].expression);
         let small = 1e-14 * size.max(zero.abs());
@@ -517,7 +517,7 @@ impl Follower<'_> {
                 }
             }
             let mut sets = groups(k, |i, j| coupled[i * k + j]);
-            // What the time alone moves is decided first: others may jump with it.
+            // Functions of the time alone are decided first: others may jump with them.
             let by_time = |i: &usize| {
                 place0[*i].is_some_and(|p| compiled.touches[p].iter().all(|v| *v >= self.n))
             };
@@ -885,7 +885,8 @@ impl Follower<'_> {
         if k > 1 || some_noise.get() || self.touching[zero[0]] {
             let (_, place, rates, _) = vertex(self, &|i| ways[i] == Way::Plus);
             for (guard, place) in zero.iter().zip(&place) {
-                self.tangent_guard[*guard] = place.is_some_and(|p| rates.first_or_zero(p) == 0.0);
+                let tangent = |p: usize| rates.first_or_zero(p) == 0.0 && rates.direction(p) != 0.0;
+                self.tangent_guard[*guard] = place.is_some_and(tangent);
             }
         }
         self.ask_new(&mut config);
@@ -1061,7 +1062,7 @@ impl Follower<'_> {
         if self.sliding.is_empty() {
             return Ok(());
         }
-        // What rests at zero is equal there.
+        // A function that rests at zero is equal there.
         let open = |g: &usize| !self.sliding.contains(g) && !self.equation.rests(*g, &self.config);
         let open: Vec<usize> = zero.iter().copied().filter(open).collect();
         let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; self.n]);
@@ -1100,8 +1101,8 @@ impl Follower<'_> {
         Ok(())
     }
 
-    /// Puts speeds of the functions in `zero` that are only rounding to zero: the state and the time
-    /// are known to rounding alone. Whether there are any.
+    /// Puts speeds of the functions in `zero` that are only rounding to zero: the state and the
+    /// time are known to rounding alone. Whether there are any.
     fn drop_noise(
         &self,
         config: &Configuration,

@@ -709,9 +709,9 @@ impl Growth {
         let slow = fitted.map_or(0.0, |l| (mean - l.intercept).abs());
         let method = TANGENT_TOLERANCE.max(options.rtol) * self.steps as f64 / length;
         let width = scatter.max((high - low) / length) + slow + method;
-        // Growth by less than one for each step may be that of a power of the time, as between
+        // Growth by less than ten for each step may be that of a power of the time, as between
         // neighbours that turn at different speeds.
-        let may_be_slow = mean > 0.0 && mean * length <= ln(self.steps as f64);
+        let may_be_slow = mean > 0.0 && mean * length <= ln(10.0 * self.steps as f64);
         if may_be_slow { width.max(mean) } else { width }
     }
 
@@ -771,7 +771,7 @@ impl Follower<'_> {
             growth.units = units;
             let lost = left.iter().position(|l| l.before > 0.0 && !(l.after > 1e-13 * l.before));
             growth.told = growth.told.min(lost.unwrap_or(usize::MAX));
-            // What sliding took away in the transient may be there again.
+            // A direction that sliding took away in the transient may be there again.
             if self.sliding.is_empty() && self.contacts.is_empty() {
                 fill_up(&mut tangents.vectors, &growth.units);
             }
@@ -855,8 +855,21 @@ pub fn closed_orbit(
     }
     let mut best: Option<ClosedOrbit> = None;
     let gap_of = |best: &Option<ClosedOrbit>| best.as_ref().map_or(f64::INFINITY, |b| b.gap);
-    for _ in 0..30 {
-        let Turn { time, end, mode, matrix, size, .. } = turn(model, &options, after, &x, true)?;
+    for iteration in 0..30 {
+        let around = turn(model, &options, after, &x, true);
+        let Turn { time, end, mode, matrix, size, .. } = around.map_err(|error| match error {
+            // What it has come to is no motion of the system's own.
+            HybridError::NoOrbit(_) | HybridError::Domain { .. } if iteration > 0 => {
+                let off = gap_of(&best);
+                HybridError::NoOrbit(format!(
+                    "Newton's method found no closed orbit (the best return was {off:e} off): it \
+                        went on to states from which the motion does not come back. Start nearer \
+                        (--start), let the motion settle longer (--settle), or give states that \
+                        come back: an angle that turns on and on does not"
+                ))
+            }
+            other => other,
+        })?;
         // The same state in another mode is another point.
         if mode != options.mode {
             (x, options.mode) = (end, mode);
