@@ -858,7 +858,7 @@ pub fn closed_orbit(
     for iteration in 0..30 {
         let around = turn(model, &options, after, &x, true);
         let Turn { time, end, mode, matrix, size, .. } = around.map_err(|error| match error {
-            // What it has come to is no motion of the system's own.
+            // The state that it has come to is none of the motion asked for.
             HybridError::NoOrbit(_) | HybridError::Domain { .. } if iteration > 0 => {
                 let off = gap_of(&best);
                 HybridError::NoOrbit(format!(
