@@ -922,6 +922,28 @@ fn tangent_vectors_pass_switches_by_saltation_matrices() {
     }
 }
 
+/// On a superstable orbit nothing of a neighbour is left: 2 x (1 - x) has the derivative 0 at 1/2,
+/// and Newton's method for a root; a map that shrinks by 1e-20 has its logarithm.
+#[test]
+fn superstable_orbits_have_no_exponent() {
+    use crate::motion::tangent::exponents;
+    let of = |set: &str, start: f64| {
+        let text = format!(
+            "states = ['x']\nstart = [{start}]\nf = ['0']\n[[event]]\nevery = 1\n\
+             set = {{ x = '{set}' }}"
+        );
+        let options = Options { t_end: 60.0, ..Options::default() };
+        exponents(&model(&text), &options, 20.0, 1).unwrap().values[0]
+    };
+    for start in [0.1, 0.23, 0.31, 0.44, 0.77, 0.9123] {
+        assert_eq!(of("2*x*(1 - x)", start), f64::NEG_INFINITY, "{start}");
+        for a in [2.0, 0.37, 13.1] {
+            assert_eq!(of(&format!("(x + {a}/x)/2"), start), f64::NEG_INFINITY, "{a} {start}");
+        }
+    }
+    near(of("1e-20*x + 0.1", 0.3), -20.0 * 10.0_f64.ln(), 1e-6);
+}
+
 /// Sliding in the transient takes nothing away from the attractor, and growth by a power of the
 /// time is not told from none.
 #[test]

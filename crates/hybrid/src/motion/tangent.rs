@@ -389,7 +389,20 @@ impl Follower<'_> {
         for j in 0..=n {
             at[j].partials = [1.0];
             for (state, e) in set {
-                let slope = self.equation.value(e, at[n], &at[..n]).partials[0];
+                let slope_at = |at: &[D]| self.equation.value(e, at[n], &at[..n]).partials[0];
+                let mut slope = slope_at(&at);
+                // A derivative that is only rounding is none, as on a superstable orbit: another
+                // rounding of the state changes much of it.
+                let [to, from] = [self.size[*state], *self.size.get(j).unwrap_or(&0.0)];
+                if slope != 0.0 && slope.abs() * from <= 1e-12 * to {
+                    let near: Vec<D> = at
+                        .iter()
+                        .map(|x| D { value: x.value * (1.0 + 2.0 * f64::EPSILON), ..*x })
+                        .collect();
+                    if (slope_at(&near) - slope).abs() >= 0.25 * slope.abs() {
+                        slope = 0.0;
+                    }
+                }
                 *if j < n { &mut by_state[state * n + j] } else { &mut by_time[*state] } = slope;
             }
             at[j].partials = [0.0];
