@@ -2002,6 +2002,24 @@ fn stops_hold_beside_friction_and_other_events() {
     }
 }
 
+/// A blow on one body leaves another one that a spring joins to it at rest on its stop, whatever
+/// rounding its speed has there; both come to rest.
+#[test]
+fn bodies_that_a_spring_joins_rest_on_their_stops() {
+    let text = "states = ['x', 'v', 'y', 'w']\nstart = [0.15, 0.95, 0, 0.68]\n\
+        f = ['v', '-1', 'w', '-1 + 0.31*(x - y)']\n\
+        [[event]]\nwhen = 'x + 0.53'\ndirection = 'down'\nset = { v = '-0.7*v' }\n\
+        after_zeno = 'stick'\n\
+        [[event]]\nwhen = 'y + 0.29'\ndirection = 'down'\nset = { w = '-0.7*w' }\n\
+        after_zeno = 'stick'";
+    for method in Method::ALL {
+        let end = end_of(text, 12.3, method).unwrap();
+        for (found, want) in end.iter().zip([-0.53, 0.0, -0.29, 0.0]) {
+            near(*found, want, 1e-11);
+        }
+    }
+}
+
 /// A clock strikes at the moment at which a pulse takes the surface away that is slid upon.
 #[test]
 fn a_pulse_and_a_clock_meet_on_a_surface() {

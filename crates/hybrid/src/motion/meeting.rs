@@ -544,8 +544,7 @@ impl Follower<'_> {
             };
             let (compiled, rates) = self.rates(&config);
             let place = compiled.active.len() + i;
-            let by = |i: usize| self.second_along(&rates.field, Some(i))[place].abs();
-            let speeds: f64 = (0..self.n).map(|i| by(i) * self.size[i]).sum();
+            let speeds = self.speeds(&rates.field, place);
             let rests = rates.first[place].abs() <= 1e-14 * speeds.max(rates.terms[place]);
             if rests && rates.second[place] * into > 0.0 {
                 self.stick(&definition, event, self.t);
@@ -553,6 +552,12 @@ impl Follower<'_> {
             }
         }
         Ok(())
+    }
+
+    /// The size of a watched value's speed where states are as large as they have been.
+    fn speeds(&self, field: &[f64], place: usize) -> f64 {
+        let by = |i: usize| self.second_along(field, Some(i))[place].abs();
+        (0..self.n).map(|i| by(i) * self.size[i]).sum()
     }
 
     /// Keeps the contacts that a reset or a new mode leaves at rest. Returns the events of those
@@ -571,8 +576,9 @@ impl Follower<'_> {
             let change =
                 self.equation.value(e, self.t, old) - self.equation.value(e, self.t, &self.x);
             let place = compiled.active.len() + c.watched;
+            let speeds = self.speeds(&rates.field, place);
             change.abs() <= 1e-12 * self.magnitude(e)
-                && rates.first[place].abs() <= 1e-9 * rates.terms[place]
+                && rates.first[place].abs() <= (1e-9 * rates.terms[place]).max(1e-14 * speeds)
         };
         let (kept, ended): (Vec<Contact>, Vec<Contact>) =
             contacts.into_iter().partition(|c| holds(c) && rests(c));

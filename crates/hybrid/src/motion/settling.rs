@@ -1112,7 +1112,7 @@ impl Follower<'_> {
     ) -> bool {
         let mut some = false;
         let variables = self.load(config);
-        let rounding = |i: usize| self.lately.get(i).map_or(0.0, |size| f64::EPSILON * size);
+        let rounding = |i: usize| self.lately.get(i).map_or(0.0, |size| 16.0 * f64::EPSILON * size);
         let near = variables.iter().enumerate().map(|(i, v)| Range::new(*v, rounding(i)));
         let near: Vec<Range> = near.collect();
         let mut field = vec![Range::default(); self.n];

@@ -722,9 +722,15 @@ impl Growth {
         let slow = fitted.map_or(0.0, |l| (mean - l.intercept).abs());
         let method = TANGENT_TOLERANCE.max(options.rtol) * self.steps as f64 / length;
         let width = scatter.max((high - low) / length) + slow + method;
-        // Growth by less than ten for each step may be that of a power of the time, as between
-        // neighbours that turn at different speeds.
-        let may_be_slow = mean > 0.0 && mean * length <= ln(10.0 * self.steps as f64);
+        // Growth by less than ten for each step that is little in all, or slows down, may be that
+        // of a power of the time, as between neighbours that turn at different speeds.
+        const LITTLE: f64 = 3.0;
+        const SLOWS: f64 = 0.75;
+        let (first, second) = rates.split_at(rates.len() / 2);
+        let slows = second.iter().sum::<f64>() < SLOWS * first.iter().sum::<f64>();
+        let total = mean * length;
+        let may_be_slow =
+            total > 0.0 && total <= ln(10.0 * self.steps as f64) && (total <= LITTLE || slows);
         if may_be_slow { width.max(mean) } else { width }
     }
 
