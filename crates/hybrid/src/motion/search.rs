@@ -863,9 +863,19 @@ impl Follower<'_> {
         }
         let what = what.or_else(|| self.division_ahead(t, x));
         let what = what.unwrap_or_else(|| {
-            "steps become too short to move: a singularity, or a solution that grows without \
-                bound"
-                .into()
+            let largest = x.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+            let tiny = self.options.atol.is_none()
+                && x.iter().any(|x| *x != 0.0 && x.abs() < 1e-12 * largest);
+            let or = if tiny {
+                ", or a state that begins at zero and is measured by its own size (--atol gives \
+                    it another)"
+            } else {
+                ""
+            };
+            format!(
+                "steps become too short to move: a singularity, or a solution that grows without \
+                    bound{or}"
+            )
         });
         HybridError::Domain { t, x: x.to_vec(), what }
     }
