@@ -546,7 +546,8 @@ fn follow_once(
 
 /// By how much integration and rounding may have moved the time `t` at which a run accumulates, by
 /// runs of another method with a tolerance near rounding or, where that does not come so far, of
-/// the same one with ten times the tolerance. None if nothing accumulates then.
+/// the same one with ten times the tolerance. None if nothing accumulates then; infinite if nothing
+/// more was wanted meanwhile.
 fn error_of_accumulation(
     model: &Model,
     options: &Options,
@@ -565,11 +566,12 @@ fn error_of_accumulation(
         | Err(HybridError::Accumulation { t: other, .. }) => Some((t - other).abs()),
         _ => None,
     };
-    let integration = match moved(&finer) {
-        Some(moved) => 2.0 * moved,
-        None => 3.0 * moved(&coarser)?,
-    };
-    Some(integration + 8.0 * f64::EPSILON * t.abs() * events as f64)
+    let integration =
+        moved(&finer).map(|by| 2.0 * by).or_else(|| moved(&coarser).map(|by| 3.0 * by));
+    if integration.is_none() && !reached(t) {
+        return Some(f64::INFINITY);
+    }
+    Some(integration? + 8.0 * f64::EPSILON * t.abs() * events as f64)
 }
 
 /// Whether an event's expression is zero, to rounding, where a motion with these options starts.
@@ -1291,9 +1293,11 @@ impl<'a> Follower<'a> {
             self.after(before)?;
         }
         if ending.is_none() && !self.equation.tables.is_empty() {
-            // A table's jump may let sliding end, and make switching functions jump.
+            // A table's jump may let sliding end, make switching functions jump, and press bodies
+            // against their stops.
             let (zero, none) = (self.sliding.clone(), vec![false; self.slides.len()]);
             self.decide(&zero, &none)?;
+            self.rest_on_stops()?;
         }
         Ok(ending)
     }
@@ -1302,7 +1306,7 @@ impl<'a> Follower<'a> {
     fn met_here(&mut self) -> Vec<Sought> {
         let active = self.compiled.active.iter().enumerate();
         let moves = |guard: usize| !self.slides[guard] && !self.fresh_guard[guard];
-        // Each with its place, the way to its zero, and whether it is on that zero.
+        // Each with its place and the way in which it passes.
         let mut near: Vec<(Sought, usize, f64)> = Vec::new();
         for (place, guard) in active.filter(|(_, guard)| moves(**guard)) {
             let (guard, side) = (*guard, self.config.sides[*guard]);

@@ -2020,6 +2020,43 @@ fn bodies_that_a_spring_joins_rest_on_their_stops() {
     }
 }
 
+/// Bodies that lie on their stops at the start, on each other, or that an event, a mode or a table
+/// lays or presses there, stay.
+#[test]
+fn bodies_lie_on_their_stops_however_they_came_there() {
+    let stop = |when: &str, set: &str| {
+        format!(
+            "[[event]]\nwhen = '{when}'\ndirection = 'down'\nset = {{ {set} }}\nafter_zeno = 'stick'\n"
+        )
+    };
+    let apart = format!(
+        "states = ['x', 'v', 'y', 'w']\nstart = [0, 0, 0, 0]\nf = ['v', '-1', 'w', '-1']\n{}{}",
+        stop("x", "v = '-0.5*v'"),
+        stop("y", "w = '-0.5*w'")
+    );
+    let piled = apart.replace("when = 'y'", "when = 'y - x'");
+    let ball = |start: &str, force: &str, more: &str| {
+        format!(
+            "states = ['x', 'v']\nstart = [{start}]\nf = ['v', '{force}']\n{}{more}",
+            stop("x", "v = '-0.5*v'")
+        )
+    };
+    let laid = ball("1, 0", "-1", "[[event]]\nat = 1\nset = { x = 0, v = 0 }");
+    let grows = ball("0, 0", "-sin(t)^3 - 0.2*t", "");
+    let pressed = ball("0, 0", "if(t < 1, 0, -1)", "");
+    let let_go = format!(
+        "states = ['x', 'v']\nstart = [0, 0]\n[modes.held]\nf = ['v', '0']\n[modes.free]\n\
+         f = ['v', '-1']\n{}[[event]]\nat = 1\nfrom = 'held'\nmode = 'free'",
+        stop("x", "v = '-0.5*v'")
+    );
+    for method in Method::ALL {
+        for text in [&apart, &piled, &laid, &grows, &pressed, &let_go] {
+            let end = end_of(text, 3.0, method).unwrap();
+            assert!(end.iter().all(|v| *v == 0.0), "{method:?} {text} {end:?}");
+        }
+    }
+}
+
 /// A clock strikes at the moment at which a pulse takes the surface away that is slid upon.
 #[test]
 fn a_pulse_and_a_clock_meet_on_a_surface() {

@@ -205,7 +205,7 @@ pub(super) fn said_how_it_ended(run: &GeneralRun, answer: &Answer) -> Exit {
         let sets = events.any(|e| e.name == name && e.mode.is_none() && !e.set.is_empty());
         let known = match zeno["error"].as_f64() {
             Some(error) => format!("error at most {error:.1e}"),
-            None => "at ten times the tolerance it does not; give a smaller --rtol".to_owned(),
+            None => "its error is not known; a smaller --rtol may tell".to_owned(),
         };
         complain(&format!(
             "{name} happens infinitely often before t = {} ({known}), where the run ends{}",

@@ -417,6 +417,10 @@ impl Follower<'_> {
                 return Ok(Some(Ending::Interrupted));
             }
         }
+        if changed || mode.is_some() {
+            // A body that is laid on its stop lies there.
+            self.rest_on_stops()?;
+        }
         // Events that a reset or a new mode makes true happen at once.
         self.happen(definition, &newly, &[], observe)
     }
@@ -519,39 +523,49 @@ impl Follower<'_> {
         if bend > 0.0 { (8e3 * rounding / bend).sqrt() } else { 0.0 }
     }
 
-    /// A body that lies without a speed at a surface on which motion may stick, and is pressed
-    /// against it, stays there.
+    /// Bodies that lie without a speed at surfaces on which motion may stick, and are pressed
+    /// against them, by each other, too, stay there.
     pub(super) fn rest_on_stops(&mut self) -> Result<(), HybridError> {
         let definition = self.model.definition().clone();
-        let config = self.config.clone();
-        for i in 0..self.watch_side.len() {
-            let Some(event) = self.event_of[i].filter(|e| definition.events()[*e].sticks) else {
-                continue;
-            };
-            let asked = definition.events()[event].from.is_none_or(|mode| mode == config.mode);
-            if !asked || self.contacts.iter().any(|c| c.watched == i) {
-                continue;
+        while let Some(event) = (0..self.watch_side.len()).find_map(|i| self.lies(&definition, i)) {
+            if !self.stick(&definition, event, self.t) {
+                break;
             }
-            let e = &self.equation.watched[i];
-            if self.equation.value(e, self.t, &self.x).abs() > 1e-12 * self.magnitude(e) {
-                continue;
-            }
-            let When::Zero(_, direction) = definition.events()[event].when else { continue };
-            let into = match direction {
-                Direction::Down => -1.0,
-                Direction::Up => 1.0,
-                Direction::Both => continue,
-            };
-            let (compiled, rates) = self.rates(&config);
-            let place = compiled.active.len() + i;
-            let speeds = self.speeds(&rates.field, place);
-            let rests = rates.first[place].abs() <= 1e-14 * speeds.max(rates.terms[place]);
-            if rests && rates.second[place] * into > 0.0 {
-                self.stick(&definition, event, self.t);
-                return self.hold_guards();
-            }
+            self.hold_guards()?;
         }
         Ok(())
+    }
+
+    /// The event of a watched expression at whose surface a body lies and is not in contact yet.
+    fn lies(&mut self, definition: &crate::Definition, i: usize) -> Option<usize> {
+        let event = self.event_of[i].filter(|event| definition.events()[*event].sticks)?;
+        let When::Zero(_, direction) = definition.events()[event].when else { return None };
+        let into = match direction {
+            Direction::Down => -1.0,
+            Direction::Up => 1.0,
+            Direction::Both => return None,
+        };
+        let of_mode = definition.events()[event].from.is_none_or(|mode| mode == self.config.mode);
+        let e = &self.equation.watched[i];
+        let is_on = self.equation.value(e, self.t, &self.x).abs() <= 1e-12 * self.magnitude(e);
+        if !of_mode || !is_on || self.contacts.iter().any(|c| c.watched == i) {
+            return None;
+        }
+        let (compiled, rates) = self.rates_of_second_order(&self.config.clone());
+        let place = compiled.active.len() + i;
+        let speeds = self.speeds(&rates.field, place);
+        let rests = rates.first[place].abs() <= 1e-14 * speeds.max(rates.terms[place]);
+        let mut push = rates.second[place];
+        if !self.contacts.is_empty() {
+            let forces = self.contact_forces(&rates.field);
+            for (contact, force) in self.contacts.iter().zip(forces) {
+                push += force * self.second_along(&rates.field, Some(contact.state))[place];
+            }
+        }
+        if rests && push == 0.0 && self.contacts.is_empty() {
+            push = self.side_ahead(place);
+        }
+        (rests && push * into > 0.0).then_some(event)
     }
 
     /// The size of a watched value's speed where states are as large as they have been.

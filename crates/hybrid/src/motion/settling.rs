@@ -1438,7 +1438,7 @@ impl Follower<'_> {
 
     /// The side to which a watched value of third order or more leaves zero: it grows by more than
     /// a square. 0 if it stays.
-    fn side_ahead(&mut self, place: usize) -> f64 {
+    pub(super) fn side_ahead(&mut self, place: usize) -> f64 {
         const BRIEF: f64 = 0.005;
         let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; self.n]);
         self.rhs(t, &x, &mut field);

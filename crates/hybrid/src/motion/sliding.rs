@@ -627,7 +627,7 @@ impl Follower<'_> {
         self.rates_to_order(config, &[], true)
     }
 
-    /// The same, with both.
+    /// Rates as [`Follower::rates_with`] has them, with all second derivatives if `second_order`.
     pub(super) fn rates_to_order(
         &mut self,
         config: &Configuration,

@@ -676,12 +676,15 @@ struct Left {
     after: f64,
 }
 
+/// The product of two vectors in these units.
+fn product_in(units: &[f64], a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).zip(units).map(|((a, b), unit)| (a * unit) * (b * unit)).sum()
+}
+
 /// Makes vectors orthonormal in these units, one after the other. Those of which nothing is left
 /// but rounding are made zero.
 fn orthonormal(vectors: &mut [Vec<f64>], units: &[f64]) -> Vec<Left> {
-    let product = |a: &[f64], b: &[f64]| -> f64 {
-        a.iter().zip(b).zip(units).map(|((a, b), unit)| (a * unit) * (b * unit)).sum()
-    };
+    let product = |a: &[f64], b: &[f64]| product_in(units, a, b);
     let mut left = Vec::with_capacity(vectors.len());
     for i in 0..vectors.len() {
         let (done, open) = vectors.split_at_mut(i);
@@ -801,9 +804,7 @@ impl Follower<'_> {
 /// Puts unit vectors of the states, made orthonormal in these units to all others, in the place of
 /// vectors that are zero.
 fn fill_up(vectors: &mut [Vec<f64>], units: &[f64]) {
-    let product = |a: &[f64], b: &[f64]| -> f64 {
-        a.iter().zip(b).zip(units).map(|((a, b), unit)| (a * unit) * (b * unit)).sum()
-    };
+    let product = |a: &[f64], b: &[f64]| product_in(units, a, b);
     for i in 0..vectors.len() {
         if vectors[i].iter().any(|v| *v != 0.0) {
             continue;
