@@ -2020,13 +2020,14 @@ fn bodies_that_a_spring_joins_rest_on_their_stops() {
     }
 }
 
-/// Bodies that lie on their stops at the start, on each other, or that an event, a mode or a table
+/// Bodies that lie on their stops at the start, on each other, or that an event, a mode or a switch
 /// lays or presses there, stay.
 #[test]
 fn bodies_lie_on_their_stops_however_they_came_there() {
     let stop = |when: &str, set: &str| {
         format!(
-            "[[event]]\nwhen = '{when}'\ndirection = 'down'\nset = {{ {set} }}\nafter_zeno = 'stick'\n"
+            "[[event]]\nwhen = '{when}'\ndirection = 'down'\nset = {{ {set} }}\n\
+             after_zeno = 'stick'\n"
         )
     };
     let apart = format!(
