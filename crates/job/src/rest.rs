@@ -191,16 +191,39 @@ pub fn near(system: &System, switch: SwitchSpec, from: &[f64]) -> Option<Rest> {
         SwitchSpec::Relay { band, .. } => band,
         SwitchSpec::Smoothed { .. } | SwitchSpec::Hysteretic { .. } => return None,
     };
-    let [plus, minus] = [Field::plus(system), Field::minus(system)];
+    let fields = [Field::plus(system), Field::minus(system)];
+    let [plus, minus] = &fields;
     // A side's rest counts where that side is.
     let on = |field: &Field, sign: f64| {
         regular(field).filter(|r| sign * switching(system, &r.state) > beyond)
     };
     let slides = matches!(switch, SwitchSpec::Filippov { .. });
-    let between = slides.then(|| pseudo(system, &plus, &minus, from)).flatten();
-    let candidates = [between, on(&plus, 1.0), on(&minus, -1.0)];
+    let between = slides.then(|| pseudo(system, plus, minus, from)).flatten();
+    let boundary = || of_both(system, &fields, [regular(plus)?, regular(minus)?], from);
+    let both = slides.then(boundary).flatten();
+    let candidates = [both, between, on(plus, 1.0), on(minus, -1.0)];
     let there = |r: &Rest| distance(&r.state, from);
     candidates.into_iter().flatten().min_by(|a, b| there(a).total_cmp(&there(b)))
+}
+
+/// The rest near `from` of both fields on the switching surface, if it is one. Where their Jacobian
+/// matrices differ the linear terms of neither decide.
+fn of_both(system: &System, fields: &[Field; 2], rests: [Rest; 2], from: &[f64]) -> Option<Rest> {
+    let [here, there] = rests;
+    let (n, x) = (from.len(), &here.state);
+    let h = linearised(n, &|x, out| out[0] = switching(system, x), 1, x);
+    let rounding = 1e-9 * size(x) + 1e-6 * distance(x, from);
+    let one = distance(x, &there.state) <= rounding;
+    if !(one && h.value[0].abs() <= size(&h.rows) * rounding) {
+        return None;
+    }
+    let rows = |f: &Field| linearised(n, &|x, out| f.evaluate(x, out), n, x).rows;
+    let [a, b] = fields.each_ref().map(rows);
+    let linear = distance(&a, &b) <= ROUNDING * size(&a).max(size(&b));
+    Some(match linear {
+        true => here,
+        false => Rest { eigenvalues: Vec::new(), stability: Stability::Neutral, ..here },
+    })
 }
 
 /// The pseudo-equilibrium near `from`: f- + w (f+ - f-) = 0 and h = 0 with a weight w in (0, 1).

@@ -1584,6 +1584,10 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         if !(l.p.abs() <= near && l.q.abs() <= near) {
             return None;
         }
+        // Both fields cross in one direction: no fold, however small a focus has become.
+        if l.p * l.q > 0.0 && l.p.abs() > l.zero_p && l.q.abs() > l.zero_q {
+            return None;
+        }
         let system = self.sided();
         let folds = FusedFolds::at(&system, &self.x).filter(FusedFolds::leave)?;
         let Some(velocity) = folds.velocity else { return Some(folds) };

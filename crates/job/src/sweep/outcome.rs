@@ -378,5 +378,17 @@ mod tests {
         for x in [0.2, 4.5, 10.3, -2.7] {
             assert_eq!(outcome(friction(), [x, 0.0], filippov, 600.0, section(1)), "rest", "{x}");
         }
+        // A focus on the surface, of one field or of two: it decays far below what it began with.
+        let on_surface = |plus: [&str; 2], minus: [&str; 2]| {
+            let [plus, minus] = [plus, minus].map(|f| format!("['{}', '{}']", f[0], f[1]));
+            cases::of(&format!("states = ['x', 'y']\nh = 'x'\nplus = {plus}\nminus = {minus}"))
+        };
+        let one = ["-0.1*x - y", "x - 0.1*y"];
+        for (plus, minus) in [(one, one), (["-0.2*x - y", "x"], ["-0.05*x - y", "2*x"])] {
+            for x in [0.5, 2.0, 3.0] {
+                let system = on_surface(plus, minus);
+                assert_eq!(outcome(system, [x, 0.0], filippov, 600.0, section(1)), "rest", "{x}");
+            }
+        }
     }
 }
