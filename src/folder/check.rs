@@ -52,7 +52,8 @@ pub struct ClaimFile {
     /// The table [default: the first].
     table: Option<Spanned<String>>,
     /// Quantity of the column, or of a complex fact: last, first, max, min, mean, span, count,
-    /// modulus.
+    /// modulus. A mean is one over rows, which stand denser where a path bends; with `every` in
+    /// the run it is one over time.
     take: Option<Spanned<String>>,
     /// The paper's value.
     equals: Option<Spanned<f64>>,
@@ -258,9 +259,32 @@ impl Claim {
                 return Err(wrong(path.span(), why, one_of(name, facts)));
             }
         }
+        if c.decided.date.is_none() || c.decided.time.is_some() {
+            let why = format!("`decided` is a day, and this is {}", c.decided);
+            return Err(wrong(place, why, "give a date of TOML: decided = 2026-11-27".into()));
+        }
         let missing = |what: &str| {
             wrong(place.clone(), format!("a check of {kind} needs {what}"), String::new())
         };
+        let reads = [(Some(&c.of), Some(of)), (c.and.as_ref(), and)];
+        for (name, source) in reads.iter().filter_map(|(name, source)| Some(((*name)?, (*source)?)))
+        {
+            let (fits, needs) = match *kind {
+                "chaos" => (source.ask == Ask::Lyapunov, "lyapunov = { ... }"),
+                "period" | "attractors" => {
+                    (source.ask == Ask::Run, "run = { ..., section = \"y=0\" }")
+                }
+                _ => continue,
+            };
+            if !fits {
+                let why = format!(
+                    "`{}` asks for {}, of which there is no check of {kind}",
+                    name.get_ref(),
+                    source.ask.asked()
+                );
+                return Err(wrong(name.span(), why, format!("name one with {needs}")));
+            }
+        }
         let number = |value: &Option<Spanned<f64>>, what: &str| match value {
             Some(v) if v.get_ref().is_finite() => Ok(*v.get_ref()),
             Some(v) => {
@@ -315,6 +339,10 @@ impl Claim {
                     }
                     (Some(_), None, None) => Some(read.clone()),
                     (None, None, Some(_)) => None,
+                    (Some(_), _, Some(than)) => {
+                        let why = "`than` and `and` are both given";
+                        return Err(wrong(than.span(), why.into(), "leave one of them out".into()));
+                    }
                     _ => {
                         return Err(missing(
                             "`than`, a number, or `and`, another panel or measure",
@@ -595,7 +623,11 @@ fn reading(origin: &Origin, place: &Range<usize>, c: &ClaimFile) -> Result<Read,
             let table = c.table.as_ref().map(|t| t.get_ref().clone());
             Ok(Read::Column { table, column: column.get_ref().clone(), take })
         }
-        _ => {
+        (Some(_), Some(column)) => {
+            let why = "the claim reads a fact and a column".into();
+            Err(wrong(column.span(), why, "leave out read or column"))
+        }
+        (None, None) => {
             let help = "give read = \"FACT\", such as period, or column = \"NAME\" with take";
             Err(wrong(place.clone(), "the claim reads nothing".into(), help))
         }

@@ -54,14 +54,22 @@ pub struct Finding {
     /// Its comparison with the expectation.
     #[serde(flatten)]
     pub state: State,
+    /// Whether it is a claim whose rule was changed when its data were already known.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub rule_after_data: bool,
 }
 
 impl Finding {
     /// For people.
     pub fn line(&self) -> String {
         let name = &self.name;
+        let known = if self.rule_after_data {
+            "; its rule was changed when the data were known"
+        } else {
+            ""
+        };
         match &self.state {
-            State::Same => format!("{name}: same"),
+            State::Same => format!("{name}: same{known}"),
             State::Differs { what } => format!("{name}: DIFFERS in its {what}"),
             State::New => format!("{name}: NEW: nothing is expected of it yet"),
             State::Failed { why } => format!("{name}: FAILED: {why}"),
@@ -69,6 +77,10 @@ impl Finding {
                 format!("{name}: GONE: it is expected, and the folder has no such picture or claim")
             }
         }
+    }
+
+    fn of(name: &str, state: State) -> Self {
+        Self { name: name.to_owned(), state, rule_after_data: false }
     }
 }
 
@@ -166,17 +178,15 @@ impl Folder {
                         },
                     },
                 };
-                findings.push(Finding { name, state });
+                findings.push(Finding::of(&name, state));
             }
             for old in manifest.iter().flat_map(|m| &m.pictures) {
                 if !figure.pictures.iter().any(|p| p.name == old.name) {
-                    findings.push(Finding { name: old.name.clone(), state: State::Gone });
+                    findings.push(Finding::of(&old.name, State::Gone));
                 }
             }
         }
-        findings.extend(
-            self.figures_gone()?.into_iter().map(|name| Finding { name, state: State::Gone }),
-        );
+        findings.extend(self.figures_gone()?.iter().map(|name| Finding::of(name, State::Gone)));
         let before = self.outcomes()?;
         for Scored { claim, verdict } in &made.claims {
             let old = before.verdicts.iter().find(|v| v.claim == claim.id);
@@ -197,13 +207,17 @@ impl Folder {
                 (Ok(now), Some(old)) if now.data != old.data => {
                     State::Differs { what: "data".into() }
                 }
+                (Ok(now), Some(old)) if (&now.found, now.odds) != (&old.found, old.odds) => {
+                    State::Differs { what: format!("finding: {}", now.found) }
+                }
                 _ => State::Same,
             };
-            findings.push(Finding { name: claim.id.clone(), state });
+            let rule_after_data = verdict.as_ref().is_ok_and(|now| now.rule_after_data);
+            findings.push(Finding { rule_after_data, ..Finding::of(&claim.id, state) });
         }
         for old in &before.verdicts {
             if !self.claims.iter().any(|c| c.id == old.claim) {
-                findings.push(Finding { name: old.claim.clone(), state: State::Gone });
+                findings.push(Finding::of(&old.claim, State::Gone));
             }
         }
         Ok(findings)
@@ -236,7 +250,7 @@ impl Folder {
     /// If a claim could not be scored, or a file cannot be written.
     pub fn bless(&self, made: &Made<'_>, reason: &str) -> Result<Vec<String>, CliError> {
         let findings = self.compare(made)?;
-        if let Some(Finding { name, state: State::Failed { why } }) =
+        if let Some(Finding { name, state: State::Failed { why }, .. }) =
             findings.iter().find(|f| matches!(f.state, State::Failed { .. }))
         {
             return Err(CliError::Job(JobError::Other(format!(

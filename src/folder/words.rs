@@ -60,6 +60,16 @@ pub enum Ask {
 }
 
 impl Ask {
+    /// The kind of answer, in words.
+    pub fn asked(self) -> &'static str {
+        match self {
+            Ask::Run => "a run",
+            Ask::Orbit => "a closed orbit",
+            Ask::Lyapunov => "an exponent",
+            Ask::Rests => "rests",
+        }
+    }
+
     /// The facts that an answer may have, of either form of a system.
     pub fn facts(self) -> &'static [&'static str] {
         match self {

@@ -24,6 +24,10 @@ fn paper(arguments: &[&str], folder: &Path) -> (i32, String, String) {
     (run.status.code().unwrap(), text(run.stdout), text(run.stderr))
 }
 
+/// The first claim's check.
+const VALUE: &str = "check = \"value\"\nof = \"cycle\"\nread = \"period\"\n\
+    equals = 2.1972245773362196\nwithin = 1e-6";
+
 /// The paper that `twofold paper new` writes.
 fn small() -> TempDir {
     let place = tempfile::tempdir().unwrap();
@@ -115,6 +119,14 @@ fn a_rule_that_changes_after_its_data_is_said_to() {
     assert_eq!(paper(&["report", "--quiet"], &root).0, 0);
     let page = fs::read_to_string(root.join("out/report.html")).unwrap();
     assert!(page.contains("changed when its data were known"), "{page}");
+    let (code, out, _) = paper(&["check", "--quiet"], &root);
+    assert!(
+        code == 0 && out.contains("period: same; its rule was changed when the data were known"),
+        "{out}"
+    );
+    change(&root, "expected/claims.json", "2.197225 (", "2.297225 (");
+    let (code, out, _) = paper(&["check", "--quiet"], &root);
+    assert!(code == 1 && out.contains("period: DIFFERS in its finding: 2.197225"), "{out}");
 }
 
 /// A wrong value is found to be wrong, and exit codes tell a difference from a failure.
@@ -282,7 +294,7 @@ fn papers_that_ship_are_reproduced() {
 fn what_is_wrong_in_a_folder_is_said_with_its_place() {
     let reading = "[readings.a]\nabout = \"\"\nextends = \"b\"\n[readings.b]\nabout \
         = \"\"\nextends = \"a\"\n[run]";
-    let cases: [(&str, &str, &str, &[&str]); 28] = [
+    let cases: [(&str, &str, &str, &[&str]); 33] = [
         (
             "paper.toml",
             "rtol = 1e-9",
@@ -365,6 +377,36 @@ fn what_is_wrong_in_a_folder_is_said_with_its_place() {
             &["no panel or measure `cycel`", "did you mean `cycle`?"],
         ),
         ("claims.toml", "read = \"period\"", "", &["the claim reads nothing", "claims.toml:2:1"]),
+        (
+            "claims.toml",
+            "read = \"period\"\nequals",
+            "read = \"period\"\ncolumn = \"t\"\ntake = \"last\"\nequals",
+            &["the claim reads a fact and a column", "claims.toml:10:10"],
+        ),
+        (
+            "claims.toml",
+            "relation = \"less\"",
+            "relation = \"less\"\nthan = 3",
+            &["`than` and `and` are both given", "claims.toml:23:8"],
+        ),
+        (
+            "claims.toml",
+            VALUE,
+            "check = \"chaos\"\nof = \"cycle\"",
+            &["`cycle` asks for a closed orbit", "lyapunov", "claims.toml:8:6"],
+        ),
+        (
+            "claims.toml",
+            VALUE,
+            "check = \"period\"\nof = \"cycle\"\nis = 1",
+            &["`cycle` asks for a closed orbit", "section", "claims.toml:8:6"],
+        ),
+        (
+            "claims.toml",
+            "decided = 2026-11-26",
+            "decided = 10:00:00",
+            &["`decided` is a day, and this is 10:00:00"],
+        ),
         (
             "claims.toml",
             "check = \"value\"",
