@@ -612,6 +612,17 @@ fn a_sweep_says_what_runs_settle_on() {
         outcomes(at, &["--system", "well.toml", "--t-end", "100", "--over", "params.p=1,4"]).0,
         ["rest", "rest"]
     );
+    // What grows without end is no attractor, and has crossings enough.
+    fs::write(
+        at.join("unstable.toml"),
+        "states = ['x', 'y']\nstart = [1, 0]\nf = ['0.02*x - y', 'x + 0.02*y']",
+    )
+    .unwrap();
+    for end in ["300", "600"] {
+        let grows = ["--system", "unstable.toml", "--t-end", end, "--section", "y=0"];
+        let found = outcomes(at, &[&grows[..], &["--over", "start.x=0.5,1"]].concat());
+        assert_eq!(found.0, ["undecided", "undecided"], "{end}");
+    }
     let scan = [
         "scan",
         "--quiet",

@@ -425,7 +425,11 @@ const COLUMNS: [(&str, &str); 46] = [
     ("settled_at", "from this time on it is within tolerance of the orbit"),
     ("radius", "mean distance of the last returns, once settled, from the orbit"),
     ("rate", "rate of approach, per unit time"),
-    ("rate_error", "standard error of `rate`"),
+    (
+        "rate_error",
+        "standard error of the line that `rate` is fitted by, as if its points were independent; \
+            where an approach turns or bends the true one is two to four times as large",
+    ),
     ("turn", "time of one turn around the orbit"),
     ("exponent", "largest Lyapunov exponent, per unit time"),
     ("exponent_error", "its standard error"),

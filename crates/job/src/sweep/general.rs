@@ -238,12 +238,27 @@ fn judged(
             evidence = wider;
         }
     }
-    if let Verdict::QuasiPeriodic(cycle) = &evidence.verdict
-        && cycle.rotation.is_none()
-    {
+    let nothing_turns = match &evidence.verdict {
+        Verdict::QuasiPeriodic(cycle) => cycle.rotation.is_none(),
+        Verdict::TooFew { points } => {
+            *points >= Thresholds::default().fewest_points && reaches_out(&seen)
+        }
+        _ => false,
+    };
+    if nothing_turns {
         evidence.verdict = Verdict::Undecided { lyapunov: None };
     }
     (evidence, middle)
+}
+
+/// Whether the points of the last quarter reach further out than all before.
+fn reaches_out(section: &[SectionPoint]) -> bool {
+    const FURTHER: f64 = 1.1;
+    let far = |points: &[SectionPoint]| {
+        points.iter().flat_map(|p| p.u).fold(0.0_f64, |most, u| most.max(u.abs()))
+    };
+    let (before, last) = section.split_at(section.len() / 4 * 3);
+    far(last) > FURTHER * far(before)
 }
 
 /// Whether the points of one direction come closer to those a period before.
