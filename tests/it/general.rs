@@ -669,6 +669,28 @@ fn periods_do_not_depend_on_the_origin() {
     assert_eq!(found.0, ["period-1", "period-2", "period-2"]);
 }
 
+/// Orbits of a pendulum fill the plane: that through the start is found, to the separatrix, with
+/// its period 4 K(k), k = v/2, by the arithmetic-geometric mean.
+#[test]
+fn an_orbit_that_is_not_isolated_is_the_nearest() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(at.join("pendulum.toml"), "states = ['a', 'v']\nf = ['v', '-sin(a)']").unwrap();
+    for v in [0.1, 1.0, 1.9, 1.99, 1.9999] {
+        let start = format!("0,{v}");
+        let orbit = ["orbit", "--system", "pendulum.toml", "--start", &start, "--section", "a=0"];
+        let said = String::from_utf8(good(at, &[&orbit[..], &["--quiet"]].concat())).unwrap();
+        let (mut a, mut b) = (1.0_f64, (1.0 - v * v / 4.0_f64).sqrt());
+        while (a - b).abs() > 1e-14 {
+            (a, b) = (0.5 * (a + b), (a * b).sqrt());
+        }
+        let of = |label: &str| said.lines().find_map(|l| l.strip_prefix(label)).unwrap().trim();
+        let (found, exact) = (of("period").parse::<f64>().unwrap(), std::f64::consts::TAU / a);
+        assert!((found / exact - 1.0).abs() < 1e-5, "{v}: {found} for {exact}");
+        assert!(of("stability").starts_with("neutral"), "{v}: {said}");
+    }
+}
+
 /// The outcomes and crossings of a sweep's rows.
 fn outcomes(folder: &Path, flags: &[&str]) -> (Vec<String>, Vec<i64>) {
     let table = from_csv(&good(folder, &[&["sweep", "--quiet"], flags].concat())).unwrap().1;

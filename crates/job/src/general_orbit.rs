@@ -120,6 +120,7 @@ impl Question for GeneralOrbit {
             .with_fact("point", &found.x)
             .with_fact("period", &found.period)
             .with_fact("multipliers", &found.multipliers)
+            .with_fact("multiplier_error", &found.multiplier_error)
             .with_fact("gap", &found.gap);
         let Some(along) = &self.along else { return Ok(answer) };
         at(&model, along, along.to)?;

@@ -302,6 +302,7 @@ fn of_general(arguments: &Arguments, question: &GeneralOrbit) -> Result<Exit, Cl
     let (period, gap): (f64, f64) =
         (answer.fact("period").map_err(fact)?, answer.fact("gap").map_err(fact)?);
     let largest = multipliers.first().map_or(0.0, |[re, im]| (re * re + im * im).sqrt());
+    let error: f64 = answer.fact("multiplier_error").map_err(fact)?;
     let names = question.run.model.coordinates();
     let about = json!({ "kind": question.kind(), "question": question.json() });
     let bytes = match (format, answer.table("branch")) {
@@ -320,7 +321,7 @@ fn of_general(arguments: &Arguments, question: &GeneralOrbit) -> Result<Exit, Cl
             line("point", state_in_words(&names, &point));
             line("multipliers", complex(&multipliers, f64::NAN));
             let stability = match () {
-                () if (largest - 1.0).abs() < 1e-6 => {
+                () if (largest - 1.0).abs() < error.max(1e-6) => {
                     "neutral: a multiplier is on the unit circle within its error"
                 }
                 () if largest < 1.0 => "attracts",

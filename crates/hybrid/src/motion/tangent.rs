@@ -13,7 +13,7 @@
 use super::{Ending, Follower, HybridError, Options, Record, Sought};
 use crate::Model;
 use crate::step::{A, C, E, Step};
-use twofold_num::elementary::{ln, rough_pow};
+use twofold_num::elementary::{ln, rough_pow, sqrt};
 use twofold_num::fit::line;
 use twofold_num::linear::{eigenvalues, solve_any};
 use twofold_num::{Dual, Short};
@@ -847,8 +847,36 @@ pub struct ClosedOrbit {
     /// Its Floquet multipliers, largest first (real and imaginary parts); of an autonomous system
     /// without the one that is 1.
     pub multipliers: Vec<[f64; 2]>,
+    /// Where one is close to 1: ten times as much as those of ten times the tolerance differ; else
+    /// 0.
+    pub multiplier_error: f64,
     /// Closure error after one period, in units of its states' largest size.
     pub gap: f64,
+}
+
+/// A gap, in units of the states' largest size, that may be the integration's error.
+const CLOSED: f64 = 1e-8;
+/// A multiplier's distance from 1 that may be.
+const NOT_ISOLATED: f64 = 1e-6;
+/// A multiplier's distance from 1 within which its error is looked at.
+const NEAR_ONE: f64 = 1e-2;
+
+/// The distance of two complex numbers.
+fn apart(a: &[f64; 2], b: &[f64; 2]) -> f64 {
+    let [re, im] = [a[0] - b[0], a[1] - b[1]];
+    sqrt(re * re + im * im)
+}
+
+/// The Floquet multipliers of a return map's derivative, by falling modulus.
+fn multipliers_of(matrix: &[f64], n: usize, after: &Return) -> Vec<[f64; 2]> {
+    let mut multipliers = eigenvalues(matrix, n).unwrap_or_default();
+    let square = |m: &[f64; 2]| m[0] * m[0] + m[1] * m[1];
+    multipliers.sort_by(|a, b| square(b).total_cmp(&square(a)));
+    if let Return::Crossings(_) = after {
+        // The return map has an eigenvalue 0 along the field, which is none of the orbit's.
+        multipliers.pop();
+    }
+    multipliers
 }
 
 /// Finds a closed orbit near the start of `options` by Newton's method on the return map, whose
@@ -898,7 +926,7 @@ pub fn closed_orbit(
         let gap: Vec<f64> = end.iter().zip(&x).map(|(e, x)| e - x).collect();
         let off = gap.iter().fold(0.0_f64, |a, v| a.max(v.abs())) / size.max(f64::MIN_POSITIVE);
         if off >= gap_of(&best)
-            && gap_of(&best) <= 1e-8
+            && gap_of(&best) <= CLOSED
             && let Some(best) = best
         {
             // As near as rounding lets it come. Where orbits are not isolated the next step may
@@ -906,16 +934,35 @@ pub fn closed_orbit(
             return Ok(best);
         }
         if off < gap_of(&best) {
-            let mut multipliers = eigenvalues(&matrix, n).unwrap_or_default();
-            multipliers.sort_by(|a, b| {
-                (b[0] * b[0] + b[1] * b[1]).total_cmp(&(a[0] * a[0] + a[1] * a[1]))
-            });
-            if let Return::Crossings(_) = after {
-                // The return map has an eigenvalue 0 along the field, which is none of the orbit's.
-                multipliers.pop();
+            let multipliers = multipliers_of(&matrix, n, after);
+            let mut found = ClosedOrbit {
+                x: x.clone(),
+                mode,
+                period: time,
+                multipliers,
+                multiplier_error: 0.0,
+                gap: off,
+            };
+            // Where a multiplier is 1 within its error, orbits beside are closed, too: a step of
+            // Newton's method would be one error over another one.
+            let from_one = found.multipliers.iter().map(|m| apart(m, &[1.0, 0.0]));
+            let from_one = from_one.fold(f64::INFINITY, f64::min);
+            if off <= CLOSED && from_one <= NEAR_ONE {
+                let looser = Options {
+                    rtol: 10.0 * options.rtol,
+                    atol: options.atol.map(|atol| 10.0 * atol),
+                    ..options.clone()
+                };
+                if let Ok(rough) = turn(model, &looser, after, &x, true) {
+                    let rough = multipliers_of(&rough.matrix, n, after);
+                    let pairs = found.multipliers.iter().zip(&rough);
+                    // One sample of the error.
+                    found.multiplier_error =
+                        10.0 * pairs.map(|(a, b)| apart(a, b)).fold(0.0, f64::max);
+                }
             }
-            let found = ClosedOrbit { x: x.clone(), mode, period: time, multipliers, gap: off };
-            if off <= 1e-11 {
+            let fills = from_one <= found.multiplier_error.max(NOT_ISOLATED);
+            if off <= 1e-11 || fills && off <= CLOSED {
                 return Ok(found);
             }
             best = Some(found);
