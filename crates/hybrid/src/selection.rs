@@ -146,7 +146,19 @@ fn bilinear(rates: &[Vec<f64>], k: usize) -> Option<Vec<f64>> {
             break;
         }
     }
-    Some((0..rates.len()).map(|vertex| (0..k).map(|i| factor(&w, vertex, i)).product()).collect())
+    let weight = |vertex| (0..k).map(|i| factor(&w, vertex, i)).product();
+    let weights: Vec<f64> = (0..rates.len()).map(weight).collect();
+    stays(&weights, rates, k).then_some(weights)
+}
+
+/// Rates of a mixture below this share of the largest one are rounding.
+const STAYS: f64 = 1e-10;
+
+/// Whether the mixture with these weights stays on all surfaces.
+fn stays(weights: &[f64], rates: &[Vec<f64>], k: usize) -> bool {
+    let rate = |r: usize| weights.iter().zip(rates).map(|(w, f)| w * f[r]).sum::<f64>().abs();
+    let size = rates.iter().flatten().fold(0.0_f64, |most, v| most.max(v.abs()));
+    (0..k).map(rate).sum::<f64>() <= STAYS * size
 }
 
 /// The least square of the mixture's length under the conditions that weights sum to one, are not
@@ -175,15 +187,15 @@ fn shortest(fields: &[Vec<f64>], rates: &[Vec<f64>], k: usize) -> Option<Vec<f64
             continue;
         }
         let mut all = vec![0.0; fields.len()];
-        part.iter().zip(weights).for_each(|(v, w)| all[*v] = *w);
+        part.iter().zip(weights).for_each(|(v, w)| all[*v] = w.max(0.0));
         let n = fields[0].len();
         let velocity: Vec<f64> =
             (0..n).map(|i| all.iter().zip(fields).map(|(w, f)| w * f[i]).sum()).collect();
-        let off: f64 =
-            (0..k).map(|r| all.iter().zip(rates).map(|(w, f)| w * f[r]).sum::<f64>().abs()).sum();
-        let size = rates.iter().flatten().fold(0.0_f64, |most, v| most.max(v.abs()));
+        // Of a singular set what is solved need not be a mixture.
+        let whole = (all.iter().sum::<f64>() - 1.0).abs() <= STAYS;
         let length = dot(&velocity, &velocity);
-        if off <= 1e-10 * size && best.as_ref().is_none_or(|(least, _)| length < *least) {
+        if whole && stays(&all, rates, k) && best.as_ref().is_none_or(|(least, _)| length < *least)
+        {
             best = Some((length, all));
         }
     }
