@@ -70,8 +70,10 @@ pub struct Rest {
 }
 
 impl Rest {
-    /// "stable node", "saddle", ... from the eigenvalues; on a surface that repels everything is
-    /// unstable. Of a curve of rests what they are all along it, of a larger set what this one is.
+    /// "stable node", "saddle", ... from the eigenvalues; of a pseudo-equilibrium with those of the
+    /// motion to its surface, "stable pseudo-node" or, where one of them leads to it and the other
+    /// away, "pseudo-saddle" (Kuznetsov, Rinaldi & Gragnani 2003). Of a curve of rests
+    /// what they are all along it, of a larger set what this one is.
     pub fn kind(&self) -> String {
         if self.family.as_ref().is_some_and(|f| f.changes) {
             return "stability changes along the curve".into();
@@ -97,8 +99,9 @@ impl Rest {
         let (out, into) = (values.iter().any(|e| e[0] > zero), values.iter().any(|e| e[0] < -zero));
         let neutral = values.iter().any(|e| e[0].abs() <= zero);
         let shape = if turns { "focus" } else { "node" };
-        let [repels, open] =
-            [Some(false), None].map(|a| !self.on.is_empty() && self.attracting == a);
+        let [attracts, repels, open] =
+            [Some(true), Some(false), None].map(|a| !self.on.is_empty() && self.attracting == a);
+        let pseudo = if self.on.is_empty() { "" } else { "pseudo-" };
         match (out, into) {
             _ if along > 0 => match (out, neutral || open) {
                 _ if repels => "unstable: neighbours leave the set",
@@ -110,12 +113,13 @@ impl Rest {
             (true, _) if open => "unstable".into(),
             _ if open => "not decided by the fields there".into(),
             _ if values.is_empty() => if repels { "unstable" } else { "stable" }.into(),
-            (true, true) => "saddle".into(),
+            (true, true) => format!("{pseudo}saddle"),
             (false, _) if neutral => "not decided by the linearised motion".into(),
+            (true, false) if attracts => "pseudo-saddle".into(),
             (true, false) if neutral => "unstable".into(),
-            (true, false) => format!("unstable {shape}"),
-            _ if repels => format!("{shape} that attracts along a surface that repels"),
-            _ => format!("stable {shape}"),
+            (true, false) => format!("unstable {pseudo}{shape}"),
+            _ if repels => "pseudo-saddle".into(),
+            _ => format!("stable {pseudo}{shape}"),
         }
     }
 }

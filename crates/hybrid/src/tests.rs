@@ -2541,6 +2541,23 @@ fn rests_on_a_circle_are_found() {
     }
 }
 
+/// A pseudo-equilibrium at y = 0 of x' = a sign(x), y' = b y + sign(x)/2, by the motion to the
+/// surface (a) and along it (b).
+#[test]
+fn pseudo_equilibria_have_the_names_of_the_field() {
+    for (a, b, want) in [
+        (-1, -1, "stable pseudo-node"),
+        (-1, 1, "pseudo-saddle"),
+        (1, -1, "pseudo-saddle"),
+        (1, 1, "unstable pseudo-node"),
+    ] {
+        let text = format!("states = ['x', 'y']\nf = ['({a})*sign(x)', '({b})*y + 0.5*sign(x)']");
+        let found = crate::rests::rests(&model(&text), &[(-0.3, 0.4); 2]).unwrap();
+        let kinds: Vec<String> = found.iter().map(|r| r.kind()).collect();
+        assert_eq!(kinds, [want], "{a} {b}");
+    }
+}
+
 /// Rests where a whole part becomes another number: x = k, where 1/2 - floor x is half of the time
 /// 1/2 and half of it -1/2, or mod(x, 1) - 1/4 three quarters of it -1/4.
 #[test]
