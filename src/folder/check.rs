@@ -744,8 +744,18 @@ impl Check {
                 Ok((holds, format!("{}, {word} {}", short(value), short(than))))
             }
             Check::Period { is, within } => {
-                let found = period(&section(first, None)?.0, *within);
-                let said = found.map_or("no period up to 64".to_owned(), |n| format!("period {n}"));
+                let points = section(first, None)?.0;
+                let (found, longest) = (period(&points, *within), LONGEST.min(points.len() / 3));
+                if found.is_none() && longest < *is as usize {
+                    return Err(format!(
+                        "the section is crossed {} times in the later half, and three times around \
+                            a period of {is} are {}; give a later t-end",
+                        points.len(),
+                        3 * is
+                    ));
+                }
+                let none = || format!("no period up to {longest}");
+                let said = found.map_or_else(none, |n| format!("period {n}"));
                 Ok((found == Some(*is as usize), said))
             }
             Check::Chaos => {
@@ -938,6 +948,21 @@ mod tests {
         assert_eq!(period(&circle(8, third), 1e-6), None);
         assert_eq!(period(&circle(300, 1.0), 1e-6), None);
         assert_eq!(period(&vec![vec![2.0, 3.0]; 9], 1e-6), Some(1));
+    }
+
+    /// Nine crossings of a period of two, of which the later half is looked at.
+    #[test]
+    fn a_section_that_is_too_short_for_a_period_is_not_judged() {
+        let columns = ["t", "x"].map(crate::job::Column::numbers);
+        let mut table = Table::new("section", columns.into());
+        for i in 0..9 {
+            let cells = [f64::from(i), f64::from(i % 2)];
+            table.push(cells.map(crate::job::Entry::Number).into());
+        }
+        let answer = [Arc::new(Answer::of_tables(vec![table]))];
+        let judged = |is| Check::Period { is, within: 1e-6 }.of(&answer);
+        assert_eq!(judged(1), Ok((false, "no period up to 1".into())));
+        assert!(judged(2).unwrap_err().contains("4 times in the later half"));
     }
 
     #[test]

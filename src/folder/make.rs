@@ -323,10 +323,14 @@ impl Folder {
         };
         let outcomes: Outcomes =
             serde_json::from_str(&read_text(&path)?).map_err(|e| wrong(e.to_string()))?;
-        if outcomes.version == 1 {
-            Ok(outcomes)
-        } else {
-            Err(wrong(format!("version {} is not known", outcomes.version)))
+        let mut claims = std::collections::BTreeSet::new();
+        let twice = outcomes.verdicts.iter().find(|v| !claims.insert(&v.claim));
+        match twice {
+            _ if outcomes.version != 1 => {
+                Err(wrong(format!("version {} is not known", outcomes.version)))
+            }
+            Some(twice) => Err(wrong(format!("two outcomes of claim {}", twice.claim))),
+            None => Ok(outcomes),
         }
     }
 }

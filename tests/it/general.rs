@@ -612,7 +612,7 @@ fn a_sweep_says_what_runs_settle_on() {
         outcomes(at, &["--system", "well.toml", "--t-end", "100", "--over", "params.p=1,4"]).0,
         ["rest", "rest"]
     );
-    // What grows without end is no attractor, and has crossings enough.
+    // Growth without end is no attractor, and has crossings enough.
     fs::write(
         at.join("unstable.toml"),
         "states = ['x', 'y']\nstart = [1, 0]\nf = ['0.02*x - y', 'x + 0.02*y']",

@@ -127,6 +127,13 @@ fn a_rule_that_changes_after_its_data_is_said_to() {
     change(&root, "expected/claims.json", "2.197225 (", "2.297225 (");
     let (code, out, _) = paper(&["check", "--quiet"], &root);
     assert!(code == 1 && out.contains("period: DIFFERS in its finding: 2.197225"), "{out}");
+    let path = root.join("expected/claims.json");
+    let mut all: serde_json::Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+    let first = all["verdicts"][0].clone();
+    all["verdicts"].as_array_mut().unwrap().push(first);
+    fs::write(&path, all.to_string()).unwrap();
+    let (code, _, said) = paper(&["check", "--quiet"], &root);
+    assert!(code == 2 && said.contains("two outcomes of claim period"), "{said}");
 }
 
 /// A wrong value is found to be wrong, and exit codes tell a difference from a failure.

@@ -1553,8 +1553,8 @@ fn three_relays_that_act_on_each_other() {
     assert!(error.contains("turn away"), "{error}");
 }
 
-/// On two relays with z' = 3/2 + sign(x) sign(y): equal weights give z' = 3/2, the shortest velocity
-/// of the hull is 1/2.
+/// On two relays with z' = 3/2 + sign(x) sign(y): equal weights give z' = 3/2, and the shortest
+/// velocity of the hull is 1/2.
 #[test]
 fn a_rule_chooses_among_mixtures() {
     use crate::selection::Intersection;
@@ -1570,9 +1570,9 @@ fn a_rule_chooses_among_mixtures() {
         assert!(x[0].abs() < 1e-12 && x[1].abs() < 1e-12);
     }
     // Of sets of fields that have no mixture the solution is none (SciPy's linprog: 0.3157259).
-    let text = "states = ['x', 'y', 'z']\nstart = [0, 0, 0]\nf = ['0.199 - 2*sign(x) + 0.191*sign(y) \
-        - 0.026*sign(x)*sign(y)', '0.058 - 0.54*sign(x) - 1.5*sign(y) + 0.122*sign(x)*sign(y)', \
-        '0.427 + 0.63*sign(x) - 0.46*sign(y) + 0.219*sign(x)*sign(y)']";
+    let text = "states = ['x', 'y', 'z']\nstart = [0, 0, 0]\nf = ['0.199 - 2*sign(x) + \
+        0.191*sign(y) - 0.026*sign(x)*sign(y)', '0.058 - 0.54*sign(x) - 1.5*sign(y) + \
+        0.122*sign(x)*sign(y)', '0.427 + 0.63*sign(x) - 0.46*sign(y) + 0.219*sign(x)*sign(y)']";
     let options =
         Options { t_end: 1.0, intersection: Intersection::HullLeastNorm, ..Options::default() };
     near(follow(&model(text), &options, &mut |_| true).unwrap().x[2], 0.3157259156361267, 1e-9);

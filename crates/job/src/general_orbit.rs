@@ -120,8 +120,10 @@ impl Question for GeneralOrbit {
             .with_fact("point", &found.x)
             .with_fact("period", &found.period)
             .with_fact("multipliers", &found.multipliers)
-            .with_fact("multiplier_error", &found.multiplier_error)
             .with_fact("gap", &found.gap);
+        if found.multiplier_error > 0.0 {
+            answer = answer.with_fact("multiplier_error", &found.multiplier_error);
+        }
         let Some(along) = &self.along else { return Ok(answer) };
         at(&model, along, along.to)?;
         options.mode = found.mode;

@@ -302,7 +302,8 @@ fn of_general(arguments: &Arguments, question: &GeneralOrbit) -> Result<Exit, Cl
     let (period, gap): (f64, f64) =
         (answer.fact("period").map_err(fact)?, answer.fact("gap").map_err(fact)?);
     let largest = multipliers.first().map_or(0.0, |[re, im]| (re * re + im * im).sqrt());
-    let error: f64 = answer.fact("multiplier_error").map_err(fact)?;
+    // Where none is close to 1 it is not looked for.
+    let error: f64 = answer.fact("multiplier_error").unwrap_or(0.0);
     let names = question.run.model.coordinates();
     let about = json!({ "kind": question.kind(), "question": question.json() });
     let bytes = match (format, answer.table("branch")) {
@@ -428,7 +429,8 @@ fn text(question: &ClosedOrbit, answer: &Answer) -> Result<String, CliError> {
     );
     line("period", format!("{period}"));
     line("point", state_in_words(&names, &point));
-    let error: f64 = answer.fact("multiplier_error").map_err(fact)?;
+    // Where none is close to 1 it is not looked for.
+    let error: f64 = answer.fact("multiplier_error").unwrap_or(0.0);
     line("multipliers", format!("{}, each +- {error:.1e}", complex(&multipliers, error)));
     line(
         "stability",
