@@ -954,10 +954,10 @@ mod tests {
     #[test]
     fn a_section_that_is_too_short_for_a_period_is_not_judged() {
         let columns = ["t", "x"].map(crate::job::Column::numbers);
-        let mut table = Table::new("section", columns.into());
+        let mut table = Table::new("section", columns);
         for i in 0..9 {
             let cells = [f64::from(i), f64::from(i % 2)];
-            table.push(cells.map(crate::job::Entry::Number).into());
+            table.push(Vec::from(cells.map(crate::job::Entry::Number)));
         }
         let answer = [Arc::new(Answer::of_tables(vec![table]))];
         let judged = |is| Check::Period { is, within: 1e-6 }.of(&answer);
