@@ -1576,6 +1576,16 @@ fn a_rule_chooses_among_mixtures() {
     let options =
         Options { t_end: 1.0, intersection: Intersection::HullLeastNorm, ..Options::default() };
     near(follow(&model(text), &options, &mut |_| true).unwrap().x[2], 0.3157259156361267, 1e-9);
+    // Without a rule, where all mixtures have one velocity: q' = 1 in all fields.
+    let text = "states = ['x', 'y', 'q']\nstart = [0, 0, 0]\n\
+        f = ['-sign(x)', '-sign(y) + 0.5*sign(x)*sign(y)', '1']";
+    near(run(&model(text), 1.0).1.unwrap().x[2], 1.0, 1e-12);
+    // Two of three go on with the rule where the third is left, at q = 1: z' = q - 1.
+    let text = "states = ['x', 'y', 'z', 'q']\nstart = [0, 0, 0, 0.2]\n\
+        f = ['-sign(x)', '-sign(y)', 'q - sign(z)*(1 + 0.3*sign(x)*sign(y))', '1']";
+    let options =
+        Options { t_end: 2.0, intersection: Intersection::Bilinear, ..Options::default() };
+    near(follow(&model(text), &options, &mut |_| true).unwrap().x[2], 0.72, 1e-9);
     // Coupled: the rule's weights solve the same equations.
     let text = "states = ['x', 'y']\nstart = [1, 1]\nf = ['-sign(x) - 0.5*sign(x)*sign(y)', \
         '-sign(y) + 0.3*sign(x)*sign(y)']";

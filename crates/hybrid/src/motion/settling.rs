@@ -896,6 +896,7 @@ impl Follower<'_> {
         }
         sliding.sort_unstable();
         self.adopt(config, sliding);
+        self.corners = Vec::new();
         let left = self.leave_by_jump(&zero, &before);
         if !left.is_empty() {
             let (rest, none) = (

@@ -53,7 +53,12 @@ impl Follower<'_> {
         self.separate = self.separate();
         self.dependent = false;
         self.base = Vec::new();
+        // Surfaces that are left leave the others with the mixture of their corners.
+        let mixed = !self.corners.is_empty() && self.separate.is_none() && self.sliding.len() > 1;
         self.corners = Vec::new();
+        if mixed {
+            self.take_corners();
+        }
         if self.separate.is_none() {
             for guard in self.sliding.clone() {
                 let mut flipped = self.config.clone();
