@@ -24,7 +24,7 @@ gallery: ## a picture of every system that ships into target/gallery
 report: ## one page about what stands in target/figures: target/figures/index.html
 	@$(RUN) --bin twofold -- report
 
-check: ## recompute and compare with figures/figN/expected.json; exit 1 on a difference
+check: ## recompute and compare with papers/jeffrey-2013/expected; exit 1 on a difference
 	@$(RUN) --bin twofold -- check
 
 bless: ## make today's figures the reference: make bless REASON="why"
@@ -51,7 +51,7 @@ SKIP := --skip 2_30
 elementary: ## elementary functions against double-double arithmetic, and their frozen bits: 2^24 points each (minutes)
 	@$(CARGO) test --release --locked --package twofold-num --lib elementary -- --include-ignored --nocapture $(SKIP)
 
-# The sweeps behind figures/census, figures/audit and figures/basin: 300 starts within 1e-9 of the paper's; fig. 7(iii) by other methods and
+# The sweeps behind papers/jeffrey-2013/code/census, papers/jeffrey-2013/code/audit and papers/jeffrey-2013/code/basin: 300 starts within 1e-9 of the paper's; fig. 7(iii) by other methods and
 # tolerances, and to shorter times with small local errors; alpha and beta over three decades each, and one exponent changed; starts on a plane.
 # What is there already is kept if six of its rows come out the same again.
 SWEEP := $(RUN) --bin twofold -- sweep --threads $(or $(THREADS),0) --resume --recheck 6
@@ -71,15 +71,15 @@ CELLS := --over params.alpha=1e-3..1:log:7 --over params.beta=1e-6..1e-3:log:7
 ALPHA := --over params.alpha=1e-2,1 --over params.beta=1e-5
 ALPHAS := --over params.alpha=1e-3,1e-2,0.1,1 --over params.beta=1e-5
 BETA := --over params.alpha=1e-3 --over params.beta=1e-6,1e-4,1e-3
-C := figures/census
-A := figures/audit
+C := papers/jeffrey-2013/code/census
+A := papers/jeffrey-2013/code/audit
 census: ## go on with the census, the audit and the basins (hours; Ctrl-C keeps what is finished, and the next call goes on)
 	@$(CARGO) build --release --locked --bin twofold
-	@$(SWEEP) --t-end 1e4 --method dopri5 --over start.x=-60..60:25 --over start.y=0 --over start.z=-60..60:25 --out figures/basin/printed.csv
-	@$(SWEEP) --t-end 1e4 --method dopri5 --reading reconstructed --over start.x=-3..3:25 --over start.y=0 --over start.z=-3..3:25 --out figures/basin/reconstructed.csv
+	@$(SWEEP) --t-end 1e4 --method dopri5 --over start.x=-60..60:25 --over start.y=0 --over start.z=-60..60:25 --out papers/jeffrey-2013/code/basin/printed.csv
+	@$(SWEEP) --t-end 1e4 --method dopri5 --reading reconstructed --over start.x=-3..3:25 --over start.y=0 --over start.z=-3..3:25 --out papers/jeffrey-2013/code/basin/reconstructed.csv
 	@$(SWEEP) --t-end 2e5 $(READINGS) $(INTERVALS) $(STARTS) --random 300 --out $(C)/fig7.csv
-	@$(SWEEP) --t-end 2e5 --system figures/control/shifted.toml $(INTERVALS) $(STARTS) --random 30 --out figures/control/shifted.csv
-	@$(SWEEP) --t-end 2e5 --reading reconstructed --eps 0.1 $(INTERVALS) $(STARTS) --random 30 --out figures/control/wide.csv
+	@$(SWEEP) --t-end 2e5 --system papers/jeffrey-2013/code/control/shifted.toml $(INTERVALS) $(STARTS) --random 30 --out papers/jeffrey-2013/code/control/shifted.csv
+	@$(SWEEP) --t-end 2e5 --reading reconstructed --eps 0.1 $(INTERVALS) $(STARTS) --random 30 --out papers/jeffrey-2013/code/control/wide.csv
 	@$(SWEEP) --t-end 2e5 $(READINGS) $(SIGMAS) $(STARTS) --random 300 --out $(C)/fig8.csv
 	@$(SWEEP) $(PRINTED) $(METHODS) $(STARTS) --random 100 --out $(C)/methods-printed.csv
 	@$(SWEEP) $(RECONSTRUCTED) $(METHODS) $(STARTS) --random 24 --out $(C)/methods.csv
@@ -103,8 +103,8 @@ census: ## go on with the census, the audit and the basins (hours; Ctrl-C keeps 
 	@$(SWEEP) --t-end 2e5 --method dopri5 $(CELLS) $(SIGMAS) $(STARTS) --random 6 --out $(A)/fig8.csv
 	@$(SWEEP) --t-end 2e5 --method dopri5 $(HYSTERETIC) $(CELLS) $(STARTS) --random 2 --out $(A)/fig9.csv
 
-# The sweeps behind figures/capture, by the rules that stand there.
-K := figures/capture
+# The sweeps behind papers/jeffrey-2013/code/capture, by the rules that stand there.
+K := papers/jeffrey-2013/code/capture
 CAPTURE := --t-end 2e5 --restart 100 --random-seed
 PANEL30 := --t-end 2e5 --over params.alpha=0.1 --over params.beta=3.16227766016838e-4
 capture: ## go on with the study of the times of capture, the map of the parameters by LSODA and the candidates' runs (an hour and a half on one core)
@@ -123,10 +123,10 @@ capture: ## go on with the study of the times of capture, the map of the paramet
 	@$(RUN) --example visits > $(K)/visits.csv
 
 .PHONY: resolved
-D := figures/resolved
+D := papers/jeffrey-2013/code/resolved
 RESOLVED := --t-end 2e5 $(READINGS) $(STARTS) --random 100 --rtol 1e-13 --atol 1e-13 --random-seed
 DIGITS := --t-end 2e5 $(STARTS) --over interval=100 --method taylor-extended --rtol 1e-25 --atol 1e-25 --random-seed 2020
-resolved: ## the census by methods that resolve the layer, by the rules in figures/resolved (three hours on one core; a stopped call goes on)
+resolved: ## the census by methods that resolve the layer, by the rules in papers/jeffrey-2013/code/resolved (three hours on one core; a stopped call goes on)
 	@$(CARGO) build --release --locked --bin twofold
 	@$(SWEEP) $(RESOLVED) 2017 --method taylor $(INTERVALS) --out $(D)/taylor7.csv
 	@$(SWEEP) $(RESOLVED) 2018 --method taylor $(SIGMAS) --out $(D)/taylor8.csv
@@ -135,12 +135,12 @@ resolved: ## the census by methods that resolve the layer, by the rules in figur
 	@$(SWEEP) $(DIGITS) $(RECONSTRUCTED) --random 60 --out $(D)/extended-reconstructed.csv
 
 .PHONY: delay-data
-delay-data: ## the data of figures/delay: passages, and a hundred runs of each rule to compare (a quarter of an hour; a stopped call goes on)
+delay-data: ## the data of papers/jeffrey-2013/code/delay: passages, and a hundred runs of each rule to compare (a quarter of an hour; a stopped call goes on)
 	@$(CARGO) build --release --locked --quiet --example delay_growth --example delay_runs
-	@target/release/examples/delay_growth growth > target/delay-growth.csv && mv target/delay-growth.csv figures/delay/growth.csv
-	@target/release/examples/delay_growth exits > target/delay-exits.csv && mv target/delay-exits.csv figures/delay/exits.csv
-	@target/release/examples/delay_runs sections > target/delay-sections.csv && mv target/delay-sections.csv figures/delay/sections.csv
-	@target/release/examples/delay_runs > target/delay-runs.csv && mv target/delay-runs.csv figures/delay/runs.csv
+	@target/release/examples/delay_growth growth > target/delay-growth.csv && mv target/delay-growth.csv papers/jeffrey-2013/code/delay/growth.csv
+	@target/release/examples/delay_growth exits > target/delay-exits.csv && mv target/delay-exits.csv papers/jeffrey-2013/code/delay/exits.csv
+	@target/release/examples/delay_runs sections > target/delay-sections.csv && mv target/delay-sections.csv papers/jeffrey-2013/code/delay/sections.csv
+	@target/release/examples/delay_runs > target/delay-runs.csv && mv target/delay-runs.csv papers/jeffrey-2013/code/delay/runs.csv
 
 .PHONY: returns
 returns: ## how many orbits that leave the repelling sliding region come back to the two-fold (minutes)

@@ -1,9 +1,8 @@
 //! Growth of a disturbance in one passage of the two-fold when the switch acts late or has a
 //! memory, and the place where the two-fold is left in dependence on the chatter's phase: the data
-//! of figures/delay.
+//! of papers/jeffrey-2013/code/delay.
 //!
-//! `cargo run --release --example delay_growth growth > figures/delay/growth.csv`, and the same
-//! with `exits`
+//! `cargo run --release --example delay_growth growth > growth.csv`, and the same with `exits`
 
 use nalgebra::SVector;
 use twofold::analyse::delay::{LateGrowth, LatePassageQuestion, LateRule, late_exit, late_growth};

@@ -1,5 +1,5 @@
 //! Runs of a delayed switch beside smoothed and hysteretic ones, compared by the rules of sentence
-//! 4.8 (papers/jeffrey-2013/sentences.toml): the data of figures/delay.
+//! 4.8 (papers/jeffrey-2013/sentences.toml): the data of papers/jeffrey-2013/code/delay.
 //!
 //! `make delay-data`: late sections go to a journal first, target/delay-sections-*.jsonl, and a
 //! call of the same version goes on with it.

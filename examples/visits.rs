@@ -2,7 +2,8 @@
 //! alpha and beta: 30 starts within 1e-9 of the paper's. A visit comes within 0.1 of the origin
 //! after more than 0.4 away. CSV on standard output, a row a run.
 //!
-//! `make capture`, or `cargo run --release --example visits > figures/capture/visits.csv`
+//! `make capture`, or
+//! `cargo run --release --example visits > papers/jeffrey-2013/code/capture/visits.csv`
 
 use twofold::integrate::Schedule;
 use twofold::jeffrey_2013::study::claims::claims;

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Makes figures/workprecision/odepack/: what ODEPACK's LSODA, as SciPy carries it, does on the test
-problems.
+"""Makes papers/jeffrey-2013/code/workprecision/odepack:
+ODEPACK's LSODA, as SciPy carries it, on the test problems.
 
 Frozen: run by hand, committed with the versions used, never run by the tests.
 
@@ -31,7 +31,7 @@ import scipy
 from scipy.integrate import LSODA, solve_ivp
 
 HERE = pathlib.Path(__file__).resolve().parent
-OUT = HERE.parent / "tests" / "data" / "odepack"
+OUT = HERE.parent / "papers/jeffrey-2013/code/workprecision/odepack"
 
 
 def robertson(x):

@@ -2,7 +2,7 @@
 //!
 //! The paper's computed figures are in `papers/jeffrey-2013`, a paper's folder like any other
 //! ([`crate::folder`]); sketches and studies, which are more than runs, are Rust beside their data
-//! in `figures/`.
+//! in the folder's `code`.
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -48,7 +48,12 @@ pub fn named(id: &str) -> Figure {
 /// The committed manifest of a figure, as text.
 pub fn reference(id: &str) -> Option<&'static str> {
     let file = format!("expected/{id}.json");
-    FILES.iter().find(|f| f.0 == file).map(|f| f.1).or_else(|| twofold_jeffrey_2013::reference(id))
+    FILES.iter().find(|f| f.0 == file).map(|f| f.1)
+}
+
+/// Whether a file of a paper's `expected` is a figure's.
+fn is_manifest(path: &str) -> bool {
+    path.ends_with(".json") && path != "claims.json"
 }
 
 /// The references of the paper's folder beside `expected`, if that is a checkout's `figures`.
@@ -58,11 +63,13 @@ fn beside(expected: &Path) -> Option<PathBuf> {
     Some(checkout.join(FOLDER).join("expected")).filter(|own| own.exists())
 }
 
-/// Reference of a figure in `expected` (a checkout's `figures`, or a folder of the same form):
-/// NAME/expected.json there, or in the paper's folder if it is one of its own.
+/// Reference of a figure: that of the paper's folder if `expected` is a checkout's `figures`, or
+/// NAME/expected.json in a folder of the program's pictures.
 pub fn reference_file(expected: &Path, id: &str) -> PathBuf {
-    let own = beside(expected).map(|own| own.join(format!("{id}.json")));
-    own.filter(|own| own.exists()).unwrap_or_else(|| expected.join(id).join("expected.json"))
+    match beside(expected) {
+        Some(own) => own.join(format!("{id}.json")),
+        None => expected.join(id).join("expected.json"),
+    }
 }
 
 /// The references and pictures in `expected`, each reference as NAME/expected.json.
@@ -73,9 +80,7 @@ pub fn references_in(expected: &Path) -> Result<Vec<FileBytes>, FileError> {
     let mut files =
         read_tree(expected, &|path| path.ends_with(".json") || path.ends_with(".png"))?.files;
     if let Some(own) = beside(expected) {
-        for FileBytes { path, bytes } in
-            read_tree(&own, &|path| path.starts_with("fig") && path.ends_with(".json"))?.files
-        {
+        for FileBytes { path, bytes } in read_tree(&own, &is_manifest)?.files {
             files.push(FileBytes {
                 path: format!("{}/expected.json", path.trim_end_matches(".json")),
                 bytes,
@@ -117,7 +122,7 @@ mod tests {
         let ours = |path: &str| {
             ["paper.toml", "sentences.toml"].contains(&path)
                 || path.starts_with("figures/")
-                || path.starts_with("expected/fig")
+                || path.strip_prefix("expected/").is_some_and(is_manifest)
         };
         for file in files.iter().filter(|f| ours(&f.path)) {
             assert!(

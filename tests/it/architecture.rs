@@ -121,7 +121,7 @@ struct Source {
 /// Every source that is no test.
 fn sources() -> Vec<Source> {
     let mut files = Vec::new();
-    for folder in ["crates", "src", "figures"] {
+    for folder in ["crates", "src", "figures", "papers"] {
         rust_files(&root().join(folder), &mut files);
     }
     let mut tests = BTreeSet::new();
@@ -268,7 +268,7 @@ fn circular(imports: &BTreeMap<String, BTreeSet<String>>) -> Vec<&String> {
 fn modules_of_a_crate_import_each_other_in_no_circle() {
     let sources = sources();
     let folders = CRATES.iter().map(|(name, _, _)| format!("crates/{name}/src"));
-    for folder in folders.chain(["figures", "src"].map(str::to_owned)) {
+    for folder in folders.chain(["papers/jeffrey-2013/code", "src"].map(str::to_owned)) {
         let imports = imports(&sources, &folder);
         assert!(!imports.is_empty(), "{folder} has no modules");
         let circles = circular(&imports);
@@ -401,7 +401,7 @@ fn the_rules_see_what_they_rule() {
     // Tests that stand in files of their own are left out.
     assert!(root().join("crates/render/src/tests.rs").is_file());
     assert!(all.iter().all(|s| s.name != "crates/render/src/tests.rs"));
-    assert!(all.iter().any(|s| s.name == "figures/fig4/figure.rs"));
+    assert!(all.iter().any(|s| s.name == "papers/jeffrey-2013/code/fig4/figure.rs"));
     let manifest = "[dependencies]\ntwofold-num.workspace = true\nlibm \
         = \"1\"\n[dev-dependencies]\nclap = \"1\"\n";
     assert_eq!(dependencies(manifest), ["libm", "twofold-num"].map(str::to_owned).into());

@@ -1,4 +1,4 @@
-//! The study of figures/capture: docs/capture.md and docs/parameters.md say what its files say.
+//! Times of capture: docs/capture.md and docs/parameters.md say what the committed runs say.
 //! `TWOFOLD_UPDATE=1 cargo test --test it capture::` writes the texts anew.
 
 use std::fs;
@@ -16,7 +16,7 @@ use crate::census::{path, rows};
 use crate::examples::visits;
 
 pub fn table(name: &str) -> Table {
-    rows(&format!("figures/{name}.csv")).table()
+    rows(&format!("papers/jeffrey-2013/code/{name}.csv")).table()
 }
 
 /// Fig. 7(iii) by LSODA, from the census, and by the others.
@@ -41,7 +41,7 @@ fn methods() -> Vec<(Reading, Vec<ByMethod>)> {
 
 /// The committed visits.
 fn visited() -> Table {
-    let text = fs::read_to_string(path("figures/capture/visits.csv")).unwrap();
+    let text = fs::read_to_string(path("papers/jeffrey-2013/code/capture/visits.csv")).unwrap();
     let mut lines = text.lines();
     let mut table = Table::new("visits", lines.next().unwrap().split(',').map(Column::numbers));
     for line in lines {
@@ -133,7 +133,7 @@ fn the_findings_have_the_hazard_ratios_of_the_study() {
 /// Rows of sweeps under figures, computed anew: the same to the last bit.
 pub fn come_out_the_same(numbers: &[(&str, u64)]) {
     for (name, number) in numbers {
-        let rows: Rows = rows(&format!("figures/{name}.csv"));
+        let rows: Rows = rows(&format!("papers/jeffrey-2013/code/{name}.csv"));
         let row = rows.get(*number).unwrap();
         assert_eq!(rows.sweep().row(*number, &()).unwrap().line(), row.line(), "{name}");
     }
@@ -158,7 +158,7 @@ fn no_two_methods_share_a_start() {
         let mut names: Vec<String> = ["dopri5", "radau5", "taylor"]
             .map(|m| format!("capture/{m}-{}", reading.word()))
             .into();
-        names.retain(|name| path(&format!("figures/{name}.csv")).exists());
+        names.retain(|name| path(&format!("papers/jeffrey-2013/code/{name}.csv")).exists());
         let all: Vec<&str> =
             ["census/fig7"].into_iter().chain(names.iter().map(String::as_str)).collect();
         share_no_start(&all);

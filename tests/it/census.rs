@@ -43,7 +43,7 @@ pub fn rows(name: &str) -> Rows {
 fn the_sweeps_are_those_of_the_figures() {
     let all = figures::all();
     for (id, column) in [("fig7", "interval"), ("fig8", "sigma")] {
-        let rows = rows(&format!("figures/census/{id}.csv"));
+        let rows = rows(&format!("papers/jeffrey-2013/code/census/{id}.csv"));
         let figure = all.iter().find(|f| f.id == id).unwrap();
         let panels: Vec<_> = figure.pictures.iter().flat_map(|p| &p.panels).collect();
         let axes: Vec<String> =
@@ -121,7 +121,9 @@ fn asks_for_what_is_committed(target: &str, folders: &[&str]) {
     found.sort();
     let mut committed: Vec<String> = folders
         .iter()
-        .flat_map(|figure| fs::read_dir(root.join("figures").join(figure)).unwrap())
+        .flat_map(|figure| {
+            fs::read_dir(root.join("papers/jeffrey-2013/code").join(figure)).unwrap()
+        })
         .map(|entry| entry.unwrap().path().strip_prefix(root).unwrap().display().to_string())
         .filter(|name| name.ends_with(".csv") && !name.ends_with("visits.csv"))
         .collect();
@@ -134,10 +136,10 @@ fn asks_for_what_is_committed(target: &str, folders: &[&str]) {
 #[test]
 fn committed_rows_come_out_the_same() {
     for (name, wanted) in [
-        ("figures/census/fig7.csv", vec![0, 7]),
-        ("figures/census/fig8.csv", vec![1, 8]),
-        ("figures/basin/printed.csv", vec![0, 312, 320]),
-        ("figures/basin/reconstructed.csv", vec![5, 312]),
+        ("papers/jeffrey-2013/code/census/fig7.csv", vec![0, 7]),
+        ("papers/jeffrey-2013/code/census/fig8.csv", vec![1, 8]),
+        ("papers/jeffrey-2013/code/basin/printed.csv", vec![0, 312, 320]),
+        ("papers/jeffrey-2013/code/basin/reconstructed.csv", vec![5, 312]),
     ] {
         let rows = rows(name);
         for number in wanted {
@@ -150,7 +152,11 @@ fn committed_rows_come_out_the_same() {
 #[test]
 fn the_page_says_what_the_census_says() {
     let found = Reading::ALL.map(|reading| {
-        twofold::jeffrey_2013::census::found_in(reading, &on_disk("figures/census")).unwrap()
+        twofold::jeffrey_2013::census::found_in(
+            reading,
+            &on_disk("papers/jeffrey-2013/code/census"),
+        )
+        .unwrap()
     });
     let text = census::text(&found, figures::reference);
     let page = fs::read_to_string(path("docs/census.md")).unwrap();
@@ -158,7 +164,7 @@ fn the_page_says_what_the_census_says() {
     let (said, _) = rest.split_once(census::END).expect("its text about the census ends");
     assert!(
         said.trim() == text.trim(),
-        "docs/census.md does not say what figures/census says:\n{}\n\n{text}\n",
+        "docs/census.md does not say what code/census says:\n{}\n\n{text}\n",
         census::BEGIN
     );
 }
@@ -166,7 +172,11 @@ fn the_page_says_what_the_census_says() {
 #[test]
 fn the_book_says_what_other_limits_would_do() {
     let found = Reading::ALL.map(|reading| {
-        twofold::jeffrey_2013::census::found_in(reading, &on_disk("figures/census")).unwrap()
+        twofold::jeffrey_2013::census::found_in(
+            reading,
+            &on_disk("papers/jeffrey-2013/code/census"),
+        )
+        .unwrap()
     });
     let text = census::limits_text(&found);
     let book = fs::read_to_string(path("docs/census-sweeps.md")).unwrap();
@@ -176,7 +186,7 @@ fn the_book_says_what_other_limits_would_do() {
     let (said, _) = rest.split_once(census::LIMITS_END).expect("its text about the limits ends");
     assert!(
         said.trim() == text.trim(),
-        "docs/census-sweeps.md does not say what figures/census says:\n{}\n\n{text}\n",
+        "docs/census-sweeps.md does not say what code/census says:\n{}\n\n{text}\n",
         census::LIMITS_BEGIN
     );
 }
@@ -285,7 +295,7 @@ fn groups_of_two_differ_as_the_page_says() {
     let of = |name: &str, alpha: f64, interval: Option<f64>| {
         let mut chosen = vec![("params.alpha", Entry::Number(alpha))];
         chosen.extend(interval.map(|v| ("interval", Entry::Number(v))));
-        census::runs(&rows(&format!("figures/census/{name}.csv")).table(), &chosen)
+        census::runs(&rows(&format!("papers/jeffrey-2013/code/census/{name}.csv")).table(), &chosen)
     };
     let page = fs::read_to_string(path("docs/census.md")).unwrap();
     for (groups, said) in [

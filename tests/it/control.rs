@@ -1,6 +1,6 @@
 //! The control for what the paper puts down to the singularity: the runs of fig. 7 in the
 //! reconstructed reading once more, with the two-fold moved away from the orbits
-//! (figures/control/shifted.toml), and with a switch so wide, eps = 0.1, that nothing is singular.
+//! (control/shifted.toml), and with a switch so wide, eps = 0.1, that nothing is singular.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -41,11 +41,11 @@ fn with_singularity() -> Vec<CensusRun> {
         .collect()
 }
 
-const SHIFTED: &str = "figures/control/shifted.csv";
-const WIDE: &str = "figures/control/wide.csv";
+const SHIFTED: &str = "papers/jeffrey-2013/code/control/shifted.csv";
+const WIDE: &str = "papers/jeffrey-2013/code/control/wide.csv";
 
 fn shifted() -> System {
-    let text = fs::read_to_string(path("figures/control/shifted.toml")).unwrap();
+    let text = fs::read_to_string(path("papers/jeffrey-2013/code/control/shifted.toml")).unwrap();
     System::new(Definition::from_toml(&text, "shifted.toml").unwrap_or_else(|e| panic!("{e}")))
 }
 
@@ -102,7 +102,7 @@ fn what_remains_without_the_singularity() {
 /// the same today.
 #[test]
 fn the_controls_are_the_runs_of_fig_7_with_one_change() {
-    let census = rows("figures/census/fig7.csv");
+    let census = rows("papers/jeffrey-2013/code/census/fig7.csv");
     let paper = figures::named("fig7")
         .pictures
         .into_iter()

@@ -196,7 +196,7 @@ fn the_package_holds_what_it_embeds() {
         ("twofold-dynamics", ""),
         ("twofold-systems", "systems"),
         ("twofold-papers", "papers"),
-        ("twofold-jeffrey-2013", "figures"),
+        ("twofold-jeffrey-2013", "papers/jeffrey-2013/code"),
         ("twofold-paper", "crates/paper"),
         ("twofold-render", "crates/render"),
         ("twofold-verify", "crates/verify"),

@@ -53,7 +53,7 @@ fn questions_that_cannot_be_answered_are_refused() {
 
 #[test]
 fn smoothed_orbits_leave_inside_the_funnel() {
-    // The question of figures/convergence.
+    // The question of papers/jeffrey-2013/code/convergence.
     let question = AfterVisitQuestion {
         start: vec![0.2, 0.0, -1.0],
         t_end: 80.0,
@@ -93,8 +93,8 @@ fn smoothed_orbits_leave_inside_the_funnel() {
             let coarse = coarse.fold(f64::INFINITY, f64::min);
             assert!(r.distance <= coarse, "the search made it worse: {r:?} {coarse}");
         }
-        // The distance falls, but slowly and not steadily (figures/convergence): only the bound
-        // above and the end are certain.
+        // The distance falls, but slowly and not steadily (the figure `convergence`): only the
+        // bound above and the end are certain.
         let distance = |i: usize| found.rows[i].distance;
         assert!((0..4).all(|i| distance(4) < distance(i)), "nearest at the smallest eps");
         // The member that it follows depends on eps.

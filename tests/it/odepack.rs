@@ -1,6 +1,6 @@
 //! Our LSODA against ODEPACK's own Fortran, as SciPy carries it:
-//! figures/workprecision/odepack/reference.json, made once by scripts/odepack_reference.py. Radau5
-//! against the same reference solutions.
+//! papers/jeffrey-2013/code/workprecision/odepack/reference.json, made once by
+//! scripts/odepack_reference.py. Radau5 against the same reference solutions.
 //!
 //! Step control magnifies rounding: after some hundred steps two programs that differ in the last
 //! bits make different decisions. The file therefore also says what ODEPACK does from starts 1e-12
@@ -8,9 +8,9 @@
 //! own spread is the yardstick, and the 15 % of issue 3 hold.
 
 #[allow(dead_code)]
-#[path = "../../figures/workprecision/data.rs"]
+#[path = "../../papers/jeffrey-2013/code/workprecision/data.rs"]
 mod data;
-#[path = "../../figures/workprecision/problems.rs"]
+#[path = "../../papers/jeffrey-2013/code/workprecision/problems.rs"]
 mod problems;
 
 use data::{Reference, ReferenceProblem, ReferenceRun, reference};

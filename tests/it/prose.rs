@@ -10,8 +10,9 @@ fn root() -> &'static Path {
 }
 
 /// Folders with Rust sources.
-const RUST: [&str; 10] = [
-    "crates", "src", "figures", "tests", "proofs", "examples", "benches", "fuzz", "python", "tools",
+const RUST: [&str; 11] = [
+    "crates", "src", "figures", "papers", "tests", "proofs", "examples", "benches", "fuzz",
+    "python", "tools",
 ];
 
 /// Folders with Python sources.
@@ -19,18 +20,9 @@ const PYTHON: [&str; 4] = ["python", "scripts", "benches", "cluster"];
 
 /// Every Markdown file that people write, and its text without blocks that programs write.
 fn pages() -> Vec<(String, String)> {
-    const FOLDERS: [&str; 9] = [
-        "",
-        "docs",
-        "notes",
-        "proofs",
-        "python",
-        "benches",
-        "tests/cases",
-        "figures",
-        "crates/render/fonts",
-    ];
-    const MADE: [&str; 3] = ["benches/cost.md", "figures/CHANGES.md", "proofs/forgeries.md"];
+    const FOLDERS: [&str; 8] =
+        ["", "docs", "notes", "proofs", "python", "benches", "tests/cases", "crates/render/fonts"];
+    const MADE: [&str; 2] = ["benches/cost.md", "proofs/forgeries.md"];
     let in_folder = |folder: &&str| -> Vec<PathBuf> {
         fs::read_dir(root().join(folder)).unwrap().map(|e| e.unwrap().path()).collect()
     };

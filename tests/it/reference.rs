@@ -740,7 +740,7 @@ fn errors_of(places: &[(&str, &str)]) -> String {
 #[test]
 fn messages_are_as_the_note_says() {
     let mut block = String::new();
-    for file in ["src/cli", "figures/report"].iter().flat_map(|f| sources(f)) {
+    for file in ["src/cli", "papers/jeffrey-2013/code/report"].iter().flat_map(|f| sources(f)) {
         let said: Vec<String> = literals(&source(&file))
             .into_iter()
             .filter(|l| l.attribute.is_none())

@@ -1,4 +1,4 @@
-//! The census by methods that resolve the layer: docs/resolved.md says what figures/resolved says.
+//! The census by methods that resolve the layer: docs/resolved.md says what code/resolved says.
 //! `TWOFOLD_UPDATE=1 cargo test --test it resolved::` writes the texts anew.
 
 use twofold::jeffrey_2013::Reading;

@@ -16,7 +16,7 @@ use crate::paper::pipeline::{compute, questions};
 use crate::record::manifest::VERSION;
 use crate::record::{self, Manifest};
 
-/// Recompute figures and write them as the new reference: figures/figN/expected.json, its PNG, and
+/// Recompute figures and write them as the new reference: their hashes, their PNGs, and
 /// a line in CHANGES.md. Refused while any test other than the golden ones fails.
 #[derive(Debug, clap::Args)]
 #[command(
@@ -29,7 +29,7 @@ pub struct Arguments {
     /// Why the reference changes; kept in figures/CHANGES.md. Must be given.
     #[arg(long, value_name = "TEXT")]
     reason: String,
-    /// Folder that holds figN/expected.json.
+    /// A checkout's `figures`, or another folder, which gets figN/expected.json.
     #[arg(long, value_name = "DIR", default_value = "figures")]
     expected: PathBuf,
     /// Threads; 0 is one per core.

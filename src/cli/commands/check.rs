@@ -22,7 +22,7 @@ use crate::record::{self, Layer, Manifest, listed};
 pub struct Arguments {
     /// Figures to check, such as fig7 (any other word lists their names); all if none is named.
     figures: Vec<String>,
-    /// Reference to check against instead of figures/figN/expected.json: another manifest, or a
+    /// Reference to check against instead of the paper's: another manifest, or a
     /// folder with published pictures (PNG, named like ours). A picture holds by the first of these
     /// that does: same file, same pixels, few and slightly changed pixels, small RMS, high SSIM.
     #[arg(long, value_name = "DIR|MANIFEST")]

@@ -1,4 +1,4 @@
-//! Results of figures/capture, by its rules: times of capture by method, effect sizes of the
+//! Results of capture, by its rules: times of capture by method, effect sizes of the
 //! census, the map of the parameters by LSODA, and the likelihood of the published outcomes at each
 //! candidate for alpha and beta. Writes the tables of docs/capture.md and docs/parameters.md.
 
@@ -16,7 +16,7 @@ use twofold_num::random::RandomStream;
 
 /// Stands before each text in docs/capture.md and docs/parameters.md.
 pub const BEGIN: &str =
-    "<!-- capture: what figures/capture says; tests/it/capture.rs compares it; do not edit -->";
+    "<!-- capture: what code/capture says; tests/it/capture.rs compares it; do not edit -->";
 /// Stands after it.
 pub const END: &str = "<!-- end of capture -->";
 

@@ -9,7 +9,7 @@ use twofold::system::{
 
 /// An initial value problem with a name.
 pub struct Problem<const N: usize> {
-    /// Its name in figures/workprecision/odepack/reference.json.
+    /// Its name in workprecision/odepack/reference.json.
     pub name: &'static str,
     /// The equation, recorded: the same bits, and no method is compiled for it alone.
     pub field: BoundField<N>,

@@ -110,7 +110,7 @@ fn table(name: &str, text: &str) -> Result<Table, JobError> {
     let mut table = Table::new(name, columns.iter().map(column));
     for line in lines {
         let cells: Vec<&str> = line.split(',').collect();
-        let bad = || JobError::Other(format!("figures/delay/{name}.csv: `{line}` is no row"));
+        let bad = || JobError::Other(format!("delay/{name}.csv: `{line}` is no row"));
         if cells.len() != columns.len() {
             return Err(bad());
         }
@@ -134,7 +134,7 @@ fn table(name: &str, text: &str) -> Result<Table, JobError> {
 /// If they are not such as `make delay-data` writes.
 pub fn runs() -> Result<Vec<similarity::RuleRun>, JobError> {
     similarity::runs(DATA[3].1)
-        .ok_or_else(|| JobError::Other("figures/delay/runs.csv has other columns or rows".into()))
+        .ok_or_else(|| JobError::Other("delay/runs.csv has other columns or rows".into()))
 }
 
 /// A way, an index of [`WAYS`], in a reading of the parameters; the delayed rule and the hysteretic

@@ -203,9 +203,9 @@ mod tests {
     #[test]
     fn the_page_has_findings() {
         let blocks = of_the_project(concat!(
-            include_str!("../../docs/findings.md"),
+            include_str!("../../../../docs/findings.md"),
             "\n\n",
-            include_str!("../../docs/theorems.md")
+            include_str!("../../../../docs/theorems.md")
         ));
         assert!(blocks.len() >= 6, "{blocks:#?}");
         assert!(blocks.iter().any(|b| b.contains(
@@ -219,9 +219,9 @@ mod tests {
     #[test]
     fn the_page_has_the_tables_of_odds_and_of_the_misprint() {
         let page = concat!(
-            include_str!("../../docs/census.md"),
+            include_str!("../../../../docs/census.md"),
             "\n\n",
-            include_str!("../../docs/parameters.md")
+            include_str!("../../../../docs/parameters.md")
         );
         let blocks = of_the_odds(page);
         let tables: Vec<&String> = blocks.iter().filter(|b| b.contains("<table")).collect();

@@ -1,4 +1,4 @@
-//! Results of figures/resolved, by its rules: the outcomes of figs 7 and 8 that occur in runs which
+//! Results of resolved, by its rules: the outcomes of figs 7 and 8 that occur in runs which
 //! resolve the passage of the singularity, and those that occur only under LSODA. Writes the tables
 //! of docs/resolved.md.
 
@@ -16,7 +16,7 @@ use twofold_job::table::{Entry, Table};
 
 /// Stands before each text in docs/resolved.md.
 pub const BEGIN: &str =
-    "<!-- resolved: what figures/resolved says; tests/it/resolved.rs compares it; do not edit -->";
+    "<!-- resolved: what code/resolved says; tests/it/resolved.rs compares it; do not edit -->";
 /// Stands after it.
 pub const END: &str = "<!-- end of resolved -->";
 

@@ -1,4 +1,4 @@
-//! Error against work: ODEPACK's LSODA, as frozen in figures/workprecision/odepack, and this
+//! Error against work: ODEPACK's LSODA, as frozen in workprecision/odepack, and this
 //! crate's methods. Not a figure of the paper; it says how far the methods behind the other figures
 //! can be trusted where the answer is known.
 

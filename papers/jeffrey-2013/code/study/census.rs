@@ -628,7 +628,7 @@ impl Found {
 
 /// Stands before the text about the census in docs/census.md.
 pub const BEGIN: &str =
-    "<!-- census: what figures/census says; tests/it/census.rs compares it; do not edit -->";
+    "<!-- census: what code/census says; tests/it/census.rs compares it; do not edit -->";
 /// Stands after it.
 pub const END: &str = "<!-- end of census -->";
 
@@ -752,7 +752,7 @@ fn single_run(
 
 /// Stands before the text about other limits in docs/census-sweeps.md.
 pub const LIMITS_BEGIN: &str =
-    "<!-- limits: what figures/census says; tests/it/census.rs compares it; do not edit -->";
+    "<!-- limits: what code/census says; tests/it/census.rs compares it; do not edit -->";
 /// Stands after it.
 pub const LIMITS_END: &str = "<!-- end of limits -->";
 

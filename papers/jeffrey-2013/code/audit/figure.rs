@@ -1,5 +1,5 @@
 //! The parameter map: at which alpha and beta the paper's outcomes of figs 7, 8 and 9(i) are
-//! likely. Not a figure of the paper. Its data are committed beside it and in figures/capture, and
+//! likely. Not a figure of the paper. Its data are committed beside it and in capture, and
 //! made by `make census` and `make capture`.
 
 use std::sync::Arc;

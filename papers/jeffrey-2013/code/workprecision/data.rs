@@ -1,4 +1,4 @@
-//! Error against work for ODEPACK's LSODA (frozen, figures/workprecision/odepack) and for this
+//! Error against work for ODEPACK's LSODA (frozen, workprecision/odepack) and for this
 //! crate's methods (computed).
 
 use nalgebra::SVector;
@@ -12,7 +12,7 @@ use twofold::system::BoundField;
 
 use super::problems::{Problem, Visit, for_each};
 
-/// figures/workprecision/odepack/reference.json.
+/// workprecision/odepack/reference.json.
 #[derive(Debug, Deserialize)]
 pub struct Reference {
     /// One entry a problem.
