@@ -101,6 +101,8 @@ pub struct Orbit {
     pub extent: f64,
     /// Largest error of a multiplier.
     pub multiplier_error: f64,
+    /// Error of each multiplier.
+    pub errors: Vec<f64>,
     /// Events on the way (crossings of the switching surface, landings, departures), if the system
     /// is discontinuous.
     pub events: usize,
@@ -121,8 +123,9 @@ impl Orbit {
 
     /// The stability that the multipliers imply, within their error.
     pub fn stability(&self) -> Stability {
-        let (largest, error) = (self.largest_modulus(), self.multiplier_error);
-        let isolated = self.multipliers.iter().all(|m| distance(*m, [1.0, 0.0]) > error);
+        let (largest, error) = (self.largest_modulus(), self.largest_error());
+        let mut told = self.multipliers.iter().zip(&self.errors);
+        let isolated = told.all(|(m, error)| distance(*m, [1.0, 0.0]) > *error);
         if largest > 1.0 + error {
             Stability::Unstable
         } else if !isolated {
@@ -139,7 +142,12 @@ impl Orbit {
     /// multiplier is not told from zero.
     pub fn rate(&self) -> Option<f64> {
         let largest = self.largest_modulus();
-        (largest > self.multiplier_error).then(|| -ln(largest) / self.period)
+        (largest > self.largest_error()).then(|| -ln(largest) / self.period)
+    }
+
+    /// The error of the largest multiplier.
+    fn largest_error(&self) -> f64 {
+        self.errors.first().copied().unwrap_or(0.0)
     }
 }
 
@@ -315,8 +323,8 @@ fn orbit(
     // The start is the orbit's first passage; the last return is the start again.
     let returns = r.same.len().saturating_sub(1);
     let same = std::iter::once(u.clone()).chain(r.same.into_iter().take(returns)).collect();
-    let (multiplier_error, fills) =
-        multiplier_error(map, &u, p, &multipliers, residual / r.extent, r.derivative_error);
+    let (errors, fills) =
+        multiplier_errors(map, &u, p, &multipliers, residual / r.extent, r.derivative_error);
     Ok(Orbit {
         parameter: p,
         point: u,
@@ -325,7 +333,8 @@ fn orbit(
         residual,
         iterations,
         extent: r.extent,
-        multiplier_error,
+        multiplier_error: errors.iter().copied().fold(0.0, f64::max),
+        errors,
         events: r.events,
         fills,
         same,
@@ -333,29 +342,29 @@ fn orbit(
     })
 }
 
-/// The error of multipliers: by how much those of a less accurate map differ, and by how much they
+/// The errors of multipliers: by how much those of a less accurate map differ, and by how much they
 /// change over the distance by which the orbit's point is off (the residual over the distance of
 /// the nearest multiplier from 1), ten times as fast as they change over the orbit. Where a
 /// multiplier is 1 within the first part, the points beside are as good: this is said, too.
-fn multiplier_error(
+fn multiplier_errors(
     map: &dyn ReturnMap,
     u: &[f64],
     p: f64,
     multipliers: &[[f64; 2]],
     residual: f64,
     least: f64,
-) -> (f64, bool) {
-    let Ok(rough) = map.roughly(u, p) else { return (f64::INFINITY, false) };
+) -> (Vec<f64>, bool) {
+    let Ok(rough) = map.roughly(u, p) else {
+        return (vec![f64::INFINITY; multipliers.len()], false);
+    };
     let rough = multipliers_of(&rough.derivative, map.states(), map.axis());
-    let differences = multipliers
-        .iter()
-        .zip(&rough)
-        .map(|(a, b)| distance(*a, *b))
-        .fold(ROUNDING + least, f64::max);
-    let from_one = multipliers.iter().map(|m| distance(*m, [1.0, 0.0])).fold(1.0, f64::min);
-    let fills = from_one <= differences;
+    let differences = multipliers.iter().zip(&rough).map(|(a, b)| distance(*a, *b));
+    let errors: Vec<f64> = differences.map(|d| d.max(ROUNDING + least)).collect();
+    let off = multipliers.iter().map(|m| distance(*m, [1.0, 0.0]));
+    let fills = off.clone().zip(&errors).any(|(off, error)| off <= *error);
+    let from_one = off.fold(1.0, f64::min);
     let misplaced = if fills { 0.0 } else { (10.0 * residual / from_one).min(1.0) };
-    (differences + misplaced, fills)
+    (errors.iter().map(|error| error + misplaced).collect(), fills)
 }
 
 fn less_identity(derivative: &[f64], n: usize) -> Vec<f64> {
@@ -497,6 +506,8 @@ const JUMP: f64 = 0.75;
 const REACH: f64 = 0.4;
 /// An orbit of this share of the branch's largest extent has shrunk to a point.
 const GONE: f64 = 1e-4;
+/// The step of the derivative in the parameter, as a share of its range.
+const DELTA: f64 = 1e-6;
 /// A small loop that may be off by more than this share of itself is not told from the rest within.
 const TOLD: f64 = 0.03;
 
@@ -613,6 +624,10 @@ pub fn follow(
             {
                 Err("too long a step".into())
             }
+            // So near to a border that a less accurate return has other events.
+            Ok(next) if points && 2.0 * next.largest_error() > next.largest_modulus().max(1.0) => {
+                Err("the multipliers are not known: events are about to change".into())
+            }
             Ok(next)
                 if !beyond
                     && (next.iterations > MANY
@@ -629,11 +644,25 @@ pub fn follow(
             Err(trouble) => {
                 step *= 0.5;
                 if step < shortest {
-                    if trouble.obstacle == Obstacle::Grazing
+                    let border = (points && trouble.obstacle == Obstacle::Other)
+                        .then(|| border(map, &branch.orbits, (&du, dp), &scales, shortest))
+                        .flatten();
+                    let beside = border.as_ref().map_or(&last.point, |border| &border.point);
+                    if (border.is_some() || trouble.obstacle == Obstacle::Grazing)
                         && let Some((next, hop)) =
-                            behind_grazing(map, last, (&du, dp), &scales, options)
+                            behind_grazing(map, last, beside, (&du, dp), &scales, options)
                     {
-                        note(map, &mut branch, &mut told, &next, &scales, options.newton);
+                        if let Some(Border { change, .. }) = border {
+                            // It goes on from the border, to one of its sides, along the parameter.
+                            let side = (next.parameter - change.parameter).signum();
+                            direction = Some((vec![0.0; n], side));
+                            let change =
+                                Bifurcation { change: Change::DiscontinuityInduced, ..change };
+                            branch.bifurcations.push(change);
+                            told = next.clone();
+                        } else {
+                            note(map, &mut branch, &mut told, &next, &scales, options.newton);
+                        }
                         let stop = !go_on(&next);
                         branch.orbits.push(next);
                         step = hop;
@@ -644,6 +673,11 @@ pub fn follow(
                         continue;
                     }
                     let missed = 4.0 * step * scales.parameter;
+                    if let Some(border) = border {
+                        branch.bifurcations.push(border.change);
+                        branch.end = End::Lost(border.said.into());
+                        return branch;
+                    }
                     finish(map, &mut branch, trouble, missed, &scales);
                     return branch;
                 }
@@ -737,10 +771,12 @@ const HOP: f64 = 64.0;
 
 /// The branch's next orbit, with the step to it, where the last lies so near to a grazing that its
 /// return map has no derivative: one with other events, behind the grazing, that is not farther
-/// from the guess than the step is long. None if there the branch ends.
+/// from the guess than the step is long. None if there the branch ends. Behind the grazing of a map
+/// they stay near its border, so that Newton's method begins `beside` it.
 fn behind_grazing(
     map: &dyn ReturnMap,
     last: &Orbit,
+    beside: &[f64],
     (du, dp): (&[f64], f64),
     scales: &Scales,
     options: &BranchOptions,
@@ -752,18 +788,95 @@ fn behind_grazing(
         let guess: Vec<f64> =
             last.point.iter().zip(du).map(|(u, d)| u + hop * scales.state * d).collect();
         let p = last.parameter + hop * scales.parameter * dp;
-        let inside = (p - options.from) * (options.to - p) >= 0.0;
-        let Ok(next) = arclength(map, &guess, p, (du, dp), scales, options.newton) else {
+        if (p - options.from) * (options.to - p) < 0.0 {
             continue;
+        }
+        let other = |next: &Orbit| {
+            let off = (next.parameter - p) / scales.parameter;
+            let apart = apart(&next.point, &guess, scales.state);
+            next.events != last.events && sqrt(apart * apart + off * off) <= hop
         };
-        let apart: f64 =
-            next.point.iter().zip(&guess).map(|(a, b)| (a - b) / scales.state).map(|d| d * d).sum();
-        let off = (next.parameter - p) / scales.parameter;
-        if inside && next.events != last.events && sqrt(apart + off * off) <= hop {
+        let stays = || closed_orbit(map, beside, p, options.newton).ok().filter(other);
+        let along = arclength(map, &guess, p, (du, dp), scales, options.newton);
+        if let Some(next) = along.ok().filter(other).or_else(stays) {
             return Some((next, hop));
         }
     }
     None
+}
+
+/// The derivative of a return map grows by a factor of two where the distance to a grazing falls to
+/// a quarter (Nordmark 1991), and hardly where events merely change their order.
+const GROWS: f64 = 1.5;
+
+/// A multiplier beyond this, with a border in reach, grows towards a grazing.
+const STEEP: f64 = 100.0;
+
+/// A border beyond which the return of a map has other events.
+struct Border {
+    change: Bifurcation,
+    /// A reason to end there.
+    said: &'static str,
+    /// A point just beyond it.
+    point: Vec<f64>,
+}
+
+/// The border to which a branch comes: a grazing, if the derivative grows without bound towards it.
+fn border(
+    map: &dyn ReturnMap,
+    orbits: &[Orbit],
+    (du, dp): (&[f64], f64),
+    scales: &Scales,
+    shortest: f64,
+) -> Option<Border> {
+    let last = &orbits[orbits.len() - 1];
+    let point = |way: f64| -> Vec<f64> {
+        last.point.iter().zip(du).map(|(u, d)| u + way * scales.state * d).collect()
+    };
+    let returned = |way: f64| {
+        map.returned(&point(way), last.parameter + way * scales.parameter * dp, true).ok()
+    };
+    let others = |way: f64| returned(way).is_some_and(|r| r.events != last.events);
+    let hops = std::iter::successors(Some(2.0 * shortest), |s| Some(2.0 * s));
+    let reach = HOP * shortest.max(DELTA);
+    let hop = hops.take_while(|hop| *hop <= reach).find(|hop| others(*hop))?;
+    let (mut near, mut far) = (0.0, hop);
+    for _ in 0..40 {
+        let middle = 0.5 * (near + far);
+        if others(middle) {
+            far = middle;
+        } else {
+            near = middle;
+        }
+    }
+    let size = |way: f64| returned(way).map(|r| largest(&r.derivative));
+    let grows = |side: f64| {
+        let (close, off) = (size(far + side * hop), size(far + 4.0 * side * hop));
+        close.zip(off).is_some_and(|(close, off)| close > GROWS * off)
+    };
+    let grazes = "the orbit comes to graze a surface, where its return has no derivative";
+    // Where the orbits themselves come to graze the largest multiplier is inverse to the way.
+    let before = orbits.iter().rev().find(|o| GROWS * o.largest_modulus() < last.largest_modulus());
+    if let Some(before) = before.filter(|_| last.largest_modulus() > STEEP) {
+        let (m, n) = (before.largest_modulus(), last.largest_modulus());
+        let way = (last.parameter - before.parameter) * m / (n - m);
+        let relative = last.largest_error() / n + before.largest_error() / m;
+        let uncertainty = way.abs() * (relative + 1.0 / n) * n / (n - m);
+        let parameter = last.parameter + way;
+        let change = Bifurcation { change: Change::Grazing, parameter, uncertainty };
+        return Some(Border { change, said: grazes, point: point(far) });
+    }
+    let (change, said) = if grows(1.0) || grows(-1.0) {
+        (Change::Grazing, grazes)
+    } else {
+        (
+            Change::DiscontinuityInduced,
+            "the orbit comes to where its events change, and none that has the others is beyond",
+        )
+    };
+    let parameter = last.parameter + far * scales.parameter * dp;
+    let change = Bifurcation { change, parameter, uncertainty: hop * scales.parameter };
+    Some(Border { change, said, point: point(far) })
 }
 
 /// Ends a branch where it cannot be followed.
@@ -941,7 +1054,7 @@ fn arclength(
         before = residual;
         // The derivative in the parameter by differences; its error only slows Newton's method
         // down.
-        let delta = 1e-6 * scales.parameter;
+        let delta = DELTA * scales.parameter;
         let (up, down) = (map.returned(&u, q + delta, false)?, map.returned(&u, q - delta, false)?);
         let size = n + 1;
         let mut matrix = vec![0.0; size * size];
@@ -1119,6 +1232,7 @@ mod tests {
             iterations: 0,
             extent: 1.0,
             multiplier_error: 0.0,
+            errors: vec![0.0; multipliers.len()],
             events: 0,
             fills: false,
             same: Vec::new(),
@@ -1136,7 +1250,7 @@ mod tests {
         // Neighbours that arrive in finite time have none.
         assert_eq!((rate(&[[0.0; 2]; 2]), rate(&[])), (None, None));
         // Nor is one known of a multiplier that may be zero.
-        let within = |error| Orbit { multiplier_error: error, ..with(0.0, &[[1e-9, 0.0]]) }.rate();
+        let within = |error| Orbit { errors: vec![error], ..with(0.0, &[[1e-9, 0.0]]) }.rate();
         assert!(within(1e-8).is_none() && within(1e-10).is_some());
         assert_eq!(with(0.0, &[[0.6, 0.7]]).stability(), Stability::Stable);
         assert_eq!(with(0.0, &[[0.6, -0.9]]).stability(), Stability::Unstable);
@@ -1501,6 +1615,75 @@ mod tests {
                 let wanted = if goes_on { Change::DiscontinuityInduced } else { Change::Grazing };
                 assert_eq!((kind, reached), (wanted, goes_on), "{from} to {to}");
             }
+        }
+    }
+
+    /// A map of points whose return has a root beyond u = 1 (Nordmark 1991): on the near side the
+    /// fixed point is p, on the other one 1 + s^2 with (1 - sign s)^2 = p.
+    struct Root {
+        sign: f64,
+    }
+    impl ReturnMap for Root {
+        fn states(&self) -> usize {
+            2
+        }
+        fn axis(&self) -> usize {
+            1
+        }
+        fn has_points(&self) -> bool {
+            true
+        }
+        fn returned(&self, u: &[f64], p: f64, _: bool) -> Result<Returned, Trouble> {
+            let near = u[0] <= 1.0;
+            let (point, slope) = if near {
+                (0.5 * u[0] + 0.5 * p, 0.5)
+            } else {
+                let root = (u[0] - 1.0).sqrt();
+                (0.5 * u[0] + 0.5 * p + self.sign * root, 0.5 + self.sign * 0.5 / root)
+            };
+            let extent = u[0].abs().max(1.0);
+            let returned = once(vec![point, 0.0], vec![slope, 0.0, 0.0, 0.0]);
+            Ok(Returned { events: usize::from(!near), extent, sizes: vec![extent; 2], ..returned })
+        }
+    }
+
+    fn root_branch(sign: f64, start: f64, from: f64, to: f64) -> Branch {
+        let (longest, most, size) = (0.05, 400, 1.0);
+        let options = BranchOptions { from, to, longest, most, size, newton: NEWTON };
+        let first = closed_orbit(&Root { sign }, &[start, 0.0], from, NEWTON).unwrap();
+        follow(&Root { sign }, first, &options, &mut |_| true)
+    }
+
+    /// Orbits on both sides: the other one is unstable until s = 1/3.
+    #[test]
+    fn a_branch_of_points_goes_through_a_grazing() {
+        for (start, from, to) in [(0.5, 0.5, 4.0), (2.0, 4.0, 0.5)] {
+            let mut branch = root_branch(-1.0, start, from, to);
+            assert_eq!(branch.end, End::Reached);
+            branch.bifurcations.sort_by(|a, b| a.parameter.total_cmp(&b.parameter));
+            let [grazing, doubling] = &branch.bifurcations[..] else {
+                panic!("{:?}", branch.bifurcations)
+            };
+            assert_eq!(grazing.change, Change::DiscontinuityInduced);
+            assert!((grazing.parameter - 1.0).abs() <= grazing.uncertainty, "{grazing:?}");
+            assert_eq!(doubling.change, Change::PeriodDoubling);
+            let off = (doubling.parameter - 16.0 / 9.0).abs();
+            assert!(off <= doubling.uncertainty, "{doubling:?}");
+        }
+    }
+
+    /// Both orbits on one side: the branch ends there, or turns back to the other one.
+    #[test]
+    fn a_branch_of_points_turns_back_at_a_grazing_or_ends_there() {
+        for (start, from) in [(0.5, 0.5), (1.25, 0.25)] {
+            let branch = root_branch(1.0, start, from, 2.0);
+            let grazes = matches!(&branch.end, End::Lost(why) if why.contains("graze"));
+            assert!(grazes || branch.end == End::TurnedBack, "{:?}", branch.end);
+            let [change] = &branch.bifurcations[..] else { panic!("{:?}", branch.bifurcations) };
+            let known = if grazes { Change::Grazing } else { Change::DiscontinuityInduced };
+            assert_eq!(change.change, known);
+            assert!((change.parameter - 1.0).abs() <= change.uncertainty, "{change:?}");
+            assert!(change.uncertainty < 1e-3, "{change:?}");
         }
     }
 

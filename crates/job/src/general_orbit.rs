@@ -608,6 +608,26 @@ mod tests {
 
     /// Two equal blocks have two equal multipliers, exp(2 pi m): one point, m = 0. So has a pair of
     /// them, - exp(2 pi m), that turns by half.
+    /// A wall at 0.5 that the orbit of x'' + 0.2 x' + x = p cos 2t comes to touch where its amplitude
+    /// p/sqrt(9.16) is 0.5. Beyond no orbit is found from below; from above, where the largest
+    /// multiplier grows like one over the way, the branch goes on to those without impacts.
+    #[test]
+    fn an_orbit_that_comes_to_graze_a_wall_is_told() {
+        let touches = 0.5 * 9.16_f64.sqrt();
+        for (from, to, kind) in [(1.51, 1.52, "grazing"), (1.52, 1.51, "discontinuity-induced")] {
+            let text = format!(
+                "states = ['x', 'v']\nstart = [0.1, 0]\nf = ['v', 'p*cos(2*t) - 0.2*v - \
+                    x']\n[parameters]\np = {from}\n[[event]]\nwhen = 'x - 0.5'\ndirection = \
+                    'up'\nset = {{ v = '-0.8*v' }}"
+            );
+            let answer = branch(&text, std::f64::consts::PI, 100.0, along("p", from, to));
+            let found = changes_of(&answer, "p");
+            let (last, at, within) = found.last().unwrap();
+            assert_eq!(last, kind, "{found:?}");
+            assert!((at - touches).abs() <= *within && *within < 1e-6, "{found:?}");
+        }
+    }
+
     #[test]
     fn equal_multipliers_pass_once() {
         let text = "states = ['x', 'y', 'z']\nstart = [0.1, 0.1, 0]\n\

@@ -21,14 +21,22 @@ fn modulus(m: [f64; 2]) -> f64 {
 /// Number of multipliers that are on the unit circle within their error, as those of conserved
 /// quantities are.
 pub(super) fn on_circle(o: &Orbit) -> usize {
-    o.multipliers.iter().filter(|m| (modulus(**m) - 1.0).abs() <= o.multiplier_error).count()
+    told(o).into_iter().filter(|(m, error)| (modulus(*m) - 1.0).abs() <= *error).count()
 }
 
-/// The multipliers, by falling modulus, without the `neutral` ones that are nearest to the circle.
-fn without(o: &Orbit, neutral: usize) -> Vec<[f64; 2]> {
-    let mut left = o.multipliers.clone();
+/// A multiplier and its error.
+type Told = ([f64; 2], f64);
+
+/// The multipliers, by falling modulus, with their errors.
+fn told(o: &Orbit) -> Vec<Told> {
+    o.multipliers.iter().copied().zip(o.errors.iter().copied()).collect()
+}
+
+/// Those without the `neutral` ones that are nearest to the circle.
+fn without(o: &Orbit, neutral: usize) -> Vec<Told> {
+    let mut left = told(o);
     for _ in 0..neutral.min(left.len()) {
-        let off = |m: &[f64; 2]| (modulus(*m) - 1.0).abs();
+        let off = |m: &Told| (modulus(m.0) - 1.0).abs();
         let nearest = (0..left.len()).min_by(|i, j| off(&left[*i]).total_cmp(&off(&left[*j])));
         nearest.map(|i| left.remove(i));
     }
@@ -37,19 +45,19 @@ fn without(o: &Orbit, neutral: usize) -> Vec<[f64; 2]> {
 
 /// Whether as many multipliers are surely outside of the circle.
 pub(super) fn alike(a: &Orbit, b: &Orbit) -> bool {
-    outside(&a.multipliers, a.multiplier_error) == outside(&b.multipliers, b.multiplier_error)
+    outside(&told(a)) == outside(&told(b))
 }
 
-/// Number of multipliers beyond the circle and their error.
-fn outside(multipliers: &[[f64; 2]], error: f64) -> usize {
-    multipliers.iter().filter(|m| modulus(**m) > 1.0 + error).count()
+/// Number of multipliers beyond the circle and their errors.
+fn outside(multipliers: &[Told]) -> usize {
+    multipliers.iter().filter(|(m, error)| modulus(*m) > 1.0 + error).count()
 }
 
 /// Whether some of `before` leave the circle and as many enter it, if each goes to the nearest one
 /// of `after`.
-fn exchanges(before: &[[f64; 2]], after: &[[f64; 2]]) -> bool {
-    let mut left = after.to_vec();
-    before.iter().any(|m| {
+fn exchanges(before: &[Told], after: &[Told]) -> bool {
+    let mut left: Vec<[f64; 2]> = after.iter().map(|told| told.0).collect();
+    before.iter().any(|(m, _)| {
         let near = (0..left.len())
             .min_by(|i, j| distance(left[*i], *m).total_cmp(&distance(left[*j], *m)));
         near.is_some_and(|i| (modulus(left.remove(i)) > 1.0) != (modulus(*m) > 1.0))
@@ -104,7 +112,7 @@ fn passages(
     halvings: usize,
 ) -> Vec<Bifurcation> {
     let (before, after) = (without(a, neutral), without(b, neutral));
-    let (fewer, more) = (outside(&before, a.multiplier_error), outside(&after, b.multiplier_error));
+    let (fewer, more) = (outside(&before), outside(&after));
     let (fewer, more) = (fewer.min(more), fewer.max(more));
     if fewer == more {
         if halvings == 0 || !exchanges(&before, &after) {
@@ -122,25 +130,25 @@ fn passages(
         if std::mem::take(&mut pair) {
             continue;
         }
-        let kth = |o: &Orbit| without(o, neutral).get(k).copied().unwrap_or([f64::NAN; 2]);
+        let kth = |o: &Orbit| without(o, neutral).get(k).copied().unwrap_or(([f64::NAN; 2], 0.0));
         let single = neutral == 0 && more == fewer + 1;
         let real = |o: &Orbit| {
-            let m = kth(o);
+            let (m, _) = kth(o);
             (m[1] == 0.0).then_some(if m[0] < 0.0 { -1.0 } else { 1.0 })
         };
         // Of one that passes alone the product is smooth where the others meet.
         let side = real(a).filter(|side| single && real(b) == Some(*side));
         // One that leaves the circle of conserved quantities is beyond its error first.
-        let on_it = [a, b].iter().any(|o| (modulus(kth(o)) - 1.0).abs() <= o.multiplier_error);
-        let beyond = if on_it { 2.0 * a.multiplier_error.max(b.multiplier_error) } else { 0.0 };
+        let on_it = [a, b].map(kth).iter().any(|(m, error)| (modulus(*m) - 1.0).abs() <= *error);
+        let beyond = if on_it { 2.0 * kth(a).1.max(kth(b).1) } else { 0.0 };
         let test: &dyn Fn(&Orbit) -> (f64, f64) = &|o| match side {
             Some(side) if !on_it => (product(o, side), sensitivity(o)),
-            _ => (modulus(kth(o)) - 1.0 - beyond, o.multiplier_error + beyond),
+            _ => (modulus(kth(o).0) - 1.0 - beyond, kth(o).1 + beyond),
         };
         let at = locate(map, a, b, scales, newton, test);
-        let near = at.as_ref().map_or(if modulus(kth(a)) > 1.0 { a } else { b }, |at| &at.orbit);
-        let m = kth(near);
-        let imaginary = DOUBLE.max(sqrt(near.multiplier_error));
+        let near = at.as_ref().map_or(if modulus(kth(a).0) > 1.0 { a } else { b }, |at| &at.orbit);
+        let (m, error) = kth(near);
+        let imaginary = DOUBLE.max(sqrt(error));
         let change = if m[1].abs() > imaginary {
             pair = true;
             Change::Torus
@@ -172,7 +180,7 @@ pub(super) fn turning(
 ) -> Option<Bifurcation> {
     let turns = (middle.parameter - a.parameter) * (b.parameter - middle.parameter) < 0.0;
     let neutral = on_circle(a).min(on_circle(b));
-    let beyond = |o: &Orbit| outside(&without(o, neutral), o.multiplier_error);
+    let beyond = |o: &Orbit| outside(&without(o, neutral));
     let same = beyond(a) == beyond(b);
     if !turns || !same || a.events != middle.events || middle.events != b.events {
         return None;
@@ -198,7 +206,7 @@ pub(super) fn turning(
     }
     let share = 0.5 * (low + high);
     let near = at(share - BESIDE)?;
-    let from_one = |m: &[f64; 2]| distance(*m, [1.0, 0.0]);
+    let from_one = |(m, _): &Told| distance(*m, [1.0, 0.0]);
     without(&near, neutral).iter().map(from_one).find(|off| *off <= AT_ONE)?;
     // The parameter is even in the distance, to rounding: Richardson's extrapolation to none.
     let [one, two, four] = [1.0, 2.0, 4.0].map(|times| beside(share, times * BESIDE));
