@@ -11,6 +11,7 @@
 use twofold_num::Dual;
 use twofold_num::elementary::sqrt;
 use twofold_num::linear::{balance, eigenvalues, solve_any};
+use twofold_system::Expression;
 
 use crate::definition::{Direction, Event, When};
 use crate::equation::{Configuration, Equation, EquationError};
@@ -67,6 +68,8 @@ pub struct Rest {
     /// An event behind whose surface it lies: motion that comes from the other side is changed
     /// before. Only a start behind it comes to the rest.
     pub behind: Option<String>,
+    /// An event of the clock (`every`) that moves it: the field vanishes there, but nothing stays.
+    pub moved: Option<String>,
 }
 
 impl Rest {
@@ -75,6 +78,9 @@ impl Rest {
     /// away, "pseudo-saddle" (Kuznetsov, Rinaldi & Gragnani 2003). Of a curve of rests
     /// what they are all along it, of a larger set what this one is.
     pub fn kind(&self) -> String {
+        if let Some(event) = &self.moved {
+            return format!("no rest of the whole motion: {event} moves it again and again");
+        }
         if self.family.as_ref().is_some_and(|f| f.changes) {
             return "stability changes along the curve".into();
         }
@@ -732,6 +738,19 @@ impl Search<'_> {
         here.find(|e| passed(&e.when)).map(|e| e.name.clone())
     }
 
+    /// The first event of the clock in a mode that changes a state, or the mode.
+    fn clock_moves(&self, mode: usize, x: &[f64]) -> Option<String> {
+        let moves = |e: &&Event| {
+            let sets = |(i, to): &(usize, Expression)| {
+                (self.equation.value(to, 0.0, x) - x[*i]).abs() > 1e-9 * self.widths[*i]
+            };
+            matches!(e.when, When::Every(_))
+                && e.from.is_none_or(|from| from == mode)
+                && (e.mode.is_some_and(|to| to != mode) || e.set.iter().any(sets))
+        };
+        self.equation.definition.events().iter().find(moves).map(|e| e.name.clone())
+    }
+
     /// An isolated rest, with the linearised motion along its surfaces.
     fn rest(&self, config: &Configuration, on: &[Surface], zero: Zero) -> Option<Rest> {
         let (n, k) = (self.n, on.len());
@@ -788,6 +807,7 @@ impl Search<'_> {
         let on = on.map(|(s, w)| On { surface: self.name(s), weight: *w }).collect();
         let attracting = if k > 0 && !tangent { attracts(&normal, k) } else { None };
         let behind = self.behind(config.mode, &x);
+        let moved = self.clock_moves(config.mode, &x);
         Some(Rest {
             x,
             mode: config.mode,
@@ -799,6 +819,7 @@ impl Search<'_> {
             blur,
             boundary,
             behind,
+            moved,
         })
     }
 

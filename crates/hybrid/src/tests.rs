@@ -826,6 +826,19 @@ fn rests_are_found_with_their_stability() {
     near(found[0].on[0].weight, 0.5, 1e-12);
     // A fused focus: both fields are tangent to x = 0 where they cancel.
     let fused = model("states = ['x', 'y']\nf = ['y', '-x - 0.2*sign(x)']");
+    // What the clock moves again and again does not rest; what it does once, or leaves, does.
+    for (event, kind) in [
+        (
+            "every = 1\nset = { x = 'x + 1' }",
+            "no rest of the whole motion: kick moves it again and again",
+        ),
+        ("every = 1\nset = { x = '0.5*x' }", "stable node"),
+        ("at = 1\nset = { x = 'x + 1' }", "stable node"),
+    ] {
+        let text = format!("states = ['x']\nf = ['-x']\n[[event]]\nname = 'kick'\n{event}");
+        let found = rests(&model(&text), &[(-3.0, 3.0)]).unwrap();
+        assert_eq!(found[0].kind(), kind);
+    }
     let found = rests(&fused, &[(-3.0, 3.0); 2]).unwrap();
     assert_eq!(found.len(), 1, "{found:?}");
     assert!(found[0].tangent && found[0].eigenvalues.is_empty(), "{found:?}");
