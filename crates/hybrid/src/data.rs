@@ -7,13 +7,17 @@ pub use crate::definition::BadTable;
 use crate::definition::{Interpolation, TableEntry};
 
 /// A table's values between its rows: on each piece a cubic in the time since the piece's
-/// beginning.
+/// beginning, or, where it comes to rest at its end, in that to its end.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Table {
     /// The times of the rows, increasing.
     pub knots: Vec<f64>,
     /// Coefficients of the cubic that begins at each knot but the last, lowest first.
     pub pieces: Vec<[f64; 4]>,
+    /// Pieces whose cubic is one in the time to their end, which is negative: where a value is
+    /// reached without a speed, as a zero that is only touched, rounding must not go beyond it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub from_end: Vec<usize>,
 }
 
 impl Table {
@@ -88,10 +92,16 @@ impl Table {
         let h: Vec<f64> = knots.windows(2).map(|w| w[1] - w[0]).collect();
         let slope: Vec<f64> =
             h.iter().zip(values.windows(2)).map(|(h, v)| (v[1] - v[0]) / h).collect();
-        let hermite = |d: &[f64]| -> Vec<[f64; 4]> {
+        let mut from_end = Vec::new();
+        let mut hermite = |d: &[f64]| -> Vec<[f64; 4]> {
             let piece = |i: usize| {
                 let (a, b, m) = (d[i], d[i + 1], slope[i]);
-                [values[i], a, (3.0 * m - 2.0 * a - b) / h[i], (a + b - 2.0 * m) / (h[i] * h[i])]
+                let third = (a + b - 2.0 * m) / (h[i] * h[i]);
+                if b == 0.0 && (a != 0.0 || values[i + 1] == 0.0) {
+                    from_end.push(i);
+                    return [values[i + 1], 0.0, (a - 3.0 * m) / h[i], third];
+                }
+                [values[i], a, (3.0 * m - 2.0 * a - b) / h[i], third]
             };
             (0..h.len()).map(piece).collect()
         };
@@ -103,7 +113,7 @@ impl Table {
             Interpolation::Pchip => hermite(&monotone_slopes(&h, &slope)),
             Interpolation::Cubic => hermite(&spline_slopes(&h, &slope)),
         };
-        Ok(Self { knots, pieces })
+        Ok(Self { knots, pieces, from_end })
     }
 
     /// The first and the last time.
@@ -116,9 +126,14 @@ impl Table {
         self.knots.partition_point(|k| *k <= t).saturating_sub(1).min(self.pieces.len() - 1)
     }
 
+    /// The time from which a piece's cubic counts.
+    pub fn origin(&self, piece: usize) -> f64 {
+        self.knots[piece + usize::from(self.from_end.binary_search(&piece).is_ok())]
+    }
+
     /// The value at `t` on a piece.
     pub fn value<S: Arithmetic>(&self, piece: usize, t: S) -> S {
-        let s = t - S::from_f64(self.knots[piece]);
+        let s = t - S::from_f64(self.origin(piece));
         let [a, b, c, d] = self.pieces[piece].map(S::from_f64);
         a + s * (b + s * (c + s * d))
     }
@@ -226,6 +241,20 @@ mod tests {
         (2.8, 0.44358153846153847, 0.5),
         (4.1, 1.9050215384615379, 1.6540374999999994),
     ];
+
+    /// A zero that is touched, and a value that is reached without a speed, are not passed by
+    /// rounding.
+    #[test]
+    fn rounding_goes_beyond_no_extremum() {
+        for (values, low) in [([1.3, 0.7, 0.0, 0.9, 2.1], 0.0), ([1.3, 0.7, 0.4, 0.9, 2.1], 0.4)] {
+            let knots = vec![0.0, 0.913, 1.571, 2.03, 3.3];
+            let table = Table::new(knots.clone(), &values, Interpolation::Pchip).unwrap();
+            for k in 0..2000 {
+                let t = knots[2] + (k - 1000) as f64 * 1e-11;
+                assert!(table.value(table.piece(t), t) >= low, "{t}");
+            }
+        }
+    }
 
     /// A cubic is its own spline.
     #[test]

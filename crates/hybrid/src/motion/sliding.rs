@@ -30,7 +30,7 @@ impl Follower<'_> {
         v[n + 1..n + 1 + config.sides.len()].copy_from_slice(&config.sides);
         for (i, (table, piece)) in self.equation.tables.iter().zip(&config.pieces).enumerate() {
             let first = n + 1 + config.sides.len() + 5 * i;
-            v[first] = table.knots[*piece];
+            v[first] = table.origin(*piece);
             v[first + 1..first + 5].copy_from_slice(&table.pieces[*piece]);
         }
         v
