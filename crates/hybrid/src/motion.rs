@@ -1014,6 +1014,7 @@ impl<'a> Follower<'a> {
             let accepted = self.step_within(&mut step, wanted, &mut list);
             let Some(Accepted { length: wanted, error, parts, rejected }) = accepted else {
                 if self.land_at_an_edge()? || self.comes_to_rest(self.t, true) {
+                    h = 0.0;
                     continue;
                 }
                 return Err(self.left_domain(self.t, &step.x.clone()));

@@ -2310,6 +2310,16 @@ fn a_ball_rests_on_any_floor() {
     }
 }
 
+/// A root of |sin t|, whose domain ends on either side of each zero of the sine, which lies between
+/// two numbers. SciPy's `quad` of sqrt|sin t| exp(t - 7.5).
+#[test]
+fn roots_of_what_touches_zero_in_time_go_on() {
+    let text = "states = ['x']\nstart = [0]\nf = ['sqrt(abs(sin(t))) - x']";
+    for method in [Method::Dopri5, Method::Radau5, Method::Lsoda] {
+        near(end_of(text, 7.5, method).unwrap()[0], 0.7456573769830949, 1e-8);
+    }
+}
+
 /// A condition that a reset makes false again is met anew where it becomes true, and so is another
 /// event of the same zero.
 #[test]

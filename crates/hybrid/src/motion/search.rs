@@ -642,6 +642,8 @@ impl Follower<'_> {
     /// on either side. Very near to it the state is put onto the switch, and what holds there is
     /// decided; false if no switch is so near.
     pub(super) fn land_at_an_edge(&mut self) -> Result<bool, HybridError> {
+        /// The sine of the number nearest to pi has the sign that it had before pi.
+        const MOST_NUDGES: usize = 8;
         let n = self.n;
         let (t, x) = (self.t, self.x.clone());
         let mut field = vec![0.0; n];
@@ -673,6 +675,25 @@ impl Follower<'_> {
             self.x.iter_mut().zip(&gradient).for_each(|(x, g)| *x -= off * g / size);
         }
         self.outcome.switches += 1;
+        if size == 0.0 {
+            // A function of the time alone is passed whatever the fields are. It is zero between
+            // two numbers, of which the later one counts.
+            let mut off = off;
+            for _ in 0..MOST_NUDGES {
+                if off * values[place] < 0.0 {
+                    break;
+                }
+                self.t = self.t.next_up();
+                off = self.watched_values()[place];
+            }
+            if off * values[place] < 0.0 {
+                let mut config = self.config.clone();
+                config.sides[guard] = off.signum();
+                self.ask_new(&mut config);
+                self.adopt(config, self.sliding.clone());
+                return Ok(true);
+            }
+        }
         let (before, slid) = (self.config.clone(), self.sliding.clone());
         let mut zero = slid.clone();
         zero.push(guard);
