@@ -35,6 +35,9 @@ impl Table {
             .trim(csv::Trim::All)
             .from_reader(csv.as_bytes());
         let header = reader.headers().map_err(|e| BadTable::data(format!("{file}: {e}")))?.clone();
+        if header.is_empty() {
+            return Err(BadTable::data(format!("{file} is empty")));
+        }
         let column = |name: &str, key| {
             header.iter().position(|h| h == name).ok_or_else(|| {
                 let known: Vec<&str> = header.iter().collect();

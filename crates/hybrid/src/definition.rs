@@ -583,11 +583,18 @@ impl Definition {
         let all: Vec<&str> = names.iter().map(|(_, n)| *n).collect();
         let conditions = conditions(d, &all);
         let parse = |place: Place, text: &str, known: &[&str]| {
-            let refused = |error: ExpressionError, place| Problem {
-                place,
-                within: Some((text.to_owned(), error.span)),
-                message: error.message,
-                help: error.help,
+            let refused = |mut error: ExpressionError, place| {
+                let (before, from) = text.split_at(error.span.start.min(text.len()));
+                let tables = d.tables.0.iter().map(|(name, _)| name);
+                let mut called = tables.filter(|name| before.ends_with(*name));
+                if from.starts_with('(')
+                    && let Some(name) = called.next()
+                {
+                    error.message = format!("{name} is a table, and no function");
+                    error.help = Some(format!("write {name} alone: that is its value at t"));
+                }
+                let within = Some((text.to_owned(), error.span));
+                Problem { place, within, message: error.message, help: error.help }
             };
             match Expression::parse_general_with(text, known, &conditions) {
                 Err(error) => Err(refused(error, place)),

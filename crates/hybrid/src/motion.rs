@@ -36,8 +36,8 @@ use crate::roots::{
     slope_at_beginning, stays,
 };
 use crate::selection::{
-    Intersection, MOST_TOGETHER, Mixture, Way, attraction, groups, hold, leads_away, mixture,
-    near_solution, nearest_of_hull, position_hold, possibilities, turn, turn_of_position,
+    Intersection, MOST_TOGETHER, Mixture, Way, attraction, complementary, groups, hold, leads_away,
+    mixture, near_solution, nearest_of_hull, position_hold, possibilities, turn, turn_of_position,
     velocities_differ,
 };
 use crate::step::Step;

@@ -31,8 +31,92 @@ impl Way {
     }
 }
 
-/// Most surfaces that depend on each other at one point.
+/// Most surfaces that depend on each other at one point, if all possibilities are tried.
 pub const MOST_TOGETHER: usize = 6;
+
+/// The only possibility at the meeting of `k` surfaces, of any number, if the fields around it are
+/// sums of what each positive side adds, s' = r + M w with w from 0 to 1, and M is diagonally
+/// stable ([`attraction`]): a linear complementarity problem in a box, by block principal pivoting
+/// (Judice & Pires 1994). A solution in which nothing is on the verge of another is the only one,
+/// since all of them are a convex set (Cottle, Pang & Stone 1992, sec. 3.1). `at` gives the field
+/// and the functions' rates with these functions positive.
+pub(crate) fn complementary(
+    k: usize,
+    at: &mut dyn FnMut(Vec<bool>) -> Option<(Vec<f64>, Vec<f64>)>,
+) -> Option<Vec<Way>> {
+    const MOST_PIVOTS: usize = 2000;
+    /// So many exchanges of whole blocks may not help before single ones are made.
+    const PATIENCE: usize = 10;
+    let joined = |(field, rates): (Vec<f64>, Vec<f64>)| [field, rates].concat();
+    let base = joined(at(vec![false; k])?);
+    let n = base.len() - k;
+    let mut added = Vec::with_capacity(k);
+    for one in 0..k {
+        let there = joined(at((0..k).map(|i| i == one).collect())?);
+        added.push(there.iter().zip(&base).map(|(a, b)| a - b).collect::<Vec<f64>>());
+    }
+    let is_sum = |plus: &[bool], there: &[f64]| {
+        there.iter().enumerate().all(|(i, value)| {
+            let parts = || (0..k).filter(|j| plus[*j]).map(|j| added[j][i]);
+            let size = parts().fold(base[i].abs(), |sum, part| sum + part.abs());
+            (base[i] + parts().sum::<f64>() - value).abs() <= 1e-9 * size
+        })
+    };
+    for pattern in 1..=4 {
+        let plus: Vec<bool> = (0..k).map(|i| pattern == 1 || i % pattern == 0).collect();
+        let there = joined(at(plus.clone())?);
+        if !is_sum(&plus, &there) {
+            return None;
+        }
+    }
+    let rates = &base[n..];
+    let m: Vec<f64> = (0..k * k).map(|p| added[p % k][n + p / k]).collect();
+    if !is_diagonally_stable(&m, k) {
+        return None;
+    }
+    let (mut ways, mut fewest, mut patience) = (vec![Way::Stay; k], usize::MAX, PATIENCE);
+    for _ in 0..MOST_PIVOTS {
+        let stay: Vec<usize> = (0..k).filter(|i| ways[*i] == Way::Stay).collect();
+        let plus: Vec<usize> = (0..k).filter(|i| ways[*i] == Way::Plus).collect();
+        let rate = |i: usize| rates[i] + plus.iter().map(|j| m[i * k + j]).sum::<f64>();
+        let part: Vec<f64> = stay.iter().flat_map(|i| stay.iter().map(|j| m[*i * k + j])).collect();
+        let right: Vec<f64> = stay.iter().map(|i| -rate(*i)).collect();
+        let weights = if stay.is_empty() { Vec::new() } else { solve_any(&part, &right, 0.0)? };
+        let mut wrong = Vec::new();
+        let mut on_the_verge = false;
+        for (i, way) in ways.iter().enumerate() {
+            // How far inside its bounds this one is, in units of what is added up, and its way if
+            // it is outside.
+            let (inside, other) = if *way == Way::Stay {
+                let weight = weights[stay.iter().position(|s| *s == i)?];
+                let other = if weight < 0.5 { Way::Minus } else { Way::Plus };
+                (weight.min(1.0 - weight), other)
+            } else {
+                let parts = || stay.iter().zip(&weights).map(|(j, w)| w * m[i * k + j]);
+                let size = parts().fold(rate(i).abs(), |sum, part| sum + part.abs());
+                let speed = rate(i) + parts().sum::<f64>();
+                let away = if *way == Way::Plus { speed } else { -speed };
+                (away / size.max(f64::MIN_POSITIVE), Way::Stay)
+            };
+            on_the_verge |= inside.abs() <= 1e-12;
+            if inside < 0.0 {
+                wrong.push((i, other));
+            }
+        }
+        if wrong.is_empty() {
+            return (!on_the_verge).then_some(ways);
+        }
+        if wrong.len() < fewest {
+            (fewest, patience) = (wrong.len(), PATIENCE);
+        } else if patience > 0 {
+            patience -= 1;
+        } else {
+            wrong.drain(..wrong.len() - 1);
+        }
+        wrong.into_iter().for_each(|(i, way)| ways[i] = way);
+    }
+    None
+}
 
 /// Choice among mixtures of the fields on several surfaces at once, if mixtures have different
 /// velocities.

@@ -2310,6 +2310,61 @@ fn a_ball_rests_on_any_floor() {
     }
 }
 
+/// Relays that all act on each other: x_i' = q_i - u_i - S/10 with u_i = sign(x_i) and S their sum.
+/// From zero on u_i = q_i - S/10, cut at -1 and 1, and S is the only number that fits; those that
+/// are cut leave. From elsewhere each comes to zero by itself, the last ones beside many others.
+#[test]
+fn many_surfaces_that_act_on_each_other_meet() {
+    for k in [7, 12, 24] {
+        let q: Vec<f64> = (0..k).map(|i| 1.3 * (1.7 * i as f64 + 1.5).sin()).collect();
+        let shares = |s: f64| q.iter().map(move |q| (q - 0.1 * s).clamp(-1.0, 1.0));
+        let (mut low, mut high) = (-(k as f64), k as f64);
+        for _ in 0..100 {
+            let middle = 0.5 * (low + high);
+            if shares(middle).sum::<f64>() > middle {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        let names: Vec<String> = (0..k).map(|i| format!("'x{i}'")).collect();
+        let signs: Vec<String> = (0..k).map(|i| format!("sign(x{i})")).collect();
+        let rate = |(i, q): (usize, &f64)| format!("'{q} - sign(x{i}) - 0.1*s'");
+        let rates: Vec<String> = q.iter().enumerate().map(rate).collect();
+        let text = |start: f64| {
+            format!(
+                "states = [{}]\nstart = [{}]\nf = [{}]\n[let]\ns = '{}'",
+                names.join(", "),
+                vec![start.to_string(); k].join(", "),
+                rates.join(", "),
+                signs.join(" + ")
+            )
+        };
+        let still = end(&text(0.0), 2.0);
+        for ((x, q), u) in still.iter().zip(&q).zip(shares(low)) {
+            near(*x, 2.0 * (q - u - 0.1 * low), 1e-9);
+        }
+        let later = [9.0, 10.0].map(|t| end(&text(0.1), t));
+        for (i, (q, u)) in q.iter().zip(shares(low)).enumerate() {
+            near(later[1][i] - later[0][i], q - u - 0.1 * low, 1e-9);
+        }
+    }
+    // Sums that do not attract, and products, are refused as before.
+    let names: Vec<String> = (0..7).map(|i| format!("'x{i}'")).collect();
+    for rate in ["-sign(x0) + 0.5*s", "-sign(x0) - 0.1*s*s"] {
+        let rates: Vec<String> =
+            (0..7).map(|i| format!("'{}'", rate.replace("x0", &format!("x{i}")))).collect();
+        let signs: Vec<String> = (0..7).map(|i| format!("sign(x{i})")).collect();
+        let text = format!(
+            "states = [{}]\nstart = [0, 0, 0, 0, 0, 0, 0]\nf = [{}]\n[let]\ns = '{}'",
+            names.join(", "),
+            rates.join(", "),
+            signs.join(" + ")
+        );
+        assert!(matches!(run(&model(&text), 1.0).1, Err(HybridError::Stuck { .. })), "{rate}");
+    }
+}
+
 /// A root of |sin t|, whose domain ends on either side of each zero of the sine, which lies between
 /// two numbers. SciPy's `quad` of sqrt|sin t| exp(t - 7.5).
 #[test]

@@ -535,16 +535,6 @@ impl Follower<'_> {
                 set.iter().for_each(|i| ways[*i] = Way::Stay);
                 continue;
             }
-            if set.len() > MOST_TOGETHER {
-                let names: Vec<usize> = set.iter().map(|i| zero[*i]).collect();
-                let why = format!(
-                    "{} surfaces that depend on each other meet ({}); up to {MOST_TOGETHER} are \
-                        resolved",
-                    set.len(),
-                    self.names(&names)
-                );
-                return Err(HybridError::Stuck { t: self.t, x: self.x.clone(), why });
-            }
             let mut cache: HashMap<Vec<bool>, Vertex> = Default::default();
             let mut at = |follower: &mut Self, plus: Vec<bool>| {
                 if !cache.contains_key(&plus) {
@@ -592,6 +582,33 @@ impl Follower<'_> {
                     .collect();
                 (rates.field.clone(), first, direction, asked, first_or_zero, rests)
             };
+            if set.len() > MOST_TOGETHER {
+                let names: Vec<usize> = set.iter().map(|i| zero[*i]).collect();
+                let low = |i: usize| if decided[i] { highs[i] } else { lows[i] };
+                let plain = names.iter().all(|guard| !self.equation.guards[*guard].whole)
+                    && self.jumped(&zero, &low).iter().all(Option::is_none);
+                let found = plain.then(|| {
+                    complementary(set.len(), &mut |plus| {
+                        let (field, rates, _, asked, _, rests) = at(self, plus);
+                        let known = rates.iter().all(|rate| rate.is_finite());
+                        let all = asked.iter().all(|asked| *asked) && !rests.contains(&true);
+                        (known && all).then_some((field, rates))
+                    })
+                });
+                let Some(found) = found.flatten() else {
+                    let why = format!(
+                        "{} surfaces that depend on each other meet ({}); more than \
+                            {MOST_TOGETHER} are resolved only where the fields are sums of what \
+                            each side adds, and attract: start where fewer are zero at once \
+                            (--start), or smooth the switches",
+                        set.len(),
+                        self.names(&names)
+                    );
+                    return Err(HybridError::Stuck { t: self.t, x: self.x.clone(), why });
+                };
+                set.iter().zip(found).for_each(|(i, way)| ways[*i] = way);
+                continue;
+            }
             // Fields that are the same on both sides decide nothing and need nothing decided.
             if set.len() == 1 {
                 let (low, _, d0, ..) = at(self, vec![false]);
