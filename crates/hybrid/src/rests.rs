@@ -193,11 +193,15 @@ pub fn rests(model: &Model, within: &[(f64, f64)]) -> Result<Vec<Rest>, RestErro
     if equation.depends_on_time() {
         return Err(RestError::Driven);
     }
-    let search =
-        Search { equation, n, widths: within.iter().map(|(a, b)| b - a).collect(), within };
+    let widths = within.iter().map(|(a, b)| b - a).collect();
+    let mut search = Search { equation, n, widths, within, constant: Vec::new() };
+    let places: Vec<Vec<f64>> = (0..STARTS).map(|start| search.place(start)).collect();
+    let value = |e: &Expression, x: &Vec<f64>| search.equation.value(e, 0.0, x);
+    let guards = search.equation.guards.iter().map(|guard| &guard.expression);
+    search.constant =
+        guards.map(|e| places.iter().all(|x| value(e, x) == value(e, &places[0]))).collect();
     let mut found: Vec<Rest> = Vec::new();
     for mode in 0..model.definition().modes().len() {
-        let places: Vec<Vec<f64>> = (0..STARTS).map(|start| search.place(start)).collect();
         let configs: Vec<Configuration> =
             places.iter().map(|x| search.configuration(mode, x)).collect();
         let surfaces = search.surfaces(&configs);
@@ -298,6 +302,9 @@ struct Search<'a> {
     n: usize,
     widths: Vec<f64>,
     within: &'a [(f64, f64)],
+    /// Guards that have one value in the whole box, as those that a parameter makes zero: they are
+    /// no surfaces.
+    constant: Vec<bool>,
 }
 
 /// A field with its Jacobian, row by row.
@@ -358,7 +365,8 @@ impl Search<'_> {
         let guards = &self.equation.guards;
         let mut ends = vec![None; guards.len()];
         for config in configs {
-            for guard in &self.equation.compiled(config).active {
+            let active = &self.equation.compiled(config).active;
+            for guard in active.iter().filter(|guard| !self.constant[**guard]) {
                 let side = config.sides[*guard];
                 let (low, high) = ends[*guard].unwrap_or((side, side));
                 ends[*guard] = Some((side.min(low), side.max(high)));
@@ -532,12 +540,14 @@ impl Search<'_> {
     }
 
     fn configuration(&self, mode: usize, x: &[f64]) -> Configuration {
-        let side = |guard: &crate::equation::Guard| {
+        let side = |(number, guard): (usize, &crate::equation::Guard)| {
             let value = self.equation.value(&guard.expression, 0.0, x);
             match guard.whole {
                 true => value.floor(),
                 false => {
-                    if value < 0.0 {
+                    if value == 0.0 && self.constant[number] {
+                        0.0
+                    } else if value < 0.0 {
                         -1.0
                     } else {
                         1.0
@@ -547,7 +557,7 @@ impl Search<'_> {
         };
         Configuration {
             mode,
-            sides: self.equation.guards.iter().map(side).collect(),
+            sides: self.equation.guards.iter().enumerate().map(side).collect(),
             pieces: Vec::new(),
         }
     }
@@ -597,9 +607,16 @@ impl Search<'_> {
     /// Whether a state's own answers, but for those in `free`, are those of a configuration.
     fn is_its_own(&self, config: &Configuration, x: &[f64], free: &[Surface]) -> bool {
         let own = self.configuration(config.mode, x);
-        let compiled = self.equation.compiled(config);
         let is_free = |g: usize| Surface::is_of(free, g);
-        compiled.active.iter().all(|g| is_free(*g) || own.sides[*g] == config.sides[*g])
+        // On one side of a free function others may be asked than on the other one.
+        let mut corner = config.clone();
+        (0..1_usize << free.len()).all(|bits| {
+            for (i, surface) in free.iter().enumerate() {
+                corner.sides[surface.guard] = surface.sides()[bits >> i & 1];
+            }
+            let compiled = self.equation.compiled(&corner);
+            compiled.active.iter().all(|g| is_free(*g) || own.sides[*g] == config.sides[*g])
+        })
     }
 
     /// The mixture on the surfaces `on`, by weights of their positive sides.
