@@ -29,6 +29,9 @@ pub struct Guard {
     pub whole: bool,
     /// Whether it chooses between expressions; otherwise its answer is a number in one.
     chooses: bool,
+    /// Whether the equations are continuous where it is zero: it is asked by `abs`, `min`, `max`
+    /// and `clip` alone, in sums, products and smooth functions.
+    pub kink: bool,
 }
 
 /// The answers to all switching functions, the mode, and the pieces of tables that hold.
@@ -175,11 +178,16 @@ impl Equation {
         if equation.definition.document().h.is_some() {
             equation.register_h();
         }
-        for e in fields.iter().chain(&terms).chain(&watched) {
-            equation.find(e, false)?;
+        let rough = equation.rough_terms(fields.iter().chain(&watched).chain(&conditions));
+        for e in fields.iter().chain(&watched) {
+            equation.find(e, false, true)?;
+        }
+        let named = equation.definition.terms.iter().map(|(name, _)| rough.contains(name));
+        for (e, rough) in terms.iter().zip(named.collect::<Vec<_>>()) {
+            equation.find(e, false, !rough)?;
         }
         for e in &conditions {
-            equation.find(e, true)?;
+            equation.find(e, true, true)?;
         }
         let sets = equation.definition.events.iter().flat_map(|event| &event.set);
         for e in
@@ -293,17 +301,82 @@ impl Equation {
         self.definition.terms.iter().find(|(n, _)| n == name).map(|(_, e)| e)
     }
 
-    /// Registers the switching functions of an expression.
-    fn find(&mut self, e: &Expression, wants_condition: bool) -> Result<(), EquationError> {
+    /// The names of terms that a quotient, a root or a logarithm is taken of, themselves or in
+    /// another one: a kink in them may be a jump, or have no slope.
+    fn rough_terms<'a>(&self, asked: impl Iterator<Item = &'a Expression>) -> HashSet<String> {
+        fn collect(own: &Equation, e: &Expression, rough: bool, names: &mut Vec<(String, bool)>) {
+            if let Expression::Name(name) = e {
+                names.push((name.clone(), rough));
+            }
+            for (i, part) in e.parts().into_iter().enumerate() {
+                collect(own, part, rough || !own.is_smooth_in(e, i), names);
+            }
+        }
+        let (mut open, mut found, mut smooth) = (Vec::new(), HashSet::new(), HashSet::new());
+        asked.for_each(|e| collect(self, e, false, &mut open));
+        while let Some((name, rough)) = open.pop() {
+            let new = if rough { found.insert(name.clone()) } else { smooth.insert(name.clone()) };
+            if let (true, Some(term)) = (new, self.term(&name)) {
+                collect(self, term, rough, &mut open);
+            }
+        }
+        found
+    }
+
+    /// Whether an expression has a bounded slope in its part of that number, wherever it is taken.
+    fn is_smooth_in(&self, e: &Expression, part: usize) -> bool {
+        match e {
+            Expression::Div(..) => part == 0,
+            Expression::Power(_, exponent) => *exponent > 0,
+            Expression::RealPower(base, exponent) => part == 0 && self.is_even(base, exponent),
+            Expression::Call(Function::Ln | Function::Sqrt | Function::Tan, _) => false,
+            Expression::Apply(
+                General::Asin | General::Acos | General::Log | General::Log10 | General::Atan2,
+                _,
+            ) => false,
+            _ => true,
+        }
+    }
+
+    /// Whether a power, of what is never negative by an exponent of at least one, is taken of its
+    /// size: rounding beyond the end of its domain makes it no other number.
+    fn is_even(&self, base: &Expression, exponent: &Expression) -> bool {
+        let no_less = |e: &Expression, bound: f64| self.constant(e).is_some_and(|v| v >= bound);
+        let never_negative = match base {
+            Expression::Call(Function::Abs, _) => true,
+            Expression::Apply(General::Max, list) => list.iter().any(|e| no_less(e, 0.0)),
+            Expression::Apply(General::Clip, list) => no_less(&list[1], 0.0),
+            _ => false,
+        };
+        never_negative && no_less(exponent, 1.0)
+    }
+
+    /// The value of an expression of numbers and parameters.
+    fn constant(&self, e: &Expression) -> Option<f64> {
+        let fixed = |name: &str| self.values.contains_key(name);
+        let known = e.names().into_iter().all(fixed) && !asks(e);
+        known.then(|| self.value(e, 0.0, &[])).filter(|v| v.is_finite())
+    }
+
+    /// Registers the switching functions of an expression; `smooth`: nothing around it has a pole
+    /// or a root.
+    fn find(
+        &mut self,
+        e: &Expression,
+        wants_condition: bool,
+        smooth: bool,
+    ) -> Result<(), EquationError> {
         match e {
             Expression::Name(name) if wants_condition => match self.term(name).cloned() {
                 Some(term) if term.is_condition() => return Ok(()),
-                Some(Expression::Name(other)) => return self.find(&Expression::Name(other), true),
+                Some(Expression::Name(other)) => {
+                    return self.find(&Expression::Name(other), true, smooth);
+                }
                 _ => return Err(EquationError::NoCondition(name.clone())),
             },
-            Expression::Greater(a, b) => self.register(difference(a, b), false, true),
-            Expression::Call(Function::Sign | Function::Abs, a) => {
-                self.register((**a).clone(), false, false)
+            Expression::Greater(a, b) => self.register(difference(a, b), false, true, false),
+            Expression::Call(f @ (Function::Sign | Function::Abs), a) => {
+                self.register((**a).clone(), false, false, smooth && *f == Function::Abs)
             }
             Expression::Apply(f, list) => match f {
                 General::Min | General::Max => {
@@ -313,19 +386,20 @@ impl Equation {
                             difference(&list[i], &self.folded(*f, &list[..i])),
                             false,
                             true,
+                            smooth,
                         );
                     }
                 }
                 General::Clip => {
-                    self.register(difference(&list[0], &list[1]), false, true);
-                    self.register(difference(&list[0], &list[2]), false, true);
+                    self.register(difference(&list[0], &list[1]), false, true, smooth);
+                    self.register(difference(&list[0], &list[2]), false, true, smooth);
                 }
-                General::Heaviside => self.register(list[0].clone(), false, false),
-                General::Floor => self.register(list[0].clone(), true, false),
-                General::Mod => self.register(quotient(list), true, false),
+                General::Heaviside => self.register(list[0].clone(), false, false, false),
+                General::Floor => self.register(list[0].clone(), true, false, false),
+                General::Mod => self.register(quotient(list), true, false, false),
                 General::Atan2 => {
-                    self.register(list[1].clone(), false, true);
-                    self.register(list[0].clone(), false, true);
+                    self.register(list[1].clone(), false, true, false);
+                    self.register(list[0].clone(), false, true, false);
                 }
                 _ => {}
             },
@@ -337,7 +411,7 @@ impl Equation {
             _ => false,
         };
         for (i, part) in e.parts().into_iter().enumerate() {
-            self.find(part, conditions(i))?;
+            self.find(part, conditions(i), smooth && self.is_smooth_in(e, i))?;
         }
         Ok(())
     }
@@ -346,9 +420,9 @@ impl Equation {
         if list.len() == 1 { list[0].clone() } else { Expression::Apply(f, list.to_vec()) }
     }
 
-    fn register(&mut self, expression: Expression, whole: bool, chooses: bool) {
+    fn register(&mut self, expression: Expression, whole: bool, chooses: bool, kink: bool) {
         let (expression, _) = if whole { (expression, false) } else { self.bare(&expression) };
-        self.enter(expression, whole, chooses);
+        self.enter(expression, whole, chooses, kink);
     }
 
     /// The switching function h of a system with plus and minus, which keeps its sign: plus is
@@ -358,13 +432,14 @@ impl Equation {
         let Some(Expression::Apply(General::If, list)) = field else { return };
         let Expression::Greater(h, _) = &list[0] else { return };
         let (bare, flipped) = self.bare(h);
-        self.enter(if flipped { mirrored(&bare) } else { bare }, false, true);
+        self.enter(if flipped { mirrored(&bare) } else { bare }, false, true, false);
     }
 
-    fn enter(&mut self, expression: Expression, whole: bool, chooses: bool) {
+    fn enter(&mut self, expression: Expression, whole: bool, chooses: bool, kink: bool) {
         let key = |e: &Expression| format!("{}{e}", if whole { "whole " } else { "" });
         if let Some((i, _)) = self.by_text.get(&key(&expression)) {
             self.guards[*i].chooses |= chooses;
+            self.guards[*i].kink &= kink;
             return;
         }
         let i = self.guards.len();
@@ -374,6 +449,7 @@ impl Equation {
                 if let Some((other, opposite)) = self.by_text.get(&sum).copied() {
                     // Written before in another scale.
                     self.guards[other].chooses |= chooses;
+                    self.guards[other].kink &= kink;
                     self.by_text.insert(key(&mirrored(&expression)), (other, opposite == flipped));
                     self.by_text.insert(key(&expression), (other, opposite != flipped));
                     return;
@@ -382,7 +458,7 @@ impl Equation {
             }
         }
         self.by_text.insert(key(&expression), (i, false));
-        self.guards.push(Guard { expression, whole, chooses });
+        self.guards.push(Guard { expression, whole, chooses, kink });
     }
 
     /// The guard of an expression, and whether it is the expression's negative.
@@ -396,11 +472,7 @@ impl Equation {
     /// nothing about that: constant factors, odd powers, odd rising functions, absolute values
     /// beside what they are of, divisors instead of factors.
     fn bare(&self, e: &Expression) -> (Expression, bool) {
-        let constant = |e: &Expression| -> Option<f64> {
-            let fixed = |name: &str| self.values.contains_key(name);
-            let known = e.names().into_iter().all(fixed) && !asks(e);
-            known.then(|| self.value(e, 0.0, &[])).filter(|v| v.is_finite() && *v != 0.0)
-        };
+        let constant = |e: &Expression| self.constant(e).filter(|v| *v != 0.0);
         let scaled = |e: &Expression, factor: f64| {
             let (e, flipped) = self.bare(e);
             (e, flipped != (factor < 0.0))
@@ -1081,6 +1153,10 @@ impl Writer<'_> {
             Expression::Mul(a, b) => self.number(a) * self.number(b),
             Expression::Div(a, b) => self.number(a) / self.number(b),
             Expression::Power(a, n) => self.number(a).power(*n),
+            Expression::RealPower(a, b) if self.equation.is_even(a, b) => {
+                let (a, b) = (self.number(a), self.number(b));
+                power(a * a, b.scale(0.5))
+            }
             Expression::RealPower(a, b) => power(self.number(a), self.number(b)),
             Expression::Call(Function::Sign, a) => self.side(a).unwrap_or(Recorded::zero()),
             Expression::Call(Function::Abs, a) => match self.side(a) {

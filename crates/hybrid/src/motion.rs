@@ -981,7 +981,7 @@ impl<'a> Follower<'a> {
             step.k[0].copy_from_slice(&room);
             self.noise.fill(0.0);
             if !room.iter().all(|v| v.is_finite()) {
-                if self.comes_to_rest(self.t, true) {
+                if self.put_beyond() || self.comes_to_rest(self.t, true) {
                     continue;
                 }
                 return Err(self.left_domain(step.t, &step.x));
@@ -1329,7 +1329,12 @@ impl<'a> Follower<'a> {
         if near.is_empty() {
             return Vec::new();
         }
-        let (_, mut rates) = self.rates_of_second_order(&self.config.clone());
+        // Places are those of the present programs, which may ask more than the sides do.
+        let config = self.config.clone();
+        let plain = self.equation.compiled(&config);
+        let more = |guard: &&usize| !plain.active.contains(*guard);
+        let also: Vec<usize> = self.compiled.active.iter().filter(more).copied().collect();
+        let (_, mut rates) = self.rates_to_order(&config, &also, true);
         let mut direction = Vec::new();
         for (sought, place, _) in &near {
             let e = match *sought {

@@ -826,6 +826,22 @@ fn rests_are_found_with_their_stability() {
     near(found[0].on[0].weight, 0.5, 1e-12);
     // A fused focus: both fields are tangent to x = 0 where they cancel.
     let fused = model("states = ['x', 'y']\nf = ['y', '-x - 0.2*sign(x)']");
+    // Beyond a surface others are asked than before it: atan2 is smooth where it looks up.
+    let angle = model("states = ['x', 'y']\nf = ['atan2(y, x) - 1', '1 - y']");
+    let found = rests(&angle, &[(-2.0, 2.0); 2]).unwrap();
+    assert_eq!(found.len(), 1, "{found:?}");
+    near(found[0].x[0], 1.0 / 1.0_f64.tan(), 1e-9);
+    // What a parameter makes zero is no surface, and not greater than zero.
+    for condition in ["eps*(x - 1) > 0", "k*x > x"] {
+        let text = format!(
+            "states = ['x', 'y']\nf = ['-x + 0.5*y + 0.1', 'if({condition}, 1, 0.5) - 2*y + \
+                0.1']\n[parameters]\neps = 0\nk = 1"
+        );
+        let found = rests(&model(&text), &[(-3.0, 3.0); 2]).unwrap();
+        assert_eq!(found.len(), 1, "{found:?}");
+        near(found[0].x[0], 0.25, 1e-9);
+        assert_eq!(found[0].kind(), "stable node");
+    }
     // What the clock moves again and again does not rest; what it does once, or leaves, does.
     for (event, kind) in [
         (
@@ -2308,6 +2324,87 @@ fn a_ball_rests_on_any_floor() {
         near(t, root - speed + 2.0 * root, error + 1e-8);
         assert!(error < 1e-6);
     }
+}
+
+/// Kinks that a motion comes to like exp(-t), or lies on, decide nothing. x = sin t + exp(-g t) has
+/// the integral 1/g of |x - sin t|; a rate limiter that has just caught up; two agents in consensus.
+#[test]
+fn kinks_need_no_decision() {
+    let all = [Method::Dopri5, Method::Radau5, Method::Lsoda, Method::Taylor];
+    for gain in [1.0, 2.0, 5.0, 20.0] {
+        let text = format!(
+            "states = ['x', 'J']\nstart = [1, 0]\nf = ['cos(t) - {gain}*(x - sin(t))', 'abs(x - \
+                sin(t))']"
+        );
+        for method in all {
+            let x = end_of(&text, 60.0, method).unwrap();
+            near(x[0], 60.0_f64.sin(), 1e-8);
+            near(x[1], 1.0 / gain, 1e-8);
+        }
+    }
+    let limiter = "states = ['x', 'r']\nstart = [0, 0]\nf = ['clip(5*(r - x), -0.2, 0.2)', \
+        '0.2*(1 - 0.5*exp(-t))']";
+    let agents = "states = ['a', 'b', 'c']\nstart = [0.3, 2, 0]\nf = ['1 + b - a', '1 + a - b', \
+        'max(a - b, 0) + max(b - a, 0)']";
+    for method in all {
+        near(end_of(limiter, 30.0, method).unwrap()[0], 5.86, 1e-7);
+        near(end_of(agents, 60.0, method).unwrap()[2], 0.85, 1e-7);
+    }
+}
+
+/// A layer in which a force is proportional, written with `clip`: SciPy's DOP853 at 1e-13.
+#[test]
+fn a_layer_of_a_switch_is_followed() {
+    let text = "states = ['x', 'v']\nstart = [2, 0.5]\nf = ['v', 'u']\n[let]\ns = 'x + \
+        v*abs(v)/2'\nu = '-clip(s/0.02, -1, 1)'";
+    for method in [Method::Dopri5, Method::Radau5, Method::Lsoda, Method::Taylor] {
+        let x = end_of(text, 8.0, method).unwrap();
+        near(x[0], -0.0019349682, 1e-9);
+        near(x[1], 0.012_128_744, 1e-9);
+    }
+}
+
+/// A ball on a spring after Hertz, F = k max(-x, 0)^1.5, keeps its energy: at the end v^2/2 + x and
+/// the energy of the spring are what they were. So with other powers, and written with `if`.
+#[test]
+fn powers_of_what_is_cut_at_zero_are_followed() {
+    for (force, power) in [
+        ("max(-x, 0)^1.5", 1.5),
+        ("max(-x, 0)^2.5", 2.5),
+        ("if(x < 0, (-x)^1.5, 0)", 1.5),
+        ("sqrt(max(-x, 0))", 0.5),
+    ] {
+        for (x, v) in [(0.44, 0.54), (0.3, -1.0), (1.0, 0.0), (0.07, 0.2)] {
+            let energy = |x: f64, v: f64| {
+                0.5 * v * v + x + 50.0 / (power + 1.0) * (-x).max(0.0).powf(power + 1.0)
+            };
+            let text =
+                format!("states = ['x', 'v']\nstart = [{x}, {v}]\nf = ['v', '-1 + 50*{force}']");
+            for method in [Method::Dopri5, Method::Radau5, Method::Lsoda] {
+                let found = end_of(&text, 10.0, method).unwrap_or_else(|e| panic!("{text} {e}"));
+                near(energy(found[0], found[1]), energy(x, v), 1e-7);
+            }
+        }
+    }
+}
+
+/// An event is of the mode that those before it at its moment leave; what is met, also of that in
+/// which it was.
+#[test]
+fn simultaneous_events_see_the_mode_that_the_others_leave() {
+    let fault = "states = ['T']\nstart = [0]\n[modes.on]\nf = ['1']\n[modes.off]\nf = \
+        ['-1']\n[modes.fault]\nf = ['0']\n[[event]]\nat = 2\nfrom = 'on'\nmode = \
+        'fault'\n[[event]]\nwhen = 'T >= 2'\nfrom = 'on'\nmode = 'off'";
+    near(last(fault, 5.0), 2.0, 1e-12);
+    let clocks = |first: &str, second: &str| {
+        format!(
+            "states = ['y']\nstart = [0]\n[modes.a]\nf = ['0']\n[modes.b]\nf = ['0']\n[[event]]\n\
+                every = 1\nfrom = 'a'\nmode = 'b'\n[[event]]\nevery = 1\nfrom = '{first}'\nset \
+                = {{ y = 'y + 1' }}\n[[event]]\nat = 0.5\nmode = '{second}'"
+        )
+    };
+    assert_eq!(last(&clocks("a", "a"), 1.5), 0.0);
+    assert_eq!(last(&clocks("b", "a"), 1.5), 1.0);
 }
 
 /// Relays that all act on each other: x_i' = q_i - u_i - S/10 with u_i = sign(x_i) and S their sum.

@@ -122,7 +122,8 @@ impl Follower<'_> {
                 let (slid, none) = (self.sliding.clone(), vec![false; self.slides.len()]);
                 self.decide(&slid, &none)?;
             }
-            for guard in crossed {
+            // Equations with kinks alone are Lipschitz: no infinity of them is in finite time.
+            for guard in crossed.into_iter().filter(|guard| !self.equation.guards[*guard].kink) {
                 let found = self.switch_trains[guard].note(self.t, 0.0);
                 accumulates = accumulates.or(found.map(|(t, error)| (guard, t, error)));
             }
@@ -223,11 +224,17 @@ impl Follower<'_> {
         zero: &[usize],
         observe: &mut dyn FnMut(&Point) -> bool,
     ) -> Result<Option<Ending>, HybridError> {
-        let fired: Vec<usize> = fired
-            .iter()
-            .copied()
-            .filter(|i| definition.events()[*i].from.is_none_or(|mode| mode == self.config.mode))
-            .collect();
+        // In the mode that those before it leave; what has been met, also in that in which it was.
+        let mut now = self.config.mode;
+        let takes_place = |i: &usize| {
+            let event = &definition.events()[*i];
+            let of_clock = matches!(event.when, When::At(_) | When::Every(_));
+            let takes =
+                event.from.is_none_or(|mode| mode == now && (of_clock || mode == self.config.mode));
+            now = event.mode.filter(|_| takes).unwrap_or(now);
+            takes
+        };
+        let fired: Vec<usize> = fired.iter().copied().filter(takes_place).collect();
         if fired.is_empty() {
             return Ok(None);
         }

@@ -39,7 +39,9 @@ impl Follower<'_> {
                         list.push((Sought::Guard { guard: *guard, upper }, 1.0));
                     }
                 }
-            } else if self.fresh_guard[*guard] || !self.stays_away(step, &ranges, place, 0.0, side)
+            } else if (self.fresh_guard[*guard]
+                || !self.stays_away(step, &ranges, place, 0.0, side))
+                && !self.hides_a_kink(step, *guard)
             {
                 list.push((Sought::Guard { guard: *guard, upper: false }, side));
             }
@@ -68,6 +70,22 @@ impl Follower<'_> {
             list.push((Sought::Repelling, 1.0));
         }
         list.extend((0..self.contacts.len()).map(|place| (Sought::Release(place), 1.0)));
+    }
+
+    /// Whether the equations are continuous where this function is zero, and in the whole step it
+    /// is zero to the step's own error: which side of it is followed does not matter.
+    fn hides_a_kink(&mut self, step: &Step, guard: usize) -> bool {
+        if !self.equation.guards[guard].kink {
+            return false;
+        }
+        let expression = self.equation.guards[guard].expression.clone();
+        const ERRORS: f64 = 10.0;
+        let small = ERRORS * self.options.rtol * self.magnitude(&expression);
+        let mut x = vec![0.0; self.n];
+        [0.0, 0.5, 1.0].iter().all(|theta| {
+            step.at(*theta, &mut x);
+            self.equation.value(&expression, step.t + theta * step.h, &x).abs() <= small
+        })
     }
 
     /// Bounds guards and watched expressions in a step by the states' [`Range`]s, if one of them is
@@ -705,6 +723,36 @@ impl Follower<'_> {
             self.decide(&zero, &vec![false; self.slides.len()])?;
         }
         Ok(self.t > t || self.config != before || self.sliding != slid)
+    }
+
+    /// Mirrors the state at surfaces that it lies before by rounding, although motion goes on behind
+    /// them: there alone a root of what has just become positive is a number. False if there are
+    /// none.
+    pub(super) fn put_beyond(&mut self) -> bool {
+        let values = self.watched_values();
+        let compiled = self.compiled.clone();
+        let mut moved = false;
+        for (place, guard) in compiled.active.iter().enumerate() {
+            let (value, expression) = (values[place], &self.equation.guards[*guard].expression);
+            let before = value * self.config.sides[*guard] < 0.0;
+            let near = value.abs() <= 1e-13 * self.magnitude(expression).max(self.widest(place));
+            if self.equation.guards[*guard].whole || self.slides[*guard] || !before || !near {
+                continue;
+            }
+            let gradient = self.gradient(self.t, place);
+            let size: f64 = gradient.iter().map(|g| g * g).sum();
+            if size > 0.0 {
+                self.x.iter_mut().zip(&gradient).for_each(|(x, g)| *x -= 2.0 * value * g / size);
+                moved = true;
+            }
+        }
+        moved
+    }
+
+    /// The size of a function's terms for states of their largest sizes of late.
+    fn widest(&mut self, place: usize) -> f64 {
+        let gradient = self.gradient(self.t, place);
+        gradient.iter().zip(&self.lately).map(|(g, size)| (g * size).abs()).sum()
     }
 
     /// A motion that comes to where a root's argument is zero in finite time, and makes it stay so

@@ -628,6 +628,13 @@ impl Follower<'_> {
                     ways[set[0]] = if plus { Way::Plus } else { Way::Minus };
                     continue;
                 }
+                // At a kink the fields differ by rounding, and so do speeds that are nearly zero.
+                if self.equation.guards[zero[set[0]]].kink && !at(self, vec![false]).5[0] {
+                    let present = self.config.sides[zero[set[0]]] == highs[set[0]];
+                    let plus = if d0[0] * d1[0] > 0.0 { d1[0] > 0.0 } else { present };
+                    ways[set[0]] = if plus { Way::Plus } else { Way::Minus };
+                    continue;
+                }
             }
             let mut open = None;
             let found = possibilities(set.len(), |assignment| {
