@@ -16,7 +16,7 @@ use crate::paper::pipeline::{compute, questions};
 use crate::record::manifest::VERSION;
 use crate::record::{self, Manifest};
 
-/// Recompute figures and write them as the new reference: their hashes, their PNGs, and
+/// Recompute figures and write them as the new reference: their hashes, pictures, and
 /// a line in CHANGES.md. Refused while any test other than the golden ones fails.
 #[derive(Debug, clap::Args)]
 #[command(
