@@ -215,7 +215,9 @@ fn of_general(arguments: &Arguments, question: &GeneralExponents) -> Result<cli:
             for (i, MeanRate { value, half_width }) in found.iter().enumerate() {
                 let value = value.unwrap_or(f64::NEG_INFINITY);
                 let meaning = match () {
-                    () if value == f64::NEG_INFINITY => "sliding, or a reset, takes this direction away",
+                    () if value == f64::NEG_INFINITY => {
+                        "sliding, or a reset, takes this direction away"
+                    }
                     () if value.abs() <= *half_width => "not distinguishable from zero",
                     () if value > 0.0 => "neighbours part",
                     () => "neighbours approach",
