@@ -34,6 +34,9 @@ impl Way {
 /// Most surfaces that depend on each other at one point, if all possibilities are tried.
 pub const MOST_TOGETHER: usize = 6;
 
+/// A field around a meeting of surfaces, and the rates of their functions in it.
+pub(crate) type Around = (Vec<f64>, Vec<f64>);
+
 /// The only possibility at the meeting of `k` surfaces, of any number, if the fields around it are
 /// sums of what each positive side adds, s' = r + M w with w from 0 to 1, and M is diagonally
 /// stable ([`attraction`]): a linear complementarity problem in a box, by block principal pivoting
@@ -42,12 +45,12 @@ pub const MOST_TOGETHER: usize = 6;
 /// and the functions' rates with these functions positive.
 pub(crate) fn complementary(
     k: usize,
-    at: &mut dyn FnMut(Vec<bool>) -> Option<(Vec<f64>, Vec<f64>)>,
+    at: &mut dyn FnMut(Vec<bool>) -> Option<Around>,
 ) -> Option<Vec<Way>> {
     const MOST_PIVOTS: usize = 2000;
     /// So many exchanges of whole blocks may not help before single ones are made.
     const PATIENCE: usize = 10;
-    let joined = |(field, rates): (Vec<f64>, Vec<f64>)| [field, rates].concat();
+    let joined = |(field, rates): Around| [field, rates].concat();
     let base = joined(at(vec![false; k])?);
     let n = base.len() - k;
     let mut added = Vec::with_capacity(k);
