@@ -180,8 +180,8 @@ pub struct RunFlags {
         help_heading = "Recording"
     )]
     pub section: Option<String>,
-    /// Largest distance between the recorded polyline and the path [default: 0.001; of a picture
-    /// 0.0001].
+    /// Largest distance between the recorded polyline and the path; from a state that moves over
+    /// less than 0.003 at most a thousandth of that [default: 0.001; of a picture 0.0001].
     #[arg(long, allow_hyphen_values = true, help_heading = "Recording")]
     pub chord: Option<f64>,
     /// Record the state at the multiples of this time, instead of points that follow the path.

@@ -130,6 +130,7 @@ pub fn run_of(flags: &RunFlags) -> Result<Option<GeneralRun>, CliError> {
     }
     let options = Options {
         mode: defaults.mode,
+        extents: defaults.extents,
         t_start: flags.t_start.unwrap_or(0.0),
         t_end: flags.t_end.unwrap_or(150.0),
         start: flags.start.clone(),

@@ -2,7 +2,7 @@
 //! them.
 
 use twofold_integrate::filippov::{FilippovObserver, Mode, ModeEvent};
-use twofold_integrate::{Flow, Observer, Step};
+use twofold_integrate::{Extents, Flow, Observer, Step};
 
 use super::path::{MOST_POINTS, TimesRecorder};
 use super::{PathRecorder, Sample};
@@ -57,6 +57,7 @@ impl<const D: usize> Motion<D> {
 #[derive(Clone, Debug)]
 pub struct MotionRecorder<const D: usize = 3> {
     chord: f64,
+    extents: Extents,
     pieces: Vec<(Mode, PathRecorder<D>)>,
     events: Vec<ModeEvent<D>>,
     new_piece: bool,
@@ -67,7 +68,26 @@ pub struct MotionRecorder<const D: usize = 3> {
 impl<const D: usize> MotionRecorder<D> {
     /// An empty recording; `chord` is the largest distance between polyline and dense output.
     pub fn new(chord: f64) -> Self {
-        Self { chord, pieces: Vec::new(), events: Vec::new(), new_piece: true, points: 0 }
+        Self {
+            chord,
+            extents: Extents::default(),
+            pieces: Vec::new(),
+            events: Vec::new(),
+            new_piece: true,
+            points: 0,
+        }
+    }
+
+    /// As [`PathRecorder::over`].
+    pub fn over(mut self, extents: Extents) -> Self {
+        self.extents = extents;
+        self
+    }
+
+    /// Extents of the motion so far.
+    pub fn extents(&self) -> Extents {
+        let all = || self.pieces.iter().flat_map(|(_, path)| path.samples());
+        Extents::of((0..D).map(|i| all().map(move |s| s.x[i])))
     }
 
     /// Number of points that are kept now.
@@ -177,7 +197,11 @@ impl<const D: usize> FilippovObserver<D> for MotionRecorder<D> {
     fn step(&mut self, mode: Mode, step: &Step<'_, D>) -> Flow {
         if self.new_piece || self.pieces.last().is_none_or(|(m, _)| *m != mode) {
             self.points += self.pieces.last().map_or(0, |(_, path)| path.len());
-            let path = PathRecorder::starting(step.t0, &step.x0, self.chord);
+            if let Some((_, before)) = self.pieces.last() {
+                self.extents = before.known().clone();
+            }
+            let path =
+                PathRecorder::starting(step.t0, &step.x0, self.chord).over(self.extents.clone());
             self.pieces.push((mode, path.at_most(MOST_POINTS.saturating_sub(self.points))));
             self.new_piece = false;
         }

@@ -2,7 +2,7 @@
 
 use nalgebra::SVector;
 
-use twofold_integrate::{Flow, Observer, Step};
+use twofold_integrate::{Extents, Flow, Observer, Step};
 
 /// A point of a path: time and the state of a system with `D` states.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,6 +42,7 @@ pub struct Sample<const D: usize = 3> {
 #[derive(Clone, Debug)]
 pub struct PathRecorder<const D: usize = 3> {
     chord: f64,
+    extents: Extents,
     most: usize,
     samples: Vec<Sample<D>>,
 }
@@ -65,7 +66,24 @@ impl<const D: usize> PathRecorder<D> {
 
     /// A recorder that starts at time `t`.
     pub fn starting<const N: usize>(t: f64, x: &SVector<f64, N>, chord: f64) -> Self {
-        Self { chord, most: MOST_POINTS, samples: vec![Sample { t, x: leading(x) }] }
+        let samples = vec![Sample { t, x: leading(x) }];
+        Self { chord, extents: Extents::default(), most: MOST_POINTS, samples }
+    }
+
+    /// Keeps nearer to the small ones of states with these extents, which grow with the path.
+    pub fn over(mut self, extents: Extents) -> Self {
+        self.extents = extents;
+        self
+    }
+
+    /// The extents of states as far as it knows them.
+    pub(crate) fn known(&self) -> &Extents {
+        &self.extents
+    }
+
+    /// Extents of the path so far.
+    pub fn extents(&self) -> Extents {
+        Extents::of((0..D).map(|i| self.samples.iter().map(move |s| s.x[i])))
     }
 
     /// Stops the run at `points` points instead of [`MOST_POINTS`]; the last step is recorded
@@ -81,6 +99,11 @@ impl<const D: usize> PathRecorder<D> {
         self.samples.len()
     }
 
+    /// The points that are kept now.
+    pub(crate) fn samples(&self) -> &[Sample<D>] {
+        &self.samples
+    }
+
     /// The path.
     pub fn into_samples(self) -> Vec<Sample<D>> {
         self.samples
@@ -90,6 +113,10 @@ impl<const D: usize> PathRecorder<D> {
     /// still there.
     pub fn take(&mut self) -> Vec<Sample<D>> {
         std::mem::take(&mut self.samples)
+    }
+
+    fn chord_of(&self, state: usize) -> f64 {
+        self.extents.chord(state, self.chord)
     }
 
     /// Adds interior points of `step` between the fractions `a` and `b` where the chord misses the
@@ -106,8 +133,8 @@ impl<const D: usize> PathRecorder<D> {
         }
         let middle = 0.5 * (a.0 + b.0);
         let x = leading(&step.at(middle));
-        let gap = (0..D).map(|i| (x[i] - 0.5 * (a.1[i] + b.1[i])).abs()).fold(0.0, f64::max);
-        if gap > self.chord {
+        let misses = |i: usize| (x[i] - 0.5 * (a.1[i] + b.1[i])).abs() > self.chord_of(i);
+        if (0..D).any(misses) {
             self.refine(step, a, (middle, x), halvings - 1);
             self.samples.push(Sample { t: step.time(middle), x });
             self.refine(step, (middle, x), b, halvings - 1);
@@ -121,8 +148,9 @@ impl<const N: usize, const D: usize> Observer<N> for PathRecorder<D> {
         // chord.
         let knots = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0].map(|s| (s, leading(&step.at(s))));
         let (start, end) = (knots[0].1, knots[3].1);
+        knots[1..].iter().for_each(|(_, x)| self.extents.reach(x));
         let straight = knots[1..3].iter().all(|(s, x)| {
-            (0..D).all(|i| (x[i] - (start[i] + s * (end[i] - start[i]))).abs() <= self.chord)
+            (0..D).all(|i| (x[i] - (start[i] + s * (end[i] - start[i]))).abs() <= self.chord_of(i))
         });
         if !straight {
             for pair in knots.windows(2) {

@@ -22,6 +22,7 @@ pub(crate) use sliding::determinant_of_negative;
 
 use std::rc::Rc;
 
+use twofold_integrate::Extents;
 use twofold_num::elementary::rough_pow;
 use twofold_num::linear::solve_any;
 use twofold_num::{Dual, Short};
@@ -45,7 +46,8 @@ use crate::step::Step;
 /// Data recorded during a run.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Record {
-    /// The path, by points that a polyline through leaves by at most this distance.
+    /// The path, by points that a polyline through leaves by at most this distance, by less
+    /// of small states: [`Options::extents`].
     Path {
         /// The distance.
         chord: f64,
@@ -127,6 +129,8 @@ pub struct Options {
     pub max_steps: u64,
     /// Data to record.
     pub record: Record,
+    /// The extents of small states, to which a path keeps nearer.
+    pub extents: Extents,
     /// Side taken where the motion is not unique.
     pub exit: Exit,
     /// Integration method.
@@ -147,6 +151,7 @@ impl Default for Options {
             max_step: f64::INFINITY,
             max_steps: 400_000_000,
             record: Record::Path { chord: 1e-3 },
+            extents: Extents::default(),
             exit: Exit::Undecided,
             method: Method::Dopri5,
             intersection: Intersection::Undecided,
@@ -476,6 +481,8 @@ struct Follower<'a> {
     growth: Option<tangent::Growth>,
     /// The next multiple that is recorded.
     next_record: f64,
+    /// The small states as far as they have come.
+    extents: Extents,
     /// Room for values.
     scratch: Vec<f64>,
     scale: Vec<f64>,
@@ -854,6 +861,7 @@ impl<'a> Follower<'a> {
             tangents: None,
             growth: None,
             next_record: f64::INFINITY,
+            extents: options.extents.clone(),
             scratch: Vec::new(),
             scale: Vec::new(),
             room: Vec::new(),
@@ -1416,13 +1424,17 @@ impl<'a> Follower<'a> {
                 let mut farthest = 0.0_f64;
                 let few = [0.25, 0.5, 0.75];
                 let many: Vec<f64> = (1..16).map(|i| i as f64 / 16.0).collect();
+                self.extents.reach(&step.y);
                 let is_long = step.series.is_some() && step.multistep.is_none();
                 for &place in if is_long { &many[..] } else { &few } {
                     step.at(place, &mut at);
+                    self.extents.reach(&at);
                     let mut off = 0.0;
                     for i in 0..self.n {
                         let line = step.x[i] + place * (step.y[i] - step.x[i]);
-                        off += (at[i] - line) * (at[i] - line);
+                        let unit = self.extents.chord(i, chord) / chord;
+                        let gap = (at[i] - line) / unit;
+                        off += gap * gap;
                     }
                     farthest = farthest.max(off.sqrt());
                 }

@@ -34,6 +34,7 @@ pub mod delay;
 pub mod dopri5;
 pub mod driver;
 pub mod ensemble;
+pub mod extents;
 pub mod filippov;
 pub mod guard;
 pub mod layered;
@@ -51,6 +52,7 @@ mod tests;
 
 pub use dopri5::Dopri5;
 pub use driver::{DriveOptions, Ignore, Monitor, Observer, Summary, drive};
+pub use extents::Extents;
 pub use guard::Guarded;
 pub use layered::Layered;
 pub use lsoda::{Lsoda, LsodaOf};

@@ -20,7 +20,7 @@ use twofold_integrate::filippov::{
     self, AllModes, ExitRule, Faces, FilippovObserver, FilippovSummary, FunnelGrid, Mode, ModeEvent,
 };
 use twofold_integrate::{
-    DriveOptions, Flow, Monitor, Observer, Statistics, Step, StopReason, Summary,
+    DriveOptions, Extents, Flow, Monitor, Observer, Statistics, Step, StopReason, Summary,
 };
 use twofold_system::{Bound, BoundField, Field};
 
@@ -193,12 +193,19 @@ const PART: usize = 8192;
 struct Draining<'a, 'b, R, const D: usize> {
     recorder: R,
     aside: &'a mut Aside<'b, D>,
+    /// Extents of the first points, once there are enough of them, of a recorder that measures
+    /// distances by them.
+    extents: Option<Extents>,
 }
 
 /// Something that records and can forget.
 trait Recorder<const D: usize> {
     fn kept(&self) -> usize;
     fn take(&mut self) -> Data<D>;
+    /// The small states among the points that are kept, where that matters.
+    fn extents(&self) -> Extents {
+        Extents::default()
+    }
     /// Whether a step up to time `t` is to be given to it again: it was full before the step's end.
     fn is_behind(&self, _t: f64) -> bool {
         false
@@ -211,6 +218,9 @@ impl<const D: usize> Recorder<D> for PathRecorder<D> {
     }
     fn take(&mut self) -> Data<D> {
         Data::Path(PathRecorder::take(self))
+    }
+    fn extents(&self) -> Extents {
+        PathRecorder::extents(self)
     }
 }
 
@@ -242,6 +252,9 @@ impl<const D: usize> Recorder<D> for MotionRecorder<D> {
     fn take(&mut self) -> Data<D> {
         Data::Motion(MotionRecorder::take(self))
     }
+    fn extents(&self) -> Extents {
+        MotionRecorder::extents(self)
+    }
 }
 
 impl<const D: usize> Recorder<D> for TimedMotion<D> {
@@ -256,7 +269,34 @@ impl<const D: usize> Recorder<D> for TimedMotion<D> {
     }
 }
 
-impl<R: Recorder<D>, const D: usize> Draining<'_, '_, R, D> {
+/// A run whose path is recorded; again, finer, if a state turns out to be small among the first
+/// points, which are given away only then.
+fn path<'b, R: Recorder<D>, T, E, const D: usize>(
+    aside: &mut Aside<'b, D>,
+    recorder: impl Fn(Extents) -> R,
+    run: &mut dyn FnMut(&mut Draining<'_, 'b, R, D>) -> Result<T, E>,
+    stop: impl Fn(&T) -> StopReason,
+) -> Result<(T, R), E> {
+    let mut extents = None;
+    loop {
+        let again = extents.is_some();
+        let recorder = recorder(extents.clone().unwrap_or_default());
+        let mut draining = Draining { recorder, aside: &mut *aside, extents };
+        let end = run(&mut draining);
+        let interrupted = end.as_ref().is_ok_and(|end| stop(end) == StopReason::Cancelled);
+        let found = draining.extents.take().unwrap_or_else(|| draining.recorder.extents());
+        if again || interrupted || !found.has_small() {
+            return Ok((draining.kept_if_failed(end)?, draining.recorder));
+        }
+        extents = Some(found);
+    }
+}
+
+impl<'b, R: Recorder<D>, const D: usize> Draining<'_, 'b, R, D> {
+    fn new<'a>(recorder: R, aside: &'a mut Aside<'b, D>) -> Draining<'a, 'b, R, D> {
+        Draining { recorder, aside, extents: Some(Extents::default()) }
+    }
+
     /// Gives away what was recorded before a failure: it is right up to there.
     fn kept_if_failed<T, E>(&mut self, end: Result<T, E>) -> Result<T, E> {
         if end.is_err()
@@ -270,6 +310,12 @@ impl<R: Recorder<D>, const D: usize> Draining<'_, '_, R, D> {
     /// Gives points away if there are enough of them. Who keeps everything has no limit below that
     /// of memory.
     fn drained(&mut self, flow: Flow) -> Flow {
+        if self.extents.is_none() && self.recorder.kept() >= PART {
+            let extents = self.extents.insert(self.recorder.extents());
+            if extents.has_small() {
+                return Flow::Stop;
+            }
+        }
         if let Some(sink) = self.aside.sink.as_mut()
             && self.recorder.kept() >= PART
         {
@@ -457,23 +503,19 @@ fn watched<const D: usize>(
     };
     match spec.observe {
         Observation::Path { chord } => {
-            let mut draining = Draining { recorder: MotionRecorder::new(chord), aside };
-            let end = run(&mut draining);
-            let end = draining.kept_if_failed(end)?;
-            Ok(recording(Data::Motion(draining.recorder.into_motion()), end))
+            let recorder = |extents| MotionRecorder::new(chord).over(extents);
+            let (end, recorder) = path(aside, recorder, &mut |d| run(d), |end| end.stop)?;
+            Ok(recording(Data::Motion(recorder.into_motion()), end))
         }
         Observation::Times { every } => {
-            let mut draining = Draining {
-                recorder: TimedMotion::new(&start(spec), every).at_most(aside.most()),
-                aside,
-            };
+            let recorder = TimedMotion::new(&start(spec), every).at_most(aside.most());
+            let mut draining = Draining::new(recorder, aside);
             let end = run(&mut draining);
             let end = draining.kept_if_failed(end)?;
             Ok(recording(Data::Motion(draining.recorder.into_motion()), end))
         }
         Observation::Section { coordinate, value } => {
-            let mut draining =
-                Draining { recorder: SectionRecorder::new(coordinate, value), aside };
+            let mut draining = Draining::new(SectionRecorder::new(coordinate, value), aside);
             let end = run(&mut AllModes(&mut draining));
             let end = draining.kept_if_failed(end)?;
             Ok(recording(Data::Section(draining.recorder.into_crossings()), end))
@@ -581,22 +623,18 @@ fn observed<const D: usize, const N: usize>(
 ) -> Result<Recording<D>, JobError> {
     let (summary, data) = match spec.observe {
         Observation::Path { chord } => {
-            let mut draining =
-                Draining { recorder: PathRecorder::<D>::new(&x0, chord), aside: &mut *aside };
-            let end = run(&mut draining);
-            (draining.kept_if_failed(end)?, Data::Path(draining.recorder.into_samples()))
+            let recorder = |extents| PathRecorder::<D>::new(&x0, chord).over(extents);
+            let (end, recorder) = path(aside, recorder, &mut |d| run(d), |end| end.stop)?;
+            (end, Data::Path(recorder.into_samples()))
         }
         Observation::Times { every } => {
             let recorder = TimesRecorder::<D>::new(&x0, every).at_most(aside.most());
-            let mut draining = Draining { recorder, aside: &mut *aside };
+            let mut draining = Draining::new(recorder, aside);
             let end = run(&mut draining);
             (draining.kept_if_failed(end)?, Data::Path(draining.recorder.into_samples()))
         }
         Observation::Section { coordinate, value } => {
-            let mut draining = Draining {
-                recorder: SectionRecorder::<D>::new(coordinate, value),
-                aside: &mut *aside,
-            };
+            let mut draining = Draining::new(SectionRecorder::<D>::new(coordinate, value), aside);
             let end = run(&mut draining);
             (draining.kept_if_failed(end)?, Data::Section(draining.recorder.into_crossings()))
         }
@@ -815,6 +853,22 @@ mod tests {
             "{parts:?}"
         );
         assert!(rows == answer(&run, &()).unwrap().tables[0].rows());
+    }
+
+    /// An oscillation by 1e-4, by each switch: its top is among the points, which are given away
+    /// as they are kept.
+    #[test]
+    fn the_path_of_a_small_state_is_as_fine_as_that_of_a_large_one() {
+        for (switch, t_end) in switches().into_iter().flat_map(|s| [(s, 3.0), (s, 1500.0)]) {
+            let turning = cases::smooth(&["x", "v"], "x + 9", &["v", "-x"]);
+            let mut run = cases::run(turning, switch, t_end, Observation::Path { chord: 1e-3 });
+            run.start = vec![0.0, 1e-4];
+            let (_, rows, _) = in_parts(&run);
+            let table = answer(&run, &()).unwrap().tables.swap_remove(0);
+            assert!(format!("{rows:?}") == format!("{:?}", table.rows()));
+            let top = table.numbers("x").iter().fold(0.0, |a, b| f64::max(a, *b));
+            assert!((top - 1e-4).abs() < 2e-7, "{top}");
+        }
     }
 
     /// A kick is two points of a path at one time, as far from each other as it is large.
