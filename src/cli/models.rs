@@ -1,6 +1,6 @@
 //! Systems by name or file, as general ones.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::CliError;
 use crate::hybrid::data::BadTable;
@@ -9,7 +9,7 @@ use crate::hybrid::model::ModelError;
 use crate::hybrid::{Definition, Model};
 use crate::record::files::read_text;
 use crate::system::diagnostic::nearest;
-use crate::system::library;
+use crate::system::{Diagnostic, library};
 
 /// The system of this name, a general one or one with h, plus and minus read as such.
 ///
@@ -58,6 +58,33 @@ pub fn each_once(flag: &str, texts: &[String]) -> Result<(), CliError> {
     }
 }
 
+/// The definition in a system's file.
+fn definition(path: &Path, text: &str, name: &str) -> Result<Definition, Diagnostic> {
+    if is_json(path) {
+        Definition::from_json(text, name)
+    } else {
+        Definition::from_toml(text, name)
+    }
+}
+
+fn is_json(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"))
+}
+
+/// The files of tables that the system in a file reads; none if it cannot be understood, which its
+/// reader says.
+///
+/// # Errors
+/// If the system's file cannot be read.
+pub fn table_files(path: &Path) -> Result<Vec<PathBuf>, CliError> {
+    let text = read_text(path)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    Ok(definition(path, &text, "").map_or_else(
+        |_| Vec::new(),
+        |d| d.tables().iter().map(|(_, entry)| folder.join(&entry.file)).collect(),
+    ))
+}
+
 /// The general system of this name with parameters `set`, or with `any` also one with h, plus and
 /// minus, if there is one.
 ///
@@ -73,16 +100,10 @@ pub fn named(name: &str, set: &[String], any: bool) -> Result<Option<Model>, Cli
                 return Ok(None);
             }
             let text = read_text(path)?;
-            let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
-            if !any && !is_general(&text, json) {
+            if !any && !is_general(&text, is_json(path)) {
                 return Ok(None);
             }
-            let read = if json {
-                Definition::from_json(&text, name)
-            } else {
-                Definition::from_toml(&text, name)
-            };
-            (read, path.parent().map(|folder| (folder, text)))
+            (definition(path, &text, name), path.parent().map(|folder| (folder, text)))
         }
     };
     let wrong = |problem: String| CliError::Usage(format!("--system {name}: {problem}"));

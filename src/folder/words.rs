@@ -14,6 +14,7 @@ use crate::cli::CliError;
 use crate::cli::asked;
 use crate::cli::commands::{lyapunov, orbit, rests};
 use crate::cli::flags::{RunFlags, Use};
+use crate::cli::models::table_files;
 use crate::job::AnyQuestion;
 use crate::paper::plots::Recorded;
 use crate::system::diagnostic::nearest;
@@ -297,8 +298,18 @@ impl Said {
         let (Ok(whole), Ok(found)) = (root.canonicalize(), path.canonicalize()) else {
             return Err(wrong(format!("there is no system `{name}`")));
         };
-        if !found.starts_with(whole) {
+        let lies_outside = |file: &Path| !file.starts_with(&whole);
+        if lies_outside(&found) {
             return Err(wrong(format!("the system `{name}` does not lie in this folder")));
+        }
+        for table in table_files(&path).map_err(|e| self.refused(&e))? {
+            if table.canonicalize().is_ok_and(|file| lies_outside(&file)) {
+                return Err(self.wrong(
+                    Some("system"),
+                    format!("{}: a link that leads out of the paper's folder", table.display()),
+                    Some("put the file itself there".into()),
+                ));
+            }
         }
         Ok(path.display().to_string())
     }

@@ -604,6 +604,32 @@ fn a_reading_has_the_name_and_the_numbers_of_the_folder() {
     const FILES: Embedded = &[
         (
             "paper.toml",
+#[cfg(unix)]
+#[test]
+fn a_table_behind_a_link_is_refused() {
+    let place = small();
+    let root = place.path().join("p");
+    let measure = "\n[driven]\nrun = { system = \"systems/driven.toml\", t-end = 1 }\n";
+    let measures = fs::read_to_string(root.join("measures.toml")).unwrap();
+    fs::write(root.join("measures.toml"), measures + measure).unwrap();
+    let driven = "states = [\"x\"]\nstart = [0]\nf = [\"u\"]\n[tables.u]\nfile = \
+                  \"u.csv\"\ntime = \"t\"\ncolumn = \"u\"\n";
+    fs::write(root.join("systems/driven.toml"), driven).unwrap();
+    let table = root.join("systems/u.csv");
+    fs::write(&table, "t,u\n0,0\n1,1\n").unwrap();
+    assert_eq!(paper(&["make", "--quiet"], &root).0, 0);
+    // One that stays in the folder is followed.
+    fs::rename(&table, root.join("u.csv")).unwrap();
+    std::os::unix::fs::symlink("../u.csv", &table).unwrap();
+    assert_eq!(paper(&["make", "--quiet"], &root).0, 0);
+    fs::rename(root.join("u.csv"), place.path().join("u.csv")).unwrap();
+    fs::remove_file(&table).unwrap();
+    std::os::unix::fs::symlink("../../u.csv", &table).unwrap();
+    let (code, _, error) = paper(&["make", "--quiet"], &root);
+    let wanted = ["systems/u.csv: a link that leads out", "measures.toml:", "put the file itself"];
+    assert!(code == 2 && wanted.iter().all(|w| error.contains(w)), "{error}");
+}
+
             "format = 1
             title = 'A'
             authors = ['B']
