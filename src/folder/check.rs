@@ -201,6 +201,9 @@ pub struct Verdict {
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub rule_after_data: bool,
 }
+    /// Digest of the answers from the file's own start, if there are others.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub own_data: Option<Hash>,
 
 type Origin = Arc<(String, String)>;
 
@@ -213,6 +216,14 @@ impl Claim {
     ) -> Result<Self, FolderError> {
         let place = claim.span();
         let c = claim.into_inner();
+impl Verdict {
+    /// Whether it was found in the data of another one, whatever other starts gave.
+    pub fn has_data_of(&self, other: &Self) -> bool {
+        let own = |v: &Self| v.own_data.clone().unwrap_or_else(|| v.data.clone());
+        self.data == other.data || own(self) == own(other)
+    }
+}
+
         let wrong = |at: Range<usize>, why: String, help: String| {
             FolderError::at(origin, at, why, (!help.is_empty()).then_some(help))
         };
@@ -517,6 +528,8 @@ impl Claim {
                 match judged {
                     Ok((holds, _)) => hits += u64::from(holds),
                     Err(JobError::Interrupted) => return Err(JobError::Interrupted),
+        let digest = |hashes: &[String]| Hash::of(hashes.join("\n").as_bytes());
+        let own_data = self.odds.is_some().then(|| digest(&hashes));
                     // It does not hold of a run that cannot be scored.
                     Err(_) => failed += 1,
                 }
@@ -541,7 +554,8 @@ impl Claim {
             claim: self.id.clone(),
             rule: self.rule.clone(),
             decided: self.decided.clone(),
-            data: Hash::of(hashes.join("\n").as_bytes()),
+            data: digest(&hashes),
+            own_data,
             agrees,
             found,
             odds,

@@ -102,23 +102,31 @@ impl Folder {
     /// A claim that cannot be scored says so in the result.
     pub fn make(&self, executor: &Executor<'_>) -> Result<Made<'_>, CliError> {
         try_folder(&self.out())?;
+        let known = self.known()?;
         let mut asked: Vec<AnyQuestion> = questions(self.figures.iter().flat_map(|f| &f.pictures));
         for claim in &self.claims {
             asked.extend(claim.questions(self)?);
         }
         executor.gather(&asked);
         let pictures = make(&self.figures, &self.out(), executor)?;
-        let before = self.outcomes()?;
         let claims = self
             .claims
             .iter()
             .map(|claim| {
                 let verdict = claim.judge(self, executor).map(|mut found| {
-                    let known = before.verdicts.iter().find(|v| v.claim == claim.id);
                     // The data were known: was it by this rule that they were first judged?
-                    found.rule_after_data = known.is_some_and(|v| {
-                        v.data == found.data && (v.rule != found.rule || v.rule_after_data)
-                    });
+                    let mut judged: Vec<&Verdict> =
+                        known.verdicts.iter().filter(|v| v.has_data_of(&found)).collect();
+                    if known.verdicts.iter().any(|v| v.claim == claim.id) {
+                        judged.retain(|v| v.claim == claim.id);
+                    } else {
+                        // A claim that is renamed leaves its old name without one.
+                        judged.retain(|v| self.claims.iter().all(|c| c.id != v.claim));
+                    }
+                    found.rule_after_data = match judged.iter().find(|v| v.rule == found.rule) {
+                        Some(same) => same.rule_after_data,
+                        None => !judged.is_empty(),
+                    };
                     executor.progress().line(&format!("scored {}", claim.id));
                     found
                 });
@@ -318,6 +326,19 @@ impl Folder {
         if !path.exists() {
             return Ok(Outcomes::default());
         }
+    /// The outcomes that are expected, and those that were made last of claims without one.
+    fn known(&self) -> Result<Outcomes, CliError> {
+        let mut known = self.outcomes()?;
+        let path = self.out().join("claims.json");
+        // Another version's cannot be read.
+        let made = if path.exists() { serde_json::from_str(&read_text(&path)?).ok() } else { None };
+        let made: Outcomes = made.unwrap_or_default();
+        let expected = known.verdicts.clone();
+        let is_new = |v: &Verdict| expected.iter().all(|e| e.claim != v.claim);
+        known.verdicts.extend(made.verdicts.into_iter().filter(is_new));
+        Ok(known)
+    }
+
         let wrong = |why: String| {
             CliError::Usage(format!("{}: {why}; bless the paper anew", path.display()))
         };

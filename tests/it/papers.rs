@@ -136,6 +136,41 @@ fn a_rule_that_changes_after_its_data_is_said_to() {
     assert!(code == 2 && said.contains("two outcomes of claim period"), "{said}");
 }
 
+/// So it is of a claim that is renamed, of other odds, and before anything is expected.
+#[test]
+fn a_rule_that_changes_is_seen_by_its_data() {
+    let place = small();
+    let root = place.path().join("p");
+    let after = |claim: &str| {
+        let (code, out, said) = paper(&["make", "--quiet", "--json"], &root);
+        assert_eq!(code, 0, "{said}");
+        let all: serde_json::Value = serde_json::from_str(&out).unwrap();
+        let claims = all["claims"].as_array().unwrap();
+        let found = claims.iter().find(|c| c["claim"] == claim).expect(claim);
+        found["rule_after_data"].as_bool().unwrap()
+    };
+    assert!(!after("period"));
+    change(&root, "claims.toml", "within = 1e-6", "within = 1e-3");
+    assert!(after("period"));
+    fs::remove_dir_all(root.join("out")).unwrap();
+    assert!(!after("period"));
+    // A name alone is no rule.
+    change(&root, "claims.toml", "id = \"period\"", "id = \"cycle-time\"");
+    assert!(!after("cycle-time"));
+    change(&root, "claims.toml", "within = 1e-3", "within = 1e-2");
+    change(&root, "claims.toml", "id = \"cycle-time\"", "id = \"time\"");
+    assert!(after("time"));
+    fs::remove_dir_all(root.join("out")).unwrap();
+    let odds = "within = 1e-2\nodds = { starts = 2, spread = 1e-3, seed = 1 }";
+    change(&root, "claims.toml", "within = 1e-2", odds);
+    assert!(!after("time"));
+    change(&root, "claims.toml", "seed = 1", "seed = 2");
+    assert!(after("time"));
+    assert_eq!(paper(&["bless", "--reason", "first", "--quiet"], &root).0, 0);
+    let (code, out, _) = paper(&["check", "--quiet"], &root);
+    assert!(code == 0 && out.contains("time: same; its rule was changed"), "{out}");
+}
+
 /// A wrong value is found to be wrong, and exit codes tell a difference from a failure.
 #[test]
 fn a_claim_that_does_not_hold_differs() {
