@@ -5,6 +5,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
+use super::plots::Points;
 use super::verdict::{self, PanelVerdict, judge};
 use super::{Picture, View, drawing};
 use twofold_integrate::Statistics;
@@ -132,6 +133,12 @@ pub fn pixel_hash(pixels: &Pixels) -> Hash {
     Hash::of_parts([&pixels.width.to_le_bytes()[..], &pixels.height.to_le_bytes(), &pixels.rgba])
 }
 
+/// Numbers of the paper that are drawn over a panel.
+fn points_of<'a>(picture: &'a Picture, label: &str) -> Option<&'a Points> {
+    let View::Plots(plots) = &picture.view else { return None };
+    plots.plots.iter().find(|p| p.label == label)?.points.as_ref()
+}
+
 /// Questions of a picture's panels, label by label; a study's questions are named after their kind.
 pub(super) fn parts(picture: &Picture) -> Vec<(String, AnyQuestion)> {
     match &picture.view {
@@ -202,7 +209,8 @@ pub fn compute_with_tables(
         .map(|((label, question), answer)| PanelEntry {
             label: label.clone(),
             spec: question_hash(&**question),
-            data: answer.hash(),
+            data: points_of(picture, label)
+                .map_or_else(|| answer.hash(), |points| points.hash_over(&answer.hash())),
             verdict: verdicts.iter().find(|v| v.panel == *label).map(|v| VerdictEntry {
                 claim: v.claim_text.clone(),
                 found: v.found.clone(),

@@ -3,8 +3,10 @@
 
 use std::sync::Arc;
 
+use serde_json::json;
 use twofold_hybrid::motion::Record;
 use twofold_job::general::GeneralRun;
+use twofold_job::record::Hash;
 use twofold_job::spec::RunSpec;
 use twofold_job::{Answer, AnyQuestion, Run, Table};
 use twofold_render::markup;
@@ -85,6 +87,13 @@ pub struct Points {
 }
 
 impl Recorded {
+impl Points {
+    /// The hash of these points and of the data that they are drawn over.
+    pub(super) fn hash_over(&self, data: &Hash) -> Hash {
+        Hash::of_json(&json!({ "data": data, "points": self.points }))
+    }
+}
+
     /// The run as a question.
     pub fn question(&self) -> AnyQuestion {
         match self {
