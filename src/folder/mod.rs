@@ -419,6 +419,15 @@ impl Folder {
                 return Err(FolderError::Missing(format!(
                     "{}: a link, through which a foreign file could be written; remove it",
                     link.display()
+        let same = |one: &String, other: &String| one != other && one.eq_ignore_ascii_case(other);
+        let mut pairs = names.iter().flat_map(|one| names.iter().map(move |other| (one, other)));
+        if let Some((one, other)) = pairs.find(|(one, other)| same(one, other)) {
+            let why = format!(
+                "{part}/{one}.toml and {part}/{other}.toml differ in case alone, and are one file \
+                    on some machines: give one of them another name"
+            );
+            return Err(FolderError::Missing(why));
+        }
                 )));
             }
         }
@@ -963,8 +972,15 @@ fn one_file<'a>(
     let begins = |other: &&String| {
         name.get_ref().strip_prefix(other.as_str()).is_some_and(|end| end.starts_with('-'))
     };
-    let Some(other) = others.find(begins) else { return Ok(()) };
-    let why = format!("{of} `{}` begins with {of} `{other}` and -", name.get_ref());
+    let same = |other: &&String| {
+        *other != name.get_ref() && other.eq_ignore_ascii_case(name.get_ref().as_str())
+    };
+    let Some(other) = others.find(|other| begins(other) || same(other)) else { return Ok(()) };
+    let why = if same(&other) {
+        format!("{of} `{}` and {of} `{other}` differ in case alone", name.get_ref())
+    } else {
+        format!("{of} `{}` begins with {of} `{other}` and -", name.get_ref())
+    };
     let help = "their data would have files of one name; give it another".to_owned();
     Err(FolderError::at(origin, name.span(), why, Some(help)))
 }

@@ -38,6 +38,16 @@ impl Table {
         if header.is_empty() {
             return Err(BadTable::data(format!("{file} is empty")));
         }
+        let again = |i: &usize| header.iter().take(*i).position(|h| h == &header[*i]);
+        if let Some((first, second)) = (0..header.len()).find_map(|i| Some((again(&i)?, i))) {
+            let why = format!(
+                "{file}: columns {} and {} are both called `{}`",
+                first + 1,
+                second + 1,
+                &header[second]
+            );
+            return Err(BadTable { why, key: "file", help: "give each column a name of its own" });
+        }
         let column = |name: &str, key| {
             header.iter().position(|h| h == name).ok_or_else(|| {
                 let known: Vec<&str> = header.iter().collect();

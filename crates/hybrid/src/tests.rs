@@ -779,6 +779,7 @@ fn errors_of_tables_point_into_the_systems_file() {
     for (data, place, message, help) in [
         ("s,v\n0,1\n1,2", "6:8", "no column `t`; it has s, v", "first line"),
         ("t,u\n0,1\n1,2", "7:10", "no column `v`", "first line"),
+        ("t,v,v\n0,1,1\n1,2,9", "5:8", "w.csv: columns 2 and 3 are both called `v`", "its own"),
         ("t,v\n0,1\n1", "5:8", "w.csv, row 2: 1 cells for 2 columns", "rows of finite numbers"),
         ("t,v\n0,1\n1,a", "5:8", "row 2: `a` is not a finite number", "finite numbers"),
         ("t,v\n0,1\n0,2", "5:8", "row 2: the time 0 does not come after", "times increasing"),

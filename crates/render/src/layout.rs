@@ -197,8 +197,19 @@ fn height(panel: &SheetPanel, sheet: &Sheet, w: i32) -> i32 {
     }
 }
 
-fn plan_panels(sheet: &Sheet, inner: i32, margin: i32, y: &mut i32) -> Vec<(Rect, i32)> {
-    let columns = sheet.columns.clamp(1, sheet.panels.len().max(1));
+/// The smallest width of a drawing area.
+const SMALLEST_PT: f64 = 20.0;
+
+/// The width of a drawing area, and the room that each column of panels needs beside it.
+#[derive(Default)]
+struct Widths {
+    w: i32,
+    left: Vec<i32>,
+    right: Vec<i32>,
+}
+
+/// The widths of so many panels in a row, if there is room for them.
+fn widths(sheet: &Sheet, inner: i32, columns: usize) -> Option<Widths> {
     let gutter = units(style::GUTTER_PT);
     let rows: Vec<&[SheetPanel]> = sheet.panels.chunks(columns).collect();
     // Tick labels depend on the size of the drawing area and that on the room for tick labels: two
@@ -217,8 +228,27 @@ fn plan_panels(sheet: &Sheet, inner: i32, margin: i32, y: &mut i32) -> Vec<(Rect
             }
         }
         let taken: i32 = left.iter().chain(&right).sum();
-        w = ((inner - gutter * (columns as i32 - 1) - taken) / columns as i32).max(units(20.0));
+        w = (inner - gutter * (columns as i32 - 1) - taken) / columns as i32;
+        if w < units(SMALLEST_PT) && columns > 1 {
+            return None;
+        }
+        w = w.max(units(SMALLEST_PT));
     }
+    Some(Widths { w, left, right })
+}
+
+fn plan_panels(sheet: &Sheet, inner: i32, margin: i32, y: &mut i32) -> Vec<(Rect, i32)> {
+    let panels = sheet.panels.len().max(1);
+    let most = sheet.columns.clamp(1, panels);
+    let fit = (1..=most).rev().find(|columns| widths(sheet, inner, *columns).is_some());
+    // Panels for which there is no room stand in further rows, as many in each.
+    let columns = match fit {
+        Some(fit) if fit < most => panels.div_ceil(panels.div_ceil(fit)),
+        _ => most,
+    };
+    let Widths { w, left, right } = widths(sheet, inner, columns).unwrap_or_default();
+    let gutter = units(style::GUTTER_PT);
+    let rows: Vec<&[SheetPanel]> = sheet.panels.chunks(columns).collect();
     let mut places = Vec::new();
     for (r, row) in rows.iter().enumerate() {
         let h = row.iter().map(|p| height(p, sheet, w)).max().unwrap_or(0);
@@ -282,4 +312,28 @@ pub fn check_texts(sheet: &Sheet) -> Result<(), RenderError> {
         rich_text::set(text, FontFace::Regular)?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sheet::{Axis, ColumnWidth, PlanePanel};
+
+    #[test]
+    fn panels_without_room_in_a_row_stand_below() {
+        let rows = |columns: usize, value: f64| {
+            let mut sheet = Sheet::new(ColumnWidth::Wide, columns, "");
+            for _ in 0..6 {
+                let axis = || Axis::linear("*x*", -value, value);
+                sheet = sheet.panel("", "", PlanePanel::new(axis(), axis()));
+            }
+            let (inner, margin) = (units(270.0), units(6.0));
+            let places = plan_panels(&sheet, inner, margin, &mut 0);
+            assert!(places.iter().all(|(r, _)| r.x >= margin && r.x + r.w <= margin + inner));
+            let mut rows: Vec<i32> = places.iter().map(|(r, _)| r.y).collect();
+            rows.dedup();
+            rows.len()
+        };
+        assert_eq!((rows(6, 0.025), rows(3, 0.025), rows(2, 0.025)), (2, 2, 3));
+    }
 }

@@ -7,8 +7,8 @@ use twofold_job::table::Table;
 use twofold_render::markup;
 use twofold_render::number::number;
 use twofold_render::sheet::{
-    Axis, ColumnWidth, DotStyle, LegendEntry, LegendKey, LineStyle, MarkerShape, MarkerStyle,
-    PlanePanel, Sheet, SpacePanel,
+    Anchor, Axis, ColumnWidth, DotStyle, LegendEntry, LegendKey, LineStyle, MarkerShape,
+    MarkerStyle, PlanePanel, Sheet, SpacePanel,
 };
 use twofold_render::style;
 use twofold_system::System;
@@ -149,6 +149,15 @@ pub enum PlotError {
         /// Number of axes given.
         given: usize,
     },
+    /// Too many states.
+    #[error(
+        "a picture of kind series has at most sixteen panels, and the system has {states} states; \
+            choose some as its axes"
+    )]
+    Panels {
+        /// Number of the system's states.
+        states: usize,
+    },
     /// Too few states.
     #[error(
         "a picture of kind {kind} shows {wanted} states, and the system has {states}; choose \
@@ -184,8 +193,9 @@ pub fn axes(run: &Frame, kind: PictureKind, given: &[usize]) -> Result<Vec<usize
     match (kind, given.len()) {
         // A system's axes are horizontal, depth, vertical; of two panels in the plane the first and
         // the last of them.
-        (PictureKind::Series, 0) => Ok((0..n.min(MOST_PANELS)).collect()),
-        (PictureKind::Series, count) if count > MOST_PANELS => wrong("at most eight panels"),
+        (PictureKind::Series, 0) if n > MOST_PANELS => Err(PlotError::Panels { states: n }),
+        (PictureKind::Series, 0) => Ok((0..n).collect()),
+        (PictureKind::Series, count) if count > MOST_PANELS => wrong("at most sixteen panels"),
         (PictureKind::Plane, 0) if n < 2 => Err(few(2)),
         (PictureKind::Plane, 0) => {
             Ok(if suggested.len() == 2 { suggested.to_vec() } else { vec![others[0], others[1]] })
@@ -590,6 +600,10 @@ fn section(
             panel = surface_curve(panel, &level, ranges, &mut looks);
         }
     }
+    if t.is_empty() {
+        let middle = ranges.map(|(low, high)| 0.5 * (low + high));
+        panel = panel.note(middle, "no crossing", Anchor::Centre);
+    }
     let points = |late: bool| {
         (0..t.len()).filter(|i| (t[*i] > half) == late).map(|i| [xs[i], ys[i]]).collect::<Vec<_>>()
     };
@@ -623,7 +637,7 @@ fn exits(answer: &Answer, run: &Frame) -> Vec<Vec<f64>> {
 }
 
 /// Most panels of a series.
-const MOST_PANELS: usize = 8;
+const MOST_PANELS: usize = 16;
 /// h = 0 as a level in a series.
 const SURFACE_LEVEL: LineStyle = LineStyle::new(style::SOFT_INK, 0.6).dashed();
 /// The start of a path.
