@@ -190,6 +190,9 @@ pub struct Verdict {
     pub decided: String,
     /// Digest of the answers that were read.
     pub data: Hash,
+    /// Digest of the answers from the file's own start, if there are others.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub own_data: Option<Hash>,
     /// Whether the claim holds.
     pub agrees: bool,
     /// The finding.
@@ -201,9 +204,14 @@ pub struct Verdict {
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub rule_after_data: bool,
 }
-    /// Digest of the answers from the file's own start, if there are others.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub own_data: Option<Hash>,
+
+impl Verdict {
+    /// Whether it was found in the data of another one, whatever other starts gave.
+    pub fn has_data_of(&self, other: &Self) -> bool {
+        let own = |v: &Self| v.own_data.clone().unwrap_or_else(|| v.data.clone());
+        self.data == other.data || own(self) == own(other)
+    }
+}
 
 type Origin = Arc<(String, String)>;
 
@@ -216,14 +224,6 @@ impl Claim {
     ) -> Result<Self, FolderError> {
         let place = claim.span();
         let c = claim.into_inner();
-impl Verdict {
-    /// Whether it was found in the data of another one, whatever other starts gave.
-    pub fn has_data_of(&self, other: &Self) -> bool {
-        let own = |v: &Self| v.own_data.clone().unwrap_or_else(|| v.data.clone());
-        self.data == other.data || own(self) == own(other)
-    }
-}
-
         let wrong = |at: Range<usize>, why: String, help: String| {
             FolderError::at(origin, at, why, (!help.is_empty()).then_some(help))
         };
@@ -517,6 +517,8 @@ impl Verdict {
         let (mut agrees, mut found) = self.check.of(&answers).map_err(JobError::Other)?;
         let mut hashes: Vec<String> =
             answers.iter().map(|a| a.hash().as_str().to_owned()).collect();
+        let digest = |hashes: &[String]| Hash::of(hashes.join("\n").as_bytes());
+        let own_data = self.odds.is_some().then(|| digest(&hashes));
         let mut odds = None;
         if let Some(rule) = &self.odds {
             let (mut hits, mut failed) = (0, 0);
@@ -528,8 +530,6 @@ impl Verdict {
                 match judged {
                     Ok((holds, _)) => hits += u64::from(holds),
                     Err(JobError::Interrupted) => return Err(JobError::Interrupted),
-        let digest = |hashes: &[String]| Hash::of(hashes.join("\n").as_bytes());
-        let own_data = self.odds.is_some().then(|| digest(&hashes));
                     // It does not hold of a run that cannot be scored.
                     Err(_) => failed += 1,
                 }
@@ -880,40 +880,67 @@ fn states(table: &Table) -> Vec<&[f64]> {
 /// Points that lie within this part of their size are one, to the errors of a run.
 const ONE_POINT: f64 = 1e-6;
 
+/// A state that moves over less than this part of the largest extent is measured by its own.
+const LITTLE: f64 = 0.05;
+
+/// Such a state repeats itself if it comes back to within this part of its extent.
+const LITTLE_REPEATS: f64 = 1e-3;
+
 /// The same to rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// The largest extent of points along a state, and the largest size of a state.
-fn span_and_size(points: &[Vec<f64>]) -> (f64, f64) {
-    let along = |i: usize| {
-        let (low, high) = points
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(p[i]), b.max(p[i])));
-        (high - low, high.abs().max(low.abs()))
-    };
-    (0..points[0].len())
-        .map(along)
-        .fold((0.0, 0.0), |(a, b), (c, d)| (f64::max(a, c), f64::max(b, d)))
+/// Extents of points.
+struct Extents {
+    /// Along each state.
+    spans: Vec<f64>,
+    /// The largest of them.
+    span: f64,
+    /// The largest size of a state.
+    size: f64,
 }
 
-/// The length by which distances of points are measured.
-fn extent(points: &[Vec<f64>]) -> f64 {
-    let (span, size) = span_and_size(points);
-    // One point: its own size.
-    if span > ONE_POINT * size { span } else { size.max(f64::MIN_POSITIVE) }
+impl Extents {
+    fn of(points: &[Vec<f64>]) -> Self {
+        let along = |i: usize| {
+            points
+                .iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(p[i]), b.max(p[i])))
+        };
+        let ranges: Vec<(f64, f64)> = (0..points[0].len()).map(along).collect();
+        let spans: Vec<f64> = ranges.iter().map(|(low, high)| high - low).collect();
+        let span = spans.iter().copied().fold(0.0, f64::max);
+        let size = ranges.iter().fold(0.0, |most, (a, b)| f64::max(most, a.abs().max(b.abs())));
+        Self { spans, span, size }
+    }
+
+    /// The length by which distances of points are measured.
+    fn length(&self) -> f64 {
+        // One point: its own size.
+        if self.span > ONE_POINT * self.size { self.span } else { self.size.max(f64::MIN_POSITIVE) }
+    }
+
+    /// Units of the states: 1, but of one that moves little beside the largest, and by more than
+    /// errors, `small` of its extent.
+    fn units(&self, small: impl Fn(f64) -> f64) -> Vec<f64> {
+        let moves_little = |span: f64| span > ONE_POINT * self.size && span < LITTLE * self.span;
+        let unit = |span: &f64| if moves_little(*span) { small(*span) } else { 1.0 };
+        self.spans.iter().map(unit).collect()
+    }
 }
 
-fn distance(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).fold(0.0, |most, (a, b)| most.max((a - b).abs()))
+fn distance(a: &[f64], b: &[f64], units: &[f64]) -> f64 {
+    a.iter().zip(b).zip(units).fold(0.0, |most, ((a, b), unit)| most.max((a - b).abs() / unit))
 }
 
 /// After how many points a section repeats itself, if it does.
 fn period(points: &[Vec<f64>], within: f64) -> Option<usize> {
-    let (span, size) = span_and_size(points);
+    let extents = Extents::of(points);
+    let Extents { span, size, .. } = extents;
+    let units = extents.units(|own| (LITTLE_REPEATS * own / (within * span)).min(1.0));
     // At least three times around.
     let repeats = |near: f64| {
         (1..=LONGEST.min(points.len() / 3))
-            .find(|n| points.iter().zip(&points[*n..]).all(|(a, b)| distance(a, b) <= near))
+            .find(|n| points.iter().zip(&points[*n..]).all(|(a, b)| distance(a, b, &units) <= near))
     };
     if span <= ROUNDING * size {
         return repeats(within * size);
@@ -932,13 +959,15 @@ fn apart(a: &[Vec<f64>], b: &[Vec<f64>]) -> Result<f64, String> {
         points.iter().step_by(step).cloned().collect()
     };
     let (a, b) = (thin(a), thin(b));
+    let both: Vec<Vec<f64>> = a.iter().chain(&b).cloned().collect();
+    let extents = Extents::of(&both);
+    let units = extents.units(|own| own / extents.span);
     let one_way = |from: &[Vec<f64>], to: &[Vec<f64>]| {
         from.iter()
-            .map(|p| to.iter().map(|q| distance(p, q)).fold(f64::INFINITY, f64::min))
+            .map(|p| to.iter().map(|q| distance(p, q, &units)).fold(f64::INFINITY, f64::min))
             .fold(0.0, f64::max)
     };
-    let both: Vec<Vec<f64>> = a.iter().chain(&b).cloned().collect();
-    Ok(one_way(&a, &b).max(one_way(&b, &a)) / extent(&both))
+    Ok(one_way(&a, &b).max(one_way(&b, &a)) / extents.length())
 }
 
 /// Points of a section that are compared with another one's.
@@ -985,6 +1014,21 @@ mod tests {
         assert!(apart(&a, &b).unwrap() < 0.02);
         let moved: Vec<Vec<f64>> = b.iter().map(|p| vec![p[0] + 1.0, p[1]]).collect();
         assert!((apart(&a, &moved).unwrap() - 1.0 / 3.0).abs() < 0.02);
+    }
+
+    /// A state that moves little beside another one counts as much; one that moves by errors not.
+    #[test]
+    fn each_state_is_measured_by_its_own_extent() {
+        let points = |z: &dyn Fn(f64) -> f64| -> Vec<Vec<f64>> {
+            (0..64).map(|i| vec![1000.0 * f64::from(i % 2), z(f64::from(i))]).collect()
+        };
+        assert_eq!(apart(&points(&|_| 1.0), &points(&|_| 2.0)), Ok(1.0));
+        let noisy = |i: f64| 1.0 + 1e-4 * (i * i).sin();
+        assert!(apart(&points(&|_| 1.0), &points(&noisy)).unwrap() < 1e-6);
+        assert_eq!(period(&points(&|_| 1.0), 1e-6), Some(2));
+        assert_eq!(period(&points(&noisy), 1e-6), Some(2));
+        assert_eq!(period(&points(&|i| 0.01 * (i % 4.0)), 1e-3), Some(4));
+        assert_eq!(period(&points(&|i| 0.01 * (i % 4.0) + 1e-6 * (i * i).sin()), 1e-3), Some(4));
     }
 
     #[test]
