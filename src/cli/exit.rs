@@ -146,18 +146,18 @@ fn advice(error: &FileError) -> &'static str {
         return "";
     }
     match error.source.kind() {
-        io::ErrorKind::PermissionDenied => "; choose a place you may write to with --out",
+        io::ErrorKind::PermissionDenied => "; choose a place you may write to",
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded | io::ErrorKind::FileTooLarge => {
-            "; free some space or choose another place with --out"
+            "; free some space or choose another place"
         }
-        io::ErrorKind::ReadOnlyFilesystem => "; choose a writable place with --out",
+        io::ErrorKind::ReadOnlyFilesystem => "; choose a writable place",
         io::ErrorKind::NotADirectory | io::ErrorKind::AlreadyExists => {
-            "; a part of this path is a file, choose another place with --out"
+            "; a part of this path is a file, choose another place"
         }
         _ if error.action.starts_with("find") => {
             "; something else removed or changed it meanwhile: run this again"
         }
-        _ => "; choose another place with --out",
+        _ => "; choose another place",
     }
 }
 
@@ -197,7 +197,7 @@ mod tests {
         assert!(error("write", io::ErrorKind::StorageFull).contains("free some space"));
         assert!(
             error("write", io::ErrorKind::NotADirectory)
-                .contains("is a file, choose another place with --out")
+                .contains("is a file, choose another place")
         );
         assert!(!error("read", io::ErrorKind::PermissionDenied).contains("--out"));
         assert!(error("find again", io::ErrorKind::NotFound).contains("run this again"));

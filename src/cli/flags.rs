@@ -914,6 +914,14 @@ impl RunFlags {
         }
     }
 
+    /// Refuses a system that is not there, or a value that it does not have.
+    ///
+    /// # Errors
+    /// If it is so.
+    pub fn check_system(&self) -> Result<(), CliError> {
+        Ok(self.described_system().map(|_| ())?)
+    }
+
     fn described_system(&self) -> Result<System, Misuse> {
         let name = self.system_name();
         let mut system = match System::builtin(name) {

@@ -157,6 +157,7 @@ pub fn run_of(flags: &RunFlags) -> Result<Option<GeneralRun>, CliError> {
 pub fn looked_at(flags: &RunFlags, period: Option<f64>) -> Result<Option<GeneralRun>, CliError> {
     let Some(mut run) = run_of(flags)? else {
         if period.is_some() {
+            flags.check_system()?;
             let why = "equations with h, plus and minus do not see the time; leave it out, and \
                 give --section";
             return Err(CliError::no_effect("--period", why));

@@ -76,6 +76,17 @@ pub struct ClaimFile {
     odds: Option<Spanned<OddsFile>>,
 }
 
+/// A name with its place.
+type Name = Spanned<String>;
+
+impl ClaimFile {
+    /// The column that it reads with its table, and the panels or measures whose it is.
+    pub(super) fn column(&self) -> Option<(Name, Option<Name>, Vec<Name>)> {
+        let of = std::iter::once(&self.of).chain(&self.and).cloned().collect();
+        Some((self.column.clone()?, self.table.clone(), of))
+    }
+}
+
 /// Repetitions of a check.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
@@ -682,12 +693,7 @@ impl Read {
                 }
             }
             Read::Column { table, column, take } => {
-                let table = match table {
-                    Some(name) => answer
-                        .table(name)
-                        .ok_or_else(|| format!("the answer has no table \"{name}\""))?,
-                    None => answer.tables.first().ok_or("the answer has no table")?,
-                };
+                let table = crate::paper::plots::table(answer, table.as_deref())?;
                 let values = crate::paper::plots::column(table, column)?;
                 // Blank cells are no numbers.
                 let numbers: Vec<f64> = values.iter().copied().filter(|v| !v.is_nan()).collect();

@@ -108,6 +108,12 @@ impl Folder {
             asked.extend(claim.questions(self)?);
         }
         executor.gather(&asked);
+        for read in &self.columns {
+            // Why one failed is said with its picture or claim.
+            if let Ok(answer) = executor.ask(&*read.question) {
+                read.check(&answer)?;
+            }
+        }
         let pictures = make(&self.figures, &self.out(), executor)?;
         let claims = self
             .claims
@@ -320,12 +326,6 @@ impl Folder {
         Ok(Some(Manifest::parse(&read_text(&path)?, &path.display().to_string())?))
     }
 
-    /// The outcomes that are expected.
-    fn outcomes(&self) -> Result<Outcomes, CliError> {
-        let path = self.expected().join("claims.json");
-        if !path.exists() {
-            return Ok(Outcomes::default());
-        }
     /// The outcomes that are expected, and those that were made last of claims without one.
     fn known(&self) -> Result<Outcomes, CliError> {
         let mut known = self.outcomes()?;
@@ -339,6 +339,12 @@ impl Folder {
         Ok(known)
     }
 
+    /// The outcomes that are expected.
+    fn outcomes(&self) -> Result<Outcomes, CliError> {
+        let path = self.expected().join("claims.json");
+        if !path.exists() {
+            return Ok(Outcomes::default());
+        }
         let wrong = |why: String| {
             CliError::Usage(format!("{}: {why}; bless the paper anew", path.display()))
         };

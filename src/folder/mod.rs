@@ -30,10 +30,10 @@ use serde::de::DeserializeOwned;
 use toml::Spanned;
 
 use crate::cli::flags::Use;
-use crate::job::AnyQuestion;
 use crate::job::spec::RunSpec;
+use crate::job::{Answer, AnyQuestion};
 use crate::paper::draw::plot::{self, Look, PictureKind};
-use crate::paper::plots::{Columns, Drawing, Plot, Plots, Points, Recorded};
+use crate::paper::plots::{self, Columns, Drawing, Plot, Plots, Points, Recorded};
 use crate::paper::verdict::Claim as PanelClaim;
 use crate::paper::{Camera, Figure, FigurePanel, ParameterReading, Picture, Repeats, View};
 use crate::record::FileError;
@@ -79,6 +79,36 @@ pub struct Folder {
     pub sources: BTreeMap<String, Source>,
     /// Its claims.
     pub claims: Vec<Claim>,
+    /// The columns that figures and claims read.
+    columns: Vec<ReadColumns>,
+}
+
+/// Columns of an answer's table that a file names.
+#[derive(Clone, Debug)]
+struct ReadColumns {
+    origin: Origin,
+    question: AnyQuestion,
+    /// The table [default: the first].
+    table: Option<Spanned<String>>,
+    columns: Vec<Spanned<String>>,
+}
+
+impl ReadColumns {
+    /// Refuses a name that the answer does not have.
+    fn check(&self, answer: &Answer) -> Result<(), FolderError> {
+        let wrong = |name: &Spanned<String>, why: String| {
+            let (why, help) = why.split_once("; ").unwrap_or((&why, ""));
+            let help = (!help.is_empty()).then(|| help.to_owned());
+            FolderError::at(&self.origin, name.span(), why, help)
+        };
+        for name in &self.columns {
+            let at = self.table.as_ref().unwrap_or(name);
+            let table = plots::table(answer, self.table.as_ref().map(|t| t.get_ref().as_str()))
+                .map_err(|why| wrong(at, why))?;
+            plots::column(table, name.get_ref()).map_err(|why| wrong(name, why))?;
+        }
+        Ok(())
+    }
 }
 
 /// A source of numbers for claims.
@@ -205,7 +235,7 @@ struct PanelFile {
     /// The horizontal column.
     x: Option<Spanned<String>>,
     /// The vertical columns.
-    y: Option<Spanned<Vec<String>>>,
+    y: Option<Spanned<Vec<Spanned<String>>>>,
     /// Dots instead of a line.
     dots: Option<Spanned<bool>>,
     /// Titles of the two axes of columns [default: the columns' names].
@@ -389,6 +419,15 @@ impl Files {
             names.push(name);
         }
         names.sort();
+        let same = |one: &String, other: &String| one != other && one.eq_ignore_ascii_case(other);
+        let mut pairs = names.iter().flat_map(|one| names.iter().map(move |other| (one, other)));
+        if let Some((one, other)) = pairs.find(|(one, other)| same(one, other)) {
+            let why = format!(
+                "{part}/{one}.toml and {part}/{other}.toml differ in case alone, and are one file \
+                    on some machines: give one of them another name"
+            );
+            return Err(FolderError::Missing(why));
+        }
         Ok(names)
     }
 
@@ -419,15 +458,6 @@ impl Folder {
                 return Err(FolderError::Missing(format!(
                     "{}: a link, through which a foreign file could be written; remove it",
                     link.display()
-        let same = |one: &String, other: &String| one != other && one.eq_ignore_ascii_case(other);
-        let mut pairs = names.iter().flat_map(|one| names.iter().map(move |other| (one, other)));
-        if let Some((one, other)) = pairs.find(|(one, other)| same(one, other)) {
-            let why = format!(
-                "{part}/{one}.toml and {part}/{other}.toml differ in case alone, and are one file \
-                    on some machines: give one of them another name"
-            );
-            return Err(FolderError::Missing(why));
-        }
                 )));
             }
         }
@@ -467,6 +497,7 @@ impl Folder {
             shows: Vec::new(),
             sources: BTreeMap::new(),
             claims: Vec::new(),
+            columns: Vec::new(),
             about,
             common: origin,
         };
@@ -753,7 +784,7 @@ impl Folder {
     }
 
     fn plot(
-        &self,
+        &mut self,
         origin: &Origin,
         panel: &PanelFile,
         place: Range<usize>,
@@ -776,11 +807,17 @@ impl Folder {
                 let why = format!("{} names for {} columns", names.len(), y.len());
                 return Err(wrong(given.span(), why, "give one for each of y"));
             }
-            let source = self.source(origin, of)?;
+            let question = self.source(origin, of)?.question.clone();
+            self.columns.push(ReadColumns {
+                origin: origin.clone(),
+                question: question.clone(),
+                table: panel.table.clone(),
+                columns: std::iter::once(x).chain(y).cloned().collect(),
+            });
             let columns = Columns {
                 table: panel.table.as_ref().map(|t| t.get_ref().clone()),
                 x: x.get_ref().clone(),
-                y: y.clone(),
+                y: y.iter().map(|name| name.get_ref().clone()).collect(),
                 dots: panel.dots.as_ref().is_some_and(|d| *d.get_ref()),
                 labels: panel.labels.as_ref().map(|l| l.get_ref().clone()),
                 names,
@@ -788,7 +825,7 @@ impl Folder {
             return Ok(Plot {
                 label: panel.label.get_ref().clone(),
                 title: panel.title.clone(),
-                question: source.question.clone(),
+                question,
                 drawing: Drawing::Columns(columns),
                 points,
             });
@@ -896,8 +933,18 @@ impl Folder {
                 let why = format!("there are two claims `{}`", claim.get_ref().id.get_ref());
                 return Err(FolderError::at(&origin, claim.get_ref().id.span(), why, None));
             }
+            let read = claim.get_ref().column();
             let claim = Claim::read(&origin, claim, &|name| self.source(&origin, name))?;
             self.claims.push(claim);
+            let Some((column, table, of)) = read else { continue };
+            for name in of {
+                self.columns.push(ReadColumns {
+                    origin: origin.clone(),
+                    question: self.source(&origin, &name)?.question.clone(),
+                    table: table.clone(),
+                    columns: vec![column.clone()],
+                });
+            }
         }
         Ok(())
     }

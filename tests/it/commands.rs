@@ -133,6 +133,11 @@ fn pictures_that_cannot_be_are_refused_with_reasons() {
         &["other.csv", "twofold run"],
     );
     refused(at, &["plot", "--out", "other.csv/a.png"], 2, &["other.csv", "is a file"]);
+    let sweep =
+        "sweep --quiet --system bouncing-ball --t-end 2 --over params.r=0.5,0.9 --out s.csv";
+    good(at, &sweep.split(' ').collect::<Vec<_>>());
+    refused(at, &["plot", "--from", "s.csv", "--out", "a.png"], 2, &["s.csv: it is a sweep"]);
+    fs::remove_file(at.join("s.csv")).unwrap();
     assert_eq!(fs::read_dir(at).unwrap().count(), 1, "something was written");
 }
 
@@ -281,6 +286,7 @@ fn orbits_and_exponents_say_what_is_wrong() {
         refused(at, &[&["orbit", "--quiet"][..], more].concat(), code, expected);
     };
     orbit(&[], 2, &["--section, such as y=0"]);
+    orbit(&["--system", "nope.toml", "--period", "3"], 2, &["nope.toml", "No such file"]);
     orbit(&["--section", "y=0", "--t-end", "5"], 2, &["--t-end has no effect", "--settle"]);
     orbit(&["--section", "y=0", "--along", "alpha"], 2, &["no \"=\"", "alpha=0.1..0.2:40"]);
     orbit(&["--section", "y=0", "--along", "alhpa=1..2"], 2, &["alhpa", "did you mean `alpha`?"]);

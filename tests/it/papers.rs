@@ -528,6 +528,69 @@ fn what_is_wrong_in_a_folder_is_said_with_its_place() {
     }
 }
 
+#[test]
+fn names_that_differ_in_case_alone_are_refused() {
+    let place = small();
+    let root = place.path().join("p");
+    change(&root, "figures/fig1.toml", "label = \"b\"", "label = \"A\"");
+    let (code, _, said) = paper(&["make", "--quiet"], &root);
+    assert!(code == 2 && said.contains("panel `a` and panel `A` differ in case"), "{said}");
+    change(&root, "figures/fig1.toml", "label = \"A\"", "label = \"b\"");
+    fs::copy(root.join("figures/fig1.toml"), root.join("figures/Fig1.toml")).unwrap();
+    // Where they are one file there is nothing to refuse.
+    if fs::read_dir(root.join("figures")).unwrap().count() == 2 {
+        let (code, _, said) = paper(&["make", "--quiet"], &root);
+        assert!(code == 2 && said.contains("figures/Fig1.toml and figures/fig1.toml"), "{said}");
+    }
+}
+
+/// Points of the paper are data of a picture, though their marker may not move by a pixel.
+#[test]
+fn points_are_part_of_the_data() {
+    let place = small();
+    let root = place.path().join("p");
+    let text = fs::read_to_string(root.join("figures/fig1.toml")).unwrap();
+    let points = "\npoints = { name = \"paper\", file = \"p.csv\" }\n";
+    fs::write(root.join("figures/fig1.toml"), text + points).unwrap();
+    fs::write(root.join("p.csv"), "t,x\n3,0.05\n").unwrap();
+    assert_eq!(paper(&["bless", "--reason", "first", "--quiet"], &root).0, 0);
+    assert_eq!(paper(&["check", "--quiet"], &root).0, 0);
+    fs::write(root.join("p.csv"), "t,x\n3,0.05000001\n").unwrap();
+    let (code, out, _) = paper(&["check", "--quiet"], &root);
+    assert!(code == 1 && out.contains("fig1: DIFFERS in its data (panel b)"), "{out}");
+}
+
+/// A column that the answer does not have is named with its place and those that there are.
+#[test]
+fn a_misspelt_column_has_a_place() {
+    let panel = "[[panel]]\nlabel = \"c\"\ndraw = \"columns\"\nof = \"fig1/a\"\nx = \"t\"\ny = \
+                 [\"x\", \"xx\"]\n[[panel]]\nlabel = \"b\"";
+    let claim = "check = \"value\"\nof = \"fig1/a\"\ncolumn = \"y\"\ntake = \"max\"\nequals = \
+                 1\nwithin = 1";
+    let table = claim.replace("\"y\"", "\"x\"\ntable = \"paht\"");
+    for (file, from, to, said) in [
+        (
+            "figures/fig1.toml",
+            "[[panel]]\nlabel = \"b\"",
+            panel,
+            ["no column of numbers \"xx\"", "fig1.toml:17:11", "it has t, x"],
+        ),
+        (
+            "claims.toml",
+            VALUE,
+            claim,
+            ["column of numbers \"y\"", "claims.toml:9:10", "it has t, x"],
+        ),
+        ("claims.toml", VALUE, &table, ["no table \"paht\"", "claims.toml:10:9", "it has path"]),
+    ] {
+        let place = small();
+        let root = place.path().join("p");
+        change(&root, file, from, to);
+        let (code, _, error) = paper(&["make", "--quiet"], &root);
+        assert!(code == 2 && said.iter().all(|s| error.contains(s)), "{to}: {code} {error}");
+    }
+}
+
 /// A link that leads out of the folder is not followed.
 #[cfg(unix)]
 #[test]
@@ -539,6 +602,32 @@ fn a_system_behind_a_link_is_refused() {
     std::os::unix::fs::symlink(&outside, root.join("systems/relay.toml")).unwrap();
     let (code, _, error) = paper(&["make", "--quiet"], &root);
     assert!(code == 2 && error.contains("does not lie in this folder"), "{error}");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_table_behind_a_link_is_refused() {
+    let place = small();
+    let root = place.path().join("p");
+    let measure = "\n[driven]\nrun = { system = \"systems/driven.toml\", t-end = 1 }\n";
+    let measures = fs::read_to_string(root.join("measures.toml")).unwrap();
+    fs::write(root.join("measures.toml"), measures + measure).unwrap();
+    let driven = "states = [\"x\"]\nstart = [0]\nf = [\"u\"]\n[tables.u]\nfile = \
+                  \"u.csv\"\ntime = \"t\"\ncolumn = \"u\"\n";
+    fs::write(root.join("systems/driven.toml"), driven).unwrap();
+    let table = root.join("systems/u.csv");
+    fs::write(&table, "t,u\n0,0\n1,1\n").unwrap();
+    assert_eq!(paper(&["make", "--quiet"], &root).0, 0);
+    // One that stays in the folder is followed.
+    fs::rename(&table, root.join("u.csv")).unwrap();
+    std::os::unix::fs::symlink("../u.csv", &table).unwrap();
+    assert_eq!(paper(&["make", "--quiet"], &root).0, 0);
+    fs::rename(root.join("u.csv"), place.path().join("u.csv")).unwrap();
+    fs::remove_file(&table).unwrap();
+    std::os::unix::fs::symlink("../../u.csv", &table).unwrap();
+    let (code, _, error) = paper(&["make", "--quiet"], &root);
+    let wanted = ["systems/u.csv: a link that leads out", "measures.toml:", "put the file itself"];
+    assert!(code == 2 && wanted.iter().all(|w| error.contains(w)), "{error}");
 }
 
 /// Words of a paper reach its page as text.
@@ -639,32 +728,6 @@ fn a_reading_has_the_name_and_the_numbers_of_the_folder() {
     const FILES: Embedded = &[
         (
             "paper.toml",
-#[cfg(unix)]
-#[test]
-fn a_table_behind_a_link_is_refused() {
-    let place = small();
-    let root = place.path().join("p");
-    let measure = "\n[driven]\nrun = { system = \"systems/driven.toml\", t-end = 1 }\n";
-    let measures = fs::read_to_string(root.join("measures.toml")).unwrap();
-    fs::write(root.join("measures.toml"), measures + measure).unwrap();
-    let driven = "states = [\"x\"]\nstart = [0]\nf = [\"u\"]\n[tables.u]\nfile = \
-                  \"u.csv\"\ntime = \"t\"\ncolumn = \"u\"\n";
-    fs::write(root.join("systems/driven.toml"), driven).unwrap();
-    let table = root.join("systems/u.csv");
-    fs::write(&table, "t,u\n0,0\n1,1\n").unwrap();
-    assert_eq!(paper(&["make", "--quiet"], &root).0, 0);
-    // One that stays in the folder is followed.
-    fs::rename(&table, root.join("u.csv")).unwrap();
-    std::os::unix::fs::symlink("../u.csv", &table).unwrap();
-    assert_eq!(paper(&["make", "--quiet"], &root).0, 0);
-    fs::rename(root.join("u.csv"), place.path().join("u.csv")).unwrap();
-    fs::remove_file(&table).unwrap();
-    std::os::unix::fs::symlink("../../u.csv", &table).unwrap();
-    let (code, _, error) = paper(&["make", "--quiet"], &root);
-    let wanted = ["systems/u.csv: a link that leads out", "measures.toml:", "put the file itself"];
-    assert!(code == 2 && wanted.iter().all(|w| error.contains(w)), "{error}");
-}
-
             "format = 1
             title = 'A'
             authors = ['B']

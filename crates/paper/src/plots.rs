@@ -8,6 +8,7 @@ use twofold_hybrid::motion::Record;
 use twofold_job::general::GeneralRun;
 use twofold_job::record::Hash;
 use twofold_job::spec::RunSpec;
+use twofold_job::table::Cells;
 use twofold_job::{Answer, AnyQuestion, Run, Table};
 use twofold_render::markup;
 use twofold_render::sheet::{
@@ -86,7 +87,6 @@ pub struct Points {
     pub points: Vec<[f64; 2]>,
 }
 
-impl Recorded {
 impl Points {
     /// The hash of these points and of the data that they are drawn over.
     pub(super) fn hash_over(&self, data: &Hash) -> Hash {
@@ -94,6 +94,7 @@ impl Points {
     }
 }
 
+impl Recorded {
     /// The run as a question.
     pub fn question(&self) -> AnyQuestion {
         match self {
@@ -218,13 +219,7 @@ impl Plot {
 
 impl Columns {
     fn sheet(&self, answer: &Answer) -> Result<Sheet, String> {
-        let table = match &self.table {
-            Some(name) => answer.table(name).ok_or_else(|| {
-                let known: Vec<&str> = answer.tables.iter().map(|t| t.name.as_str()).collect();
-                format!("the answer has no table \"{name}\"; it has {}", listed(&known))
-            })?,
-            None => answer.tables.first().ok_or("the answer has no table")?,
-        };
+        let table = table(answer, self.table.as_deref())?;
         let x = column(table, &self.x)?;
         let ys = self.y.iter().map(|name| column(table, name)).collect::<Result<Vec<_>, _>>()?;
         let [horizontal, vertical] = match &self.labels {
@@ -266,6 +261,20 @@ impl Columns {
     }
 }
 
+/// The table of this name, or the first one.
+///
+/// # Errors
+/// If the answer has none: its name, and those that there are.
+pub fn table<'a>(answer: &'a Answer, name: Option<&str>) -> Result<&'a Table, String> {
+    let Some(name) = name else {
+        return answer.tables.first().ok_or_else(|| "the answer has no table".into());
+    };
+    answer.table(name).ok_or_else(|| {
+        let known: Vec<&str> = answer.tables.iter().map(|t| t.name.as_str()).collect();
+        format!("the answer has no table \"{name}\"; it has {}", listed(&known))
+    })
+}
+
 /// A column of numbers.
 ///
 /// # Errors
@@ -280,7 +289,9 @@ pub fn column<'a>(table: &'a Table, name: &str) -> Result<std::borrow::Cow<'a, [
         // Counts: far below 2^53.
         return Ok(integers.iter().map(|i| *i as f64).collect::<Vec<_>>().into());
     }
-    let known: Vec<&str> = table.columns.iter().map(|c| c.name.as_str()).collect();
+    let is_number = |c: &&twofold_job::Column| !matches!(c.cells, Cells::Words(_));
+    let known: Vec<&str> =
+        table.columns.iter().filter(is_number).map(|c| c.name.as_str()).collect();
     Err(format!(
         "table \"{}\" has no column of numbers \"{name}\"; it has {}",
         table.name,

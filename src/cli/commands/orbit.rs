@@ -112,6 +112,7 @@ impl Arguments {
     /// The question about a system with h, plus and minus.
     fn of_surfaces(&self) -> Result<ClosedOrbit, CliError> {
         if self.period.is_some() {
+            self.flags.check_system()?;
             let why = "equations with h, plus and minus do not see the time; leave it out, and \
                 give --section";
             return Err(CliError::no_effect("--period", why));

@@ -334,6 +334,10 @@ fn recorded(file: &Path) -> Result<(RunSpec, Answer), CliError> {
         ))
     };
     let bytes = record::files::read(file)?;
+    let end = String::from_utf8_lossy(&bytes[bytes.len().saturating_sub(1 << 16)..]);
+    if end.contains("\"format\":\"twofold-sweep\"") {
+        return Err(wrong("it is a sweep, whose rows are runs' ends and no path".into()));
+    }
     let (about, answer) = if bytes.first() == Some(&b'{') {
         encode::from_json(&bytes).map_err(|e| wrong(e.to_string()))?
     } else {
@@ -349,7 +353,7 @@ fn recorded(file: &Path) -> Result<(RunSpec, Answer), CliError> {
         let name = question["system"]["name"].as_str().unwrap_or("FILE");
         return Err(CliError::Usage(format!(
             "--from {}: the run of a general system is drawn from the system itself: twofold plot \
-                --system {name}",
+                --system {name}, and the flags of the run",
             file.display()
         )));
     }
