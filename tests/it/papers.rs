@@ -567,7 +567,7 @@ fn a_misspelt_column_has_a_place() {
                  [\"x\", \"xx\"]\n[[panel]]\nlabel = \"b\"";
     let claim = "check = \"value\"\nof = \"fig1/a\"\ncolumn = \"y\"\ntake = \"max\"\nequals = \
                  1\nwithin = 1";
-    let table = claim.replace("\"y\"", "\"x\"\ntable = \"paht\"");
+    let table = claim.replace("\"y\"", "\"x\"\ntable = \"pathway\"");
     for (file, from, to, said) in [
         (
             "figures/fig1.toml",
@@ -581,7 +581,7 @@ fn a_misspelt_column_has_a_place() {
             claim,
             ["column of numbers \"y\"", "claims.toml:9:10", "it has t, x"],
         ),
-        ("claims.toml", VALUE, &table, ["no table \"paht\"", "claims.toml:10:9", "it has path"]),
+        ("claims.toml", VALUE, &table, ["no table \"pathway\"", "claims.toml:10:9", "it has path"]),
     ] {
         let place = small();
         let root = place.path().join("p");
