@@ -52,10 +52,22 @@ pub fn span(axis: &Axis) -> Span {
 fn ticks_of(axis: &Axis, span: Span, length: i32, spacing: f64) -> Ticks {
     let wanted = (f64::from(length) / (spacing * f64::from(UNITS_PER_POINT))).max(2.0);
     if axis.logarithmic {
-        ticks::logarithmic(elementary::exp10(span.lower), elementary::exp10(span.upper), wanted)
-    } else {
-        ticks::linear(span.lower, span.upper, wanted)
+        return ticks::logarithmic(
+            elementary::exp10(span.lower),
+            elementary::exp10(span.upper),
+            wanted,
+        );
     }
+    let ticks = ticks::linear(span.lower, span.upper, wanted);
+    // One labelled tick is no scale.
+    if ticks.major.len() < 2 { ticks::linear(span.lower, span.upper, 2.0 * wanted) } else { ticks }
+}
+
+/// The format of an axis' title, smaller if there is not so much room.
+fn title_format(title: &str, room: i32) -> TextFormat {
+    let width = text_width(title, style::LABEL_PT);
+    let share = f64::from(room) / f64::from(width.max(1));
+    TextFormat::new(style::LABEL_PT * share.min(1.0)).anchor(HPos::Center, VPos::Bottom)
 }
 
 /// Ticks of a horizontal axis, fewer if their labels would touch.
@@ -276,13 +288,30 @@ fn draw_axes(
     let room = insets(panel, rect.w, rect.h);
     let base = rect.bottom() + room.bottom - units(DESCENT_PT);
     if across {
-        let how = TextFormat::new(style::LABEL_PT).anchor(HPos::Center, VPos::Bottom);
+        let wide = rect.w + 2 * (room.right + units(style::MARGIN_PT));
+        let how = title_format(&panel.x.title, wide);
         canvas.text(&panel.x.title, (rect.x + rect.w / 2, base), how)?;
     }
     if !up {
         return Ok(());
     }
     let left = rect.x - room.left + units(CAP_HEIGHT * style::LABEL_PT);
-    let how = TextFormat::new(style::LABEL_PT).anchor(HPos::Center, VPos::Bottom).upwards();
+    let high = rect.h + 2 * (room.top.min(room.bottom) + units(style::MARGIN_PT));
+    let how = title_format(&panel.y.title, high).upwards();
     canvas.text(&panel.y.title, (left, rect.y + rect.h / 2), how)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_short_axis_has_two_labels_and_a_long_title_fits() {
+        let axis = Axis::linear("", 0.3, 1.9);
+        assert!(y_ticks(&axis, span(&axis), units(25.0)).major.len() >= 2);
+        let (title, room) = ("the height above the table (mm)", units(40.0));
+        let small = title_format(title, room).size;
+        assert!(small < style::LABEL_PT && (text_width(title, small) - room).abs() <= 1);
+        assert_eq!(title_format("*x*", room).size, style::LABEL_PT);
+    }
 }
