@@ -141,6 +141,44 @@ fn pictures_that_cannot_be_are_refused_with_reasons() {
     assert_eq!(fs::read_dir(at).unwrap().count(), 1, "something was written");
 }
 
+/// All states of a series are shown, more than there is room for are refused, and a section that is
+/// never crossed says so.
+#[test]
+fn a_picture_shows_everything_or_says_what_is_missing() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let chain = |n: usize| {
+        let names: Vec<String> = (0..n).map(|i| format!("\"s{i}\"")).collect();
+        let rates: Vec<String> = (0..n).map(|i| format!("\"-s{i}\"")).collect();
+        let start = vec!["1"; n].join(", ");
+        let text = format!(
+            "states = [{}]\nstart = [{start}]\nf = [{}]\n",
+            names.join(", "),
+            rates.join(", ")
+        );
+        fs::write(at.join("chain.toml"), text).unwrap();
+    };
+    let series = ["plot", "--quiet", "--system", "chain.toml", "--kind", "series", "--t-end", "1"];
+    let height = |n: usize| {
+        chain(n);
+        good(at, &[&series[..], &["--out", "a.png"]].concat());
+        let png = fs::read(at.join("a.png")).unwrap();
+        u32::from_be_bytes(png[20..24].try_into().unwrap())
+    };
+    assert!(4 * height(12) > 5 * height(8));
+    chain(17);
+    refused(
+        at,
+        &[&series[..], &["--out", "a.png"]].concat(),
+        2,
+        &["at most sixteen panels", "17 states", "axes"],
+    );
+    let section =
+        "plot --quiet --system stick-slip --section x=50 --t-end 3 --searchable --out a.svg";
+    good(at, &section.split(' ').collect::<Vec<_>>());
+    assert!(fs::read_to_string(at.join("a.svg")).unwrap().contains("no crossing"));
+}
+
 /// A table in a file with a picture's name is refused: it would fail only when it is opened.
 #[test]
 fn numbers_go_into_files_that_are_named_for_them() {
