@@ -59,12 +59,13 @@ pub fn each_once(flag: &str, texts: &[String]) -> Result<(), CliError> {
 }
 
 /// The definition in a system's file.
-fn definition(path: &Path, text: &str, name: &str) -> Result<Definition, Diagnostic> {
-    if is_json(path) {
+fn definition(path: &Path, text: &str, name: &str) -> Result<Definition, Box<Diagnostic>> {
+    let read = if is_json(path) {
         Definition::from_json(text, name)
     } else {
         Definition::from_toml(text, name)
-    }
+    };
+    read.map_err(Box::new)
 }
 
 fn is_json(path: &Path) -> bool {
@@ -94,7 +95,7 @@ pub fn named(name: &str, set: &[String], any: bool) -> Result<Option<Model>, Cli
     let path = Path::new(name);
     let built_in = library::general(name).or_else(|| library::text(name).filter(|_| any));
     let (definition, file) = match built_in {
-        Some(text) => (Definition::from_toml(text, name), None),
+        Some(text) => (Definition::from_toml(text, name).map_err(Box::new), None),
         None => {
             if library::text(name).is_some() || !path.is_file() {
                 return Ok(None);
