@@ -146,18 +146,22 @@ fn advice(error: &FileError) -> &'static str {
         return "";
     }
     match error.source.kind() {
-        io::ErrorKind::PermissionDenied => "; choose a place you may write to",
-        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded | io::ErrorKind::FileTooLarge => {
-            "; free some space or choose another place"
+        io::ErrorKind::PermissionDenied => {
+            "; choose a place you may write to (--out, if the command has it)"
         }
-        io::ErrorKind::ReadOnlyFilesystem => "; choose a writable place",
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded | io::ErrorKind::FileTooLarge => {
+            "; free some space or choose another place (--out, if the command has it)"
+        }
+        io::ErrorKind::ReadOnlyFilesystem => {
+            "; choose a writable place (--out, if the command has it)"
+        }
         io::ErrorKind::NotADirectory | io::ErrorKind::AlreadyExists => {
-            "; a part of this path is a file, choose another place"
+            "; a part of this path is a file, choose another place (--out, if the command has it)"
         }
         _ if error.action.starts_with("find") => {
             "; something else removed or changed it meanwhile: run this again"
         }
-        _ => "; choose another place",
+        _ => "; choose another place (--out, if the command has it)",
     }
 }
 

@@ -88,8 +88,8 @@ pub(crate) fn complementary(
         let mut wrong = Vec::new();
         let mut on_the_verge = false;
         for (i, way) in ways.iter().enumerate() {
-            // How far inside its bounds this one is, in units of what is added up, and its way if
-            // it is outside.
+            // Its distance from its bounds in units of what is added up, and its way if it is
+            // outside.
             let (inside, other) = if *way == Way::Stay {
                 let weight = weights[stay.iter().position(|s| *s == i)?];
                 let other = if weight < 0.5 { Way::Minus } else { Way::Plus };

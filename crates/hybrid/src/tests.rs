@@ -832,7 +832,7 @@ fn rests_are_found_with_their_stability() {
     let found = rests(&angle, &[(-2.0, 2.0); 2]).unwrap();
     assert_eq!(found.len(), 1, "{found:?}");
     near(found[0].x[0], 1.0 / 1.0_f64.tan(), 1e-9);
-    // What a parameter makes zero is no surface, and not greater than zero.
+    // A function that a parameter makes zero is no surface, and not greater than zero.
     for condition in ["eps*(x - 1) > 0", "k*x > x"] {
         let text = format!(
             "states = ['x', 'y']\nf = ['-x + 0.5*y + 0.1', 'if({condition}, 1, 0.5) - 2*y + \
@@ -843,7 +843,7 @@ fn rests_are_found_with_their_stability() {
         near(found[0].x[0], 0.25, 1e-9);
         assert_eq!(found[0].kind(), "stable node");
     }
-    // What the clock moves again and again does not rest; what it does once, or leaves, does.
+    // A state that the clock moves again and again does not rest; one that it moves once does.
     for (event, kind) in [
         (
             "every = 1\nset = { x = 'x + 1' }",
@@ -2328,7 +2328,7 @@ fn a_ball_rests_on_any_floor() {
 }
 
 /// Kinks that a motion comes to like exp(-t), or lies on, decide nothing. x = sin t + exp(-g t) has
-/// the integral 1/g of |x - sin t|; a rate limiter that has just caught up; two agents in consensus.
+/// the integral 1/g of |x - sin t|; a rate limiter that has caught up; two agents in consensus.
 #[test]
 fn kinks_need_no_decision() {
     let all = [Method::Dopri5, Method::Radau5, Method::Lsoda, Method::Taylor];

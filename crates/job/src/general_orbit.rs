@@ -608,7 +608,7 @@ mod tests {
 
     /// Two equal blocks have two equal multipliers, exp(2 pi m): one point, m = 0. So has a pair of
     /// them, - exp(2 pi m), that turns by half.
-    /// A wall at 0.5 that the orbit of x'' + 0.2 x' + x = p cos 2t comes to touch where its amplitude
+    /// A wall at 0.5 that the orbit of x'' + 0.2 x' + x = p cos 2t touches where its amplitude
     /// p/sqrt(9.16) is 0.5. Beyond no orbit is found from below; from above, where the largest
     /// multiplier grows like one over the way, the branch goes on to those without impacts.
     #[test]

@@ -8,7 +8,7 @@ use super::font::CAP_HEIGHT;
 use super::scene::{Position, UNITS_PER_POINT, units};
 use super::sheet::{Axis, PlaneLayer, PlanePanel};
 use super::style;
-use super::ticks::{self, Ticks};
+use super::ticks::{self, Tick, Ticks};
 use twofold_num::elementary;
 
 /// Space that a panel needs around its drawing area, in units.
@@ -97,8 +97,27 @@ fn x_ticks(axis: &Axis, span: Span, length: i32) -> Ticks {
     ticks
 }
 
+/// Ticks of a vertical axis: of labels that would touch every second one, or the two at the ends.
 fn y_ticks(axis: &Axis, span: Span, length: i32) -> Ticks {
-    ticks_of(axis, span, length, style::TICK_SPACING_Y_PT)
+    let all = ticks_of(axis, span, length, style::TICK_SPACING_Y_PT);
+    let place = |tick: &Tick| {
+        (scaled(axis, tick.value) - span.lower) / (span.upper - span.lower) * f64::from(length)
+    };
+    let crowded = |ticks: &[Tick]| {
+        let touch = |w: &[Tick]| place(&w[1]) - place(&w[0]) < f64::from(units(style::TICK_PT));
+        ticks.windows(2).any(touch)
+    };
+    let last = all.major.len().saturating_sub(1);
+    for step in [1, 2, last.max(1)] {
+        let (kept, dropped): (Vec<_>, Vec<_>) =
+            all.major.iter().cloned().enumerate().partition(|(i, _)| i % step == 0);
+        let major: Vec<Tick> = kept.into_iter().map(|(_, tick)| tick).collect();
+        if !crowded(&major) {
+            let minor = dropped.into_iter().map(|(_, tick)| tick.value);
+            return Ticks { major, minor: all.minor.iter().copied().chain(minor).collect() };
+        }
+    }
+    all
 }
 
 /// Ranges of a panel over a drawing area of this size: with equal axes the shorter range is widened
@@ -309,6 +328,11 @@ mod tests {
     fn a_short_axis_has_two_labels_and_a_long_title_fits() {
         let axis = Axis::linear("", 0.3, 1.9);
         assert!(y_ticks(&axis, span(&axis), units(25.0)).major.len() >= 2);
+        // Five would touch on an axis that is three letters high.
+        let axis = Axis::linear("", -0.42, 0.42);
+        let few = y_ticks(&axis, span(&axis), units(3.0 * style::TICK_PT));
+        let labels: Vec<&str> = few.major.iter().map(|tick| tick.label.as_str()).collect();
+        assert!((2..=3).contains(&labels.len()), "{labels:?}");
         let (title, room) = ("the height above the table (mm)", units(40.0));
         let small = title_format(title, room).size;
         assert!(small < style::LABEL_PT && (text_width(title, small) - room).abs() <= 1);

@@ -725,9 +725,9 @@ impl Follower<'_> {
         Ok(self.t > t || self.config != before || self.sliding != slid)
     }
 
-    /// Mirrors the state at surfaces that it lies before by rounding, although motion goes on behind
-    /// them: there alone a root of what has just become positive is a number. False if there are
-    /// none.
+    /// Mirrors the state at surfaces that it lies before by rounding, although motion goes on
+    /// behind them: there alone a root of what has just become positive is a number. False if there
+    /// are none.
     pub(super) fn put_beyond(&mut self) -> bool {
         let values = self.watched_values();
         let compiled = self.compiled.clone();
