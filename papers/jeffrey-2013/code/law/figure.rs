@@ -658,7 +658,7 @@ fn draw_selection(answers: &[Arc<Answer>]) -> Sheet {
 
     let mut places = PlanePanel::new(
         Axis::log("*ε*", 6e-5, 1.6e-2),
-        Axis::linear("−*z*/√*ε* where the surface is left", -4.0, 20.0),
+        Axis::linear("−*z*/√*ε* where it is left", -4.0, 12.5),
     );
     let mut sides = PlanePanel::new(
         Axis::log("*ε*", 6e-5, 1.6e-2),
@@ -667,10 +667,9 @@ fn draw_selection(answers: &[Arc<Answer>]) -> Sheet {
     let smooth: Vec<&Row> = rows[0].iter().filter(|r| SELECTION.contains(&r.eps)).collect();
     let dots = marker(MarkerShape::Dot, style::INK, 4.0);
     let tip: Vec<[f64; 2]> = smooth.iter().map(|r| [r.eps, sqrt(r.z2)]).collect();
-    places = places
-        .line(tip.clone(), LineStyle::new(style::INK, style::CURVE_PT))
-        .markers(tip, dots)
-        .legend(LegendKey::Marker(dots), "smoothing");
+    places =
+        places.line(tip.clone(), LineStyle::new(style::INK, style::CURVE_PT)).markers(tip, dots);
+    let mut rules = vec![LegendEntry::new(LegendKey::Marker(dots), "smoothing (e, f)")];
     let share: Vec<[f64; 2]> =
         smooth.iter().map(|r| [r.eps, if r.minus { 1.0 } else { 0.0 }]).collect();
     sides = sides.markers(share, dots);
@@ -710,21 +709,19 @@ fn draw_selection(answers: &[Arc<Answer>]) -> Sheet {
                 ));
             }
         }
-        places = places.markers(middles, look).legend(LegendKey::Marker(look), words);
+        places = places.markers(middles, look);
+        rules.push(LegendEntry::new(LegendKey::Marker(look), format!("{words} (e, f)")));
         sides = sides.markers(shares, look);
     }
     let factors: Vec<String> =
         TRANSITIONS.iter().zip(&stretch).map(|(t, k)| format!("{} {k:.3}", t.1)).collect();
-    let sheet = TRANSITIONS.iter().fold(
-        Sheet::new(ColumnWidth::Wide, 2, ""),
-        |sheet, (_, words, colour, shape)| {
-            sheet.legend(LegendEntry::new(
-                LegendKey::Marker(marker(*shape, *colour, 4.0)),
-                format!("{words} (a–d)"),
-            ))
-        },
-    );
-    sheet
+    let functions = TRANSITIONS.iter().map(|(_, words, colour, shape)| {
+        let look = LegendKey::Marker(marker(*shape, *colour, 4.0));
+        LegendEntry::new(look, format!("{words} (a–d)"))
+    });
+    functions
+        .chain(rules)
+        .fold(Sheet::new(ColumnWidth::Wide, 2, ""), Sheet::legend)
         .panel_aspect(0.8)
         .panel(
             "(a)",
