@@ -323,12 +323,16 @@ impl Equation {
         found
     }
 
-    /// Whether an expression has a bounded slope in its part of that number, wherever it is taken.
+    /// Whether an expression has a bounded slope in its part of that number, wherever it is taken:
+    /// |x|/x and |x| (1/x) jump, although |x| does not.
     fn is_smooth_in(&self, e: &Expression, part: usize) -> bool {
         match e {
-            Expression::Div(..) => part == 0,
+            Expression::Mul(a, b) => !self.has_pole(if part == 0 { b } else { a }),
+            Expression::Div(_, b) => part == 0 && self.constant(b).is_some(),
             Expression::Power(_, exponent) => *exponent > 0,
-            Expression::RealPower(base, exponent) => part == 0 && self.is_even(base, exponent),
+            Expression::RealPower(base, exponent) => {
+                part == 0 && self.is_power_of_size(base, exponent)
+            }
             Expression::Call(Function::Ln | Function::Sqrt | Function::Tan, _) => false,
             Expression::Apply(
                 General::Asin | General::Acos | General::Log | General::Log10 | General::Atan2,
@@ -338,9 +342,35 @@ impl Equation {
         }
     }
 
+    /// Whether an expression, or a term that it names, may grow without bound at a finite state.
+    fn has_pole(&self, e: &Expression) -> bool {
+        let (mut open, mut seen) = (vec![e], HashSet::new());
+        while let Some(e) = open.pop() {
+            let found = match e {
+                Expression::Name(name) => {
+                    open.extend(self.term(name).filter(|_| seen.insert(name)));
+                    false
+                }
+                Expression::Div(_, b) => self.constant(b).is_none(),
+                Expression::Power(_, exponent) => *exponent < 0,
+                Expression::RealPower(_, exponent) => {
+                    !self.constant(exponent).is_some_and(|v| v > 0.0)
+                }
+                Expression::Call(Function::Ln | Function::Tan, _)
+                | Expression::Apply(General::Log | General::Log10, _) => true,
+                _ => false,
+            };
+            if found {
+                return true;
+            }
+            open.extend(e.parts());
+        }
+        false
+    }
+
     /// Whether a power, of what is never negative by an exponent of at least one, is taken of its
     /// size: rounding beyond the end of its domain makes it no other number.
-    fn is_even(&self, base: &Expression, exponent: &Expression) -> bool {
+    fn is_power_of_size(&self, base: &Expression, exponent: &Expression) -> bool {
         let no_less = |e: &Expression, bound: f64| self.constant(e).is_some_and(|v| v >= bound);
         let never_negative = match base {
             Expression::Call(Function::Abs, _) => true,
@@ -376,23 +406,28 @@ impl Equation {
             },
             Expression::Greater(a, b) => self.register(difference(a, b), false, true, false),
             Expression::Call(f @ (Function::Sign | Function::Abs), a) => {
-                self.register((**a).clone(), false, false, smooth && *f == Function::Abs)
+                let kink = smooth && *f == Function::Abs && !self.has_pole(a);
+                self.register((**a).clone(), false, false, kink)
             }
             Expression::Apply(f, list) => match f {
                 General::Min | General::Max => {
+                    let kink = smooth && !list.iter().any(|e| self.has_pole(e));
                     // Each with the least or greatest before it.
                     for i in 1..list.len() {
                         self.register(
                             difference(&list[i], &self.folded(*f, &list[..i])),
                             false,
                             true,
-                            smooth,
+                            kink,
                         );
                     }
                 }
                 General::Clip => {
-                    self.register(difference(&list[0], &list[1]), false, true, smooth);
-                    self.register(difference(&list[0], &list[2]), false, true, smooth);
+                    // Bounds that change may exchange their order, at which it jumps.
+                    let bounded = list[1..].iter().all(|e| self.constant(e).is_some());
+                    let kink = smooth && bounded && !self.has_pole(&list[0]);
+                    self.register(difference(&list[0], &list[1]), false, true, kink);
+                    self.register(difference(&list[0], &list[2]), false, true, kink);
                 }
                 General::Heaviside => self.register(list[0].clone(), false, false, false),
                 General::Floor => self.register(list[0].clone(), true, false, false),
@@ -848,6 +883,11 @@ pub(crate) enum Gate {
     Divisor,
 }
 
+/// Whether numbers have one sign: their product may be too small to have one.
+pub(crate) fn same_sign(a: f64, b: f64) -> bool {
+    a > 0.0 && b > 0.0 || a < 0.0 && b < 0.0
+}
+
 impl Gate {
     /// Whether it does nothing that a step could miss while its argument is between these numbers.
     pub fn is_quiet(self, low: f64, high: f64) -> bool {
@@ -858,7 +898,7 @@ impl Gate {
             Gate::Wave => width <= 3.0,
             Gate::Scale | Gate::Divisor => {
                 let (most, least) = (low.abs().max(high.abs()), low.abs().min(high.abs()));
-                width <= 0.0 || (most <= 8.0 * least && low * high > 0.0)
+                width <= 0.0 || (most <= 8.0 * least && same_sign(low, high))
             }
         }
     }
@@ -1153,7 +1193,7 @@ impl Writer<'_> {
             Expression::Mul(a, b) => self.number(a) * self.number(b),
             Expression::Div(a, b) => self.number(a) / self.number(b),
             Expression::Power(a, n) => self.number(a).power(*n),
-            Expression::RealPower(a, b) if self.equation.is_even(a, b) => {
+            Expression::RealPower(a, b) if self.equation.is_power_of_size(a, b) => {
                 let (a, b) = (self.number(a), self.number(b));
                 power(a * a, b.scale(0.5))
             }

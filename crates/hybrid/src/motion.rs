@@ -41,7 +41,7 @@ use crate::selection::{
     mixture, near_solution, nearest_of_hull, position_hold, possibilities, turn, turn_of_position,
     velocities_differ,
 };
-use crate::step::Step;
+use crate::step::{LEAST_STATE, Step};
 
 /// Data recorded during a run.
 #[derive(Clone, Debug, PartialEq)]
@@ -670,7 +670,7 @@ fn scale_now(follower: &Follower, step: &Step, out: &mut Vec<f64>) {
                 let size = size.max(0.01 * follower.scale_of(i)).max(least);
                 options.rtol * size
                     + if noise.is_finite() { 4.0 * step.h * noise } else { 0.0 }
-                    + f64::MIN_POSITIVE
+                    + LEAST_STATE
             }
         }
     };

@@ -6,6 +6,8 @@
 //! then narrowed down on the function itself (regula falsi, the Illinois way: Dowell & Jarratt
 //! 1971; halving where that is slow).
 
+use crate::equation::same_sign;
+
 /// Places of the samples, as fractions.
 pub(crate) const PLACES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 /// Largest number of halvings of a step whose end is on the same side, and of one whose end is
@@ -313,7 +315,7 @@ fn settled(newton: f64, u: f64) -> bool {
 fn changes(b: &[f64; 5]) -> usize {
     let (mut changes, mut before) = (0, 0.0);
     for c in b.iter().filter(|c| **c != 0.0) {
-        changes += usize::from(before * c < 0.0);
+        changes += usize::from(same_sign(before, -c));
         before = *c;
     }
     changes

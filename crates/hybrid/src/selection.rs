@@ -7,6 +7,7 @@
 //! several are a motion that is not decided.
 
 use twofold_num::linear::{eigenvalues, solve_any};
+use twofold_num::random::RandomStream;
 use twofold_system::Expression;
 
 /// Motion of a switching function from zero.
@@ -48,6 +49,8 @@ pub(crate) fn complementary(
     at: &mut dyn FnMut(Vec<bool>) -> Option<Around>,
 ) -> Option<Vec<Way>> {
     const MOST_PIVOTS: usize = 2000;
+    /// Corners at which the fields are compared with sums.
+    const TRIED: usize = 40;
     /// So many exchanges of whole blocks may not help before single ones are made.
     const PATIENCE: usize = 10;
     let joined = |(field, rates): Around| [field, rates].concat();
@@ -65,8 +68,10 @@ pub(crate) fn complementary(
             (base[i] + parts().sum::<f64>() - value).abs() <= 1e-9 * size
         })
     };
-    for pattern in 1..=4 {
-        let plus: Vec<bool> = (0..k).map(|i| pattern == 1 || i % pattern == 0).collect();
+    // What signs multiply may cancel on some sides, and hardly on all of many drawn by chance.
+    let mut chance = RandomStream::new(0, k as u64);
+    for _ in 0..TRIED {
+        let plus: Vec<bool> = (0..k).map(|_| chance.uniform() < 0.5).collect();
         let there = joined(at(plus.clone())?);
         if !is_sum(&plus, &there) {
             return None;

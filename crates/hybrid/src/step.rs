@@ -51,6 +51,9 @@ pub(crate) type RightHandSide<'a> = dyn FnMut(f64, &[f64], &mut [f64]) + 'a;
 /// times the step.
 const LARGEST_DEFECT: f64 = 20.0;
 
+/// Errors of states are measured by no less: squares of smaller ones lose their digits.
+pub(crate) const LEAST_STATE: f64 = 1e-150;
+
 /// The series of the motion where a step begins.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Series {
@@ -267,7 +270,7 @@ impl Step {
         }
         let mut z = vec![0.0; m];
         let mut reach: Vec<f64> = (0..n)
-            .map(|i| self.x[i].abs().max((h * self.k[0][i]).abs()).max(f64::MIN_POSITIVE))
+            .map(|i| self.x[i].abs().max((h * self.k[0][i]).abs()).max(LEAST_STATE))
             .collect();
         let (mut f, mut last, mut settled) = (vec![vec![0.0; n]; 3], f64::INFINITY, false);
         for _ in 0..12 {

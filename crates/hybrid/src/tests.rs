@@ -2353,6 +2353,35 @@ fn kinks_need_no_decision() {
     }
 }
 
+/// A quotient by what it is zero with makes a jump of a kink, upon which the motion slides.
+#[test]
+fn kinks_over_a_zero_are_jumps() {
+    for rate in ["-abs(x)/x", "-abs(x)*x^(-1)", "-max(x, -x)/x", "-abs(x)*r", "-r*max(x, -x)"] {
+        let text =
+            format!("states = ['x', 'y']\nstart = [1, 0]\nf = ['{rate}', '0.5']\n[let]\nr = '1/x'");
+        let x = end(&text, 3.0);
+        near(x[0], 0.0, 1e-12);
+        near(x[1], 1.5, 1e-12);
+    }
+}
+
+/// A stiff contact between bodies that are far from the origin: the gap of 1e-8 is no rounding, for
+/// the force in it is not. Two equal bodies exchange their speeds.
+#[test]
+fn small_gaps_of_stiff_contacts_count() {
+    for (k, speed) in [(1e8, 1e-3), (1e10, 1e-3), (1e10, 1e-2)] {
+        let x = end(
+            &format!(
+                "states = ['a', 'b', 'u', 'v']\nstart = [1, 1, {speed}, 0]\nf = ['u', 'v', \
+                    '-{k:e}*max(a - b, 0)', '{k:e}*max(a - b, 0)']"
+            ),
+            1.0,
+        );
+        near(x[2] / speed, 0.0, 1e-6);
+        near(x[3] / speed, 1.0, 1e-6);
+    }
+}
+
 /// A layer in which a force is proportional, written with `clip`: SciPy's DOP853 at 1e-13.
 #[test]
 fn a_layer_of_a_switch_is_followed() {
@@ -2449,7 +2478,11 @@ fn many_surfaces_that_act_on_each_other_meet() {
     }
     // Sums that do not attract, and products, are refused as before.
     let names: Vec<String> = (0..7).map(|i| format!("'x{i}'")).collect();
-    for rate in ["-sign(x0) + 0.5*s", "-sign(x0) - 0.1*s*s"] {
+    for rate in [
+        "-sign(x0) + 0.5*s",
+        "-sign(x0) - 0.1*s*s",
+        "-sign(x0) - 0.1*s + 0.1*(sign(x1)*sign(x2) - sign(x3)*sign(x4))",
+    ] {
         let rates: Vec<String> =
             (0..7).map(|i| format!("'{}'", rate.replace("x0", &format!("x{i}")))).collect();
         let signs: Vec<String> = (0..7).map(|i| format!("sign(x{i})")).collect();
@@ -3678,5 +3711,49 @@ fn what_lies_at_an_events_zero_is_not_struck_through_it() {
         near(there[4], 2.0 - 3.0_f64.cos(), 1e-8);
         near(back[0], -6.0_f64.cos(), 1e-8);
         near(back[4], 2.0, 1e-8);
+    }
+}
+
+/// A state at rest that grows like a high power of the time: the beads before a wave, whose forces
+/// are so small that their squares are no numbers, and Bouc and Wen's hysteresis, a root of what is
+/// zero. SciPy's DOP853 at 1e-13.
+#[test]
+fn high_powers_of_time_leave_rest() {
+    let chain = |n: usize| {
+        let all = |f: &dyn Fn(usize) -> String| (0..n).map(f).collect::<Vec<_>>().join(", ");
+        let force = |i: usize| format!("max(x{i} - x{}, 0)^1.5", i + 1);
+        let speed = |i: usize| {
+            let left = if i > 0 { force(i - 1) } else { "0".into() };
+            let right = if i + 1 < n { force(i) } else { "0".into() };
+            format!("'{left} - {right}'")
+        };
+        format!(
+            "states = [{}, {}]\nstart = [{}, 1, {}]\nf = [{}, {}]",
+            all(&|i| format!("'x{i}'")),
+            all(&|i| format!("'v{i}'")),
+            all(&|_| "0".into()),
+            (1..n).map(|_| "0").collect::<Vec<_>>().join(", "),
+            all(&|i| format!("'v{i}'")),
+            all(&speed)
+        )
+    };
+    let bouc = "states = ['x', 'v', 'z']\nstart = [0, 0, 0]\nf = ['v', 'sin(t) - 0.1*v - z', \
+        'v - 0.5*abs(v)*abs(z)^0.5*z - 0.5*v*abs(z)^1.5']";
+    let at = |text: &str, t_end: f64, method: Method| {
+        let options = Options { t_end, method, ..Options::default() };
+        follow(&model(text), &options, &mut |_| true).unwrap().x
+    };
+    let x = at(&chain(10), 20.0, Method::Dopri5);
+    near(x[0], -0.0511887025, 1e-8);
+    near(x[9], 9.1330508803, 1e-8);
+    near(x[19], 0.9858658664, 1e-8);
+    for method in [Method::Dopri5, Method::Radau5, Method::Lsoda] {
+        let x = at(&chain(4), 10.0, method);
+        near(x[0], 0.6596614754, 1e-8);
+        near(x[3], 6.3419326816, 1e-8);
+        near(x[7], 0.9909725727, 1e-8);
+        let x = at(bouc, 10.0, method);
+        near(x[0], 1.50006331, 1e-7);
+        near(x[2], 0.97082131, 1e-7);
     }
 }

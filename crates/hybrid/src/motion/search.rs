@@ -3,7 +3,7 @@
 use twofold_num::tape::Program;
 
 use super::*;
-use crate::equation::Gate;
+use crate::equation::{Gate, same_sign};
 use crate::range::Range;
 use twofold_num::Arithmetic as _;
 
@@ -73,18 +73,42 @@ impl Follower<'_> {
     }
 
     /// Whether the equations are continuous where this function is zero, and in the whole step it
-    /// is zero to the step's own error: which side of it is followed does not matter.
+    /// is so near to zero that the other side's field leads to the same state, to the step's own
+    /// error: which side is followed does not matter.
     fn hides_a_kink(&mut self, step: &Step, guard: usize) -> bool {
+        /// In units of a step's error: the zeros that the error makes are farther apart.
+        const ERRORS: f64 = 10.0;
         if !self.equation.guards[guard].kink {
             return false;
         }
+        let (n, rtol) = (self.n, self.options.rtol);
         let expression = self.equation.guards[guard].expression.clone();
-        const ERRORS: f64 = 10.0;
-        let small = ERRORS * self.options.rtol * self.magnitude(&expression);
-        let mut x = vec![0.0; self.n];
-        [0.0, 0.5, 1.0].iter().all(|theta| {
-            step.at(*theta, &mut x);
-            self.equation.value(&expression, step.t + theta * step.h, &x).abs() <= small
+        let small = ERRORS * rtol * self.magnitude(&expression);
+        let places = [0.0, 0.5, 1.0].map(|theta| {
+            let mut x = vec![0.0; n];
+            step.at(theta, &mut x);
+            (step.t + theta * step.h, x)
+        });
+        if !places.iter().all(|(t, x)| self.equation.value(&expression, *t, x).abs() <= small) {
+            return false;
+        }
+        let mut other = self.config.clone();
+        other.sides[guard] = -other.sides[guard];
+        self.ask_new(&mut other);
+        let (compiled, mut variables) = (self.equation.compiled(&other), self.load(&other));
+        let (mut here, mut there) = (vec![0.0; n], vec![0.0; n]);
+        places.iter().all(|(t, x)| {
+            variables[..n].copy_from_slice(x);
+            variables[n] = *t;
+            compiled.field.evaluate(&variables, &mut there);
+            self.variables[..n].copy_from_slice(x);
+            self.variables[n] = *t;
+            self.compiled.field.evaluate(&self.variables, &mut here);
+            let atol = self.options.atol.unwrap_or(0.0);
+            (0..n).all(|i| {
+                let error = ERRORS * (atol + rtol * self.scale_of(i).max(x[i].abs()));
+                ((here[i] - there[i]) * step.h).abs() <= error
+            })
         })
     }
 
@@ -487,7 +511,7 @@ impl Follower<'_> {
         self.room = room;
         let mut slope = (high - low) / ((b - a) * longest);
         let mut before = low;
-        if !(low * high < 0.0)
+        if !same_sign(low, -high)
             && let Some(place) = self.place_of(sought)
         {
             // Rounding hides a difference over so short a time.
@@ -554,7 +578,7 @@ impl Follower<'_> {
         const MOST_DOUBLINGS: usize = 48;
         let Some(place) = self.place_of(sought) else { return };
         let t = step.t + step.h;
-        if !(self.value_of(sought, t, &step.y) * before > 0.0) {
+        if !same_sign(self.value_of(sought, t, &step.y), before) {
             return;
         }
         let (n, mut field) = (self.n, std::mem::take(&mut self.room));
@@ -579,7 +603,7 @@ impl Follower<'_> {
                 return;
             }
             let there: Vec<f64> = x.iter().zip(&field).map(|(x, f)| x + later * f).collect();
-            if !(self.value_of(sought, t + later, &there) * before > 0.0) {
+            if !same_sign(self.value_of(sought, t + later, &there), before) {
                 let length = step.h + later;
                 step.take(length, &mut |t, x, out| self.rhs(t, x, out));
                 return;
@@ -632,7 +656,7 @@ impl Follower<'_> {
         let sizes: Vec<f64> =
             self.x.iter().zip(&self.lately).map(|(x, s)| x.abs().max(0.01 * s)).collect();
         let scale = |i: usize, speed: f64| {
-            atol + rtol * sizes[i].max(1e-3 * speed * span.min(1.0)) + f64::MIN_POSITIVE
+            atol + rtol * sizes[i].max(1e-3 * speed * span.min(1.0)) + LEAST_STATE
         };
         let norm = |v: &[f64], scale: &[f64]| {
             (v.iter().zip(scale).map(|(v, s)| (v / s) * (v / s)).sum::<f64>() / v.len() as f64)

@@ -218,10 +218,9 @@ impl Follower<'_> {
                 if c[k] == 0.0 {
                     continue;
                 }
-                // Quantities below the smallest normal number count for nothing, as in the scale of
-                // a step.
+                // What is below the least of states counts for nothing, as in the scale of a step.
                 let by = |size: f64, power: usize| {
-                    rough_pow((size + f64::MIN_POSITIVE) / c[k].abs(), 1.0 / power as f64)
+                    rough_pow((size + LEAST_STATE) / c[k].abs(), 1.0 / power as f64)
                 };
                 let mut h = if is_state {
                     let size = c[0].abs().max(0.01 * self.scale_of(i));
@@ -282,10 +281,8 @@ impl Follower<'_> {
             let size = c.iter().fold(0.0_f64, |most, c| most.max(c.abs()));
             for k in 6..c.len() {
                 // Of k = 6 alone little is seen where it vanishes.
-                most = most.max(rough_pow(
-                    c[k].abs() / (tolerance * size + f64::MIN_POSITIVE),
-                    1.0 / k as f64,
-                ));
+                most = most
+                    .max(rough_pow(c[k].abs() / (tolerance * size + LEAST_STATE), 1.0 / k as f64));
             }
         }
         most.min(MOST_SEARCHED).ceil() as usize

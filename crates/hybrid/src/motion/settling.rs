@@ -7,6 +7,7 @@ use twofold_num::Elementary as _;
 use twofold_system::expression::{Function, General};
 
 use super::*;
+use crate::equation::same_sign;
 
 /// Most surfaces on which a rule chooses a mixture.
 const MOST_CORNERS: usize = 3;
@@ -337,7 +338,9 @@ impl Follower<'_> {
     /// by more than a square. 0 if it stays.
     fn side_ahead_in(&mut self, config: &Configuration, guard: usize) -> f64 {
         match self.values_ahead(config, guard, [0.005, 0.01]) {
-            Some([near, far]) if near * far > 0.0 && far.abs() > 5.0 * near.abs() => far.signum(),
+            Some([near, far]) if same_sign(near, far) && far.abs() > 5.0 * near.abs() => {
+                far.signum()
+            }
             _ => 0.0,
         }
     }
@@ -551,7 +554,7 @@ impl Follower<'_> {
                     .zip(set.iter().map(|i| place[*i].map_or(0.0, |p| rates.direction(p))))
                     .map(|(i, direction)| {
                         let whole = follower.equation.guards[zero[*i]].whole;
-                        if direction == 0.0 && set.len() > 1 && !whole {
+                        if direction == 0.0 && !whole {
                             follower.side_ahead_in(config, zero[*i])
                         } else {
                             direction
@@ -631,7 +634,7 @@ impl Follower<'_> {
                 // At a kink the fields differ by rounding, and so do speeds that are nearly zero.
                 if self.equation.guards[zero[set[0]]].kink && !at(self, vec![false]).5[0] {
                     let present = self.config.sides[zero[set[0]]] == highs[set[0]];
-                    let plus = if d0[0] * d1[0] > 0.0 { d1[0] > 0.0 } else { present };
+                    let plus = if same_sign(d0[0], d1[0]) { d1[0] > 0.0 } else { present };
                     ways[set[0]] = if plus { Way::Plus } else { Way::Minus };
                     continue;
                 }
@@ -1483,7 +1486,7 @@ impl Follower<'_> {
             self.compiled.watched.evaluate(&self.variables, &mut values);
             values[place]
         });
-        if near * far > 0.0 && far.abs() > 5.0 * near.abs() { far.signum() } else { 0.0 }
+        if same_sign(near, far) && far.abs() > 5.0 * near.abs() { far.signum() } else { 0.0 }
     }
 
     /// Whether a watched expression has no speed at the present point.

@@ -10,6 +10,8 @@ use twofold_num::Arithmetic as _;
 
 /// A state this much smaller than it was has digits that rounding may take.
 const SMALL: f64 = 1e-3;
+/// Rounding may be what keeps steps below this part of the run so short.
+const TINY_STEP: f64 = 1e-9;
 /// Rounding errors reach a speed through so many other states in a step, as in a chain of
 /// integrators.
 const PASSES: usize = 3;
@@ -253,14 +255,15 @@ impl Follower<'_> {
         if self.noise[i].is_finite() { self.lately[i] } else { self.size[i] }
     }
 
-    /// Bounds the rounding errors of speeds where a state has become small, beside which they may
-    /// count: those of the field's own terms, and those that reach it by the other states in a
-    /// step as long as the present one. False if no state is small, nor a speed a mixture.
+    /// Bounds the rounding errors of speeds where a state has become small, or a step, beside which
+    /// they may count: those of the field's own terms, and those that reach it by the other states
+    /// in a step as long as the present one. False if neither is small, nor a speed a mixture.
     pub(super) fn note_noise(&mut self, step: &Step) -> bool {
         let small = |(lately, size): (&f64, &f64)| *lately < SMALL * size;
         let mixed = !self.sliding.is_empty() || !self.contacts.is_empty();
-        if self.options.atol.is_some() || !(mixed || self.lately.iter().zip(&self.size).any(small))
-        {
+        let tiny = step.h < TINY_STEP * (self.options.t_end - self.options.t_start);
+        let count = mixed || tiny || self.lately.iter().zip(&self.size).any(small);
+        if self.options.atol.is_some() || !count {
             self.noise.fill(0.0);
             return false;
         }
