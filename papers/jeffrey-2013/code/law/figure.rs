@@ -613,6 +613,23 @@ impl Rule {
     }
 }
 
+/// The known ones of points in falling order of eps, without those that would cover others: about
+/// ten a decade, and both sides of each jump.
+fn apart(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+    const LEAST_RATIO: f64 = 1.11;
+    const JUMP: f64 = 0.5;
+    points.retain(|p| p[1].is_finite());
+    let mut kept: Vec<[f64; 2]> = Vec::new();
+    for (i, p) in points.iter().enumerate() {
+        let beside = [i.checked_sub(1), Some(i + 1)].into_iter().flatten();
+        let jumps = beside.filter_map(|k| points.get(k)).any(|q| (q[1] - p[1]).abs() > JUMP);
+        if jumps || kept.last().is_none_or(|last| last[0] >= LEAST_RATIO * p[0]) {
+            kept.push(*p);
+        }
+    }
+    kept
+}
+
 fn draw_selection(answers: &[Arc<Answer>]) -> Sheet {
     let law = Predicted::of(-1.2, -1.4);
     let each = OTHERS.len() + ladder(DECADES_OTHERS).len();
@@ -651,7 +668,7 @@ fn draw_selection(answers: &[Arc<Answer>]) -> Sheet {
             let points: Vec<[f64; 2]> =
                 rows[OTHERS.len()..].iter().map(|r| [r.eps / k, r.far[0]]).collect();
             let look = marker(shape, colour, 2.8);
-            panel = panel.markers(points.into_iter().filter(|p| p[1].is_finite()).collect(), look);
+            panel = panel.markers(apart(points), look);
         }
         panel
     };
