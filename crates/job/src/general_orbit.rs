@@ -31,6 +31,9 @@ pub struct GeneralOrbit {
 /// States that have settled at less than this share of their sizes at the start are at zero.
 const ROUNDED: f64 = 1e-6;
 
+/// An orbit farther from where the motion settled than this share of a state may be another one.
+const ANOTHER: f64 = 0.05;
+
 /// A return may take so many times the steps of the first orbit of a branch, or of this number.
 const LONGEST: u64 = 100;
 const LEAST_STEPS: u64 = 1000;
@@ -70,8 +73,9 @@ impl Question for GeneralOrbit {
     }
 
     /// Facts: `states` (their names), `point`, `period`, `multipliers` (real and imaginary parts,
-    /// the largest first) and `gap` (how far the orbit is from closed, relative to its largest
-    /// state). Of a branch also the tables `branch` and `bifurcations` and the fact `end`, as of
+    /// the largest first), `gap` (how far the orbit is from closed, relative to its largest
+    /// state) and, if the search went farther than that, `moved` (how far it lies from where the
+    /// motion had settled, relative to the size of a state). Of a branch also the tables `branch` and `bifurcations` and the fact `end`, as of
     /// [`ClosedOrbit`](super::ClosedOrbit).
     fn compute(&self, _: &dyn Ask, monitor: &dyn Monitor) -> Result<Answer, JobError> {
         let model = match &self.along {
@@ -121,6 +125,9 @@ impl Question for GeneralOrbit {
             .with_fact("period", &found.period)
             .with_fact("multipliers", &found.multipliers)
             .with_fact("gap", &found.gap);
+        if found.moved > ANOTHER {
+            answer = answer.with_fact("moved", &found.moved);
+        }
         if found.multiplier_error > 0.0 {
             answer = answer.with_fact("multiplier_error", &found.multiplier_error);
         }
@@ -412,6 +419,12 @@ mod tests {
         let expected = 4.0 * (1.0 - half) * half / (1.0 - half * half);
         assert!((point[0] - expected).abs() < 1e-9, "{point:?} {expected}");
         assert!((multipliers[0][0] - half * half).abs() < 1e-8, "{multipliers:?}");
+        // After a period from zero the distance is 1/e of the point, and the state is at most
+        // e^(1/2) as large as there.
+        let moved: f64 = answer.fact("moved").unwrap();
+        assert!((moved - half * half * half).abs() < 1e-6, "{moved}");
+        let settled = Executor::quiet().ask(&GeneralOrbit { settle: 10.0, ..question }).unwrap();
+        assert!(settled.fact::<f64>("moved").is_err());
     }
 
     /// Settling ends in the second mode, from which the first one would not come back.

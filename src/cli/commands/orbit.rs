@@ -331,6 +331,15 @@ fn of_general(arguments: &Arguments, question: &GeneralOrbit) -> Result<Exit, Cl
             };
             line("stability", stability.into());
             line("closed to", format!("{gap:.1e} of the largest state"));
+            if let Ok(moved) = answer.fact::<f64>("moved") {
+                let from =
+                    if question.settle > 0.0 { "where the motion settled" } else { "the start" };
+                let far = format!(
+                    "{:.0} % of a state's size from {from}: perhaps another orbit",
+                    100.0 * moved
+                );
+                line("lies", far);
+            }
             if let Some(along) = &question.along {
                 branch_lines(along, &answer, &mut line);
             }

@@ -852,6 +852,9 @@ pub struct ClosedOrbit {
     pub multiplier_error: f64,
     /// Closure error after one period, in units of its states' largest size.
     pub gap: f64,
+    /// How far the point is from the one at which the search began, at most, in units of each
+    /// state's size.
+    pub moved: f64,
 }
 
 /// A gap, in units of the states' largest size, that may be the integration's error.
@@ -865,6 +868,16 @@ const NEAR_ONE: f64 = 1e-2;
 fn apart(a: &[f64; 2], b: &[f64; 2]) -> f64 {
     let [re, im] = [a[0] - b[0], a[1] - b[1]];
     sqrt(re * re + im * im)
+}
+
+/// The largest difference of two states, in units of the sizes within these bounds. What is zero to
+/// rounding beside the others has no size.
+fn moved(from: &[f64], to: &[f64], bounds: &[[f64; 2]]) -> f64 {
+    const ROUNDED: f64 = 1e-6;
+    let sizes: Vec<f64> = bounds.iter().map(|[low, high]| low.abs().max(high.abs())).collect();
+    let largest = sizes.iter().copied().fold(0.0, f64::max);
+    let far = (0..to.len()).map(|i| (from[i] - to[i]).abs() / sizes[i].max(ROUNDED * largest));
+    far.filter(|share| share.is_finite()).fold(0.0, f64::max)
 }
 
 /// The Floquet multipliers of a return map's derivative, by falling modulus.
@@ -901,11 +914,12 @@ pub fn closed_orbit(
         let first = turn(model, &options, &Return::Crossings(1), &x, false)?;
         (x, options.mode) = (first.end, first.mode);
     }
+    let began = x.clone();
     let mut best: Option<ClosedOrbit> = None;
     let gap_of = |best: &Option<ClosedOrbit>| best.as_ref().map_or(f64::INFINITY, |b| b.gap);
     for iteration in 0..30 {
         let around = turn(model, &options, after, &x, true);
-        let Turn { time, end, mode, matrix, size, .. } = around.map_err(|error| match error {
+        let Turn { time, end, mode, matrix, size, bounds, .. } = around.map_err(|error| match error {
             // The state that it has come to is none of the motion asked for.
             HybridError::NoOrbit(_) | HybridError::Domain { .. } if iteration > 0 => {
                 let off = gap_of(&best);
@@ -942,6 +956,7 @@ pub fn closed_orbit(
                 multipliers,
                 multiplier_error: 0.0,
                 gap: off,
+                moved: moved(&began, &x, &bounds),
             };
             // Where a multiplier is 1 within its error, orbits beside are closed, too: a step of
             // Newton's method would be one error over another one.
