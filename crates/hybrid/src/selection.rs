@@ -68,7 +68,7 @@ pub(crate) fn complementary(
             (base[i] + parts().sum::<f64>() - value).abs() <= 1e-9 * size
         })
     };
-    // What signs multiply may cancel on some sides, and hardly on all of many drawn by chance.
+    // Products of signs may cancel on some sides, and hardly on all of many drawn by chance.
     let mut chance = RandomStream::new(0, k as u64);
     for _ in 0..TRIED {
         let plus: Vec<bool> = (0..k).map(|_| chance.uniform() < 0.5).collect();

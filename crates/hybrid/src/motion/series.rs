@@ -218,7 +218,7 @@ impl Follower<'_> {
                 if c[k] == 0.0 {
                     continue;
                 }
-                // What is below the least of states counts for nothing, as in the scale of a step.
+                // States below the least one count for nothing, as in the scale of a step.
                 let by = |size: f64, power: usize| {
                     rough_pow((size + LEAST_STATE) / c[k].abs(), 1.0 / power as f64)
                 };

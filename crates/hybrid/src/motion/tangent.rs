@@ -852,8 +852,7 @@ pub struct ClosedOrbit {
     pub multiplier_error: f64,
     /// Closure error after one period, in units of its states' largest size.
     pub gap: f64,
-    /// How far the point is from the one at which the search began, at most, in units of each
-    /// state's size.
+    /// The largest distance of a state from where the search began, in units of its size.
     pub moved: f64,
 }
 
@@ -918,8 +917,7 @@ pub fn closed_orbit(
     let mut best: Option<ClosedOrbit> = None;
     let gap_of = |best: &Option<ClosedOrbit>| best.as_ref().map_or(f64::INFINITY, |b| b.gap);
     for iteration in 0..30 {
-        let around = turn(model, &options, after, &x, true);
-        let Turn { time, end, mode, matrix, size, bounds, .. } = around.map_err(|error| match error {
+        let around = turn(model, &options, after, &x, true).map_err(|error| match error {
             // The state that it has come to is none of the motion asked for.
             HybridError::NoOrbit(_) | HybridError::Domain { .. } if iteration > 0 => {
                 let off = gap_of(&best);
@@ -932,6 +930,7 @@ pub fn closed_orbit(
             }
             other => other,
         })?;
+        let Turn { time, end, mode, matrix, size, bounds, .. } = around;
         // The same state in another mode is another point.
         if mode != options.mode {
             (x, options.mode) = (end, mode);

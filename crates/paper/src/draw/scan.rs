@@ -97,13 +97,12 @@ pub fn map(title: &str, over: [&Scanned; 2], basins: &[Basin]) -> Sheet {
     let mut sheet = Sheet::new(ColumnWidth::Single, 1, "map of endings")
         .title(markup::literal(title))
         .panel_aspect(0.9);
-    let mut next = 0;
+    let (mut attractors, mut others) = (0.., 0..);
     for basin in basins {
         let colour = if basin.attracts {
-            next += 1;
-            palette(next - 1)
+            attractors.next().map_or(style::INK, palette)
         } else {
-            style::CROSSING
+            others.next().map_or(style::CROSSING, grey)
         };
         for (i, j, length) in rows_of(&basin.cells) {
             let (a, b) = (x_edges[i], x_edges[i + length]);
@@ -136,10 +135,38 @@ fn palette(k: usize) -> Colour {
     (0..k / style::SERIES.len()).fold(base, |c, _| c.lighten(0.35))
 }
 
+/// Greys of the other endings, ever darker.
+fn grey(k: usize) -> Colour {
+    const GREYS: [Colour; 4] = [
+        style::CROSSING,
+        Colour::rgb(0xa6, 0xa6, 0xa6),
+        Colour::rgb(0x70, 0x70, 0x70),
+        Colour::rgb(0x40, 0x40, 0x40),
+    ];
+    GREYS[k.min(GREYS.len() - 1)]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use twofold_render::sheet::Content;
+
+    #[test]
+    fn endings_have_a_colour_each() {
+        let basin = |attracts: bool, i: usize| Basin {
+            name: format!("ending {i}"),
+            attracts,
+            cells: vec![(i, 0)],
+        };
+        let basins: Vec<Basin> = (0..6).map(|i| basin(i % 2 == 0, i)).collect();
+        let values: Vec<f64> = (0..6).map(f64::from).collect();
+        let (x, y) = (scanned(&values, false), scanned(&[0.0], false));
+        let sheet = map("", [&x, &y], &basins);
+        let mut seen: Vec<String> = sheet.legend.iter().map(|e| format!("{:?}", e.key)).collect();
+        seen.sort();
+        seen.dedup();
+        assert_eq!(seen.len(), 6, "{seen:?}");
+    }
 
     #[test]
     fn cells_become_rectangles() {
