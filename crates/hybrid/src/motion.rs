@@ -647,6 +647,9 @@ const FORGET_BY: f64 = 0.1;
 /// Steps between two words on the time reached.
 const STEPS_BETWEEN_WORDS: u64 = 64;
 
+/// A root of zero is left by so many implicit steps, whose length grows fivefold, or it is not left.
+const MOST_LEAVING: u32 = 1000;
+
 /// So many steps that take a run less than this part of its time would not end.
 const STEPS_BETWEEN_LOOKS: u64 = 16384;
 const NO_TIME: f64 = 1e-12;
@@ -920,6 +923,8 @@ impl<'a> Follower<'a> {
         let mut clock = Clock::new(self)?;
         let mut step = Step::new(self.n);
         let mut h = 0.0;
+        // The next implicit step where there is no series, and how many there were.
+        let (mut implicit, mut leaving) = (0.0, 0);
         let mut quiet = 0;
         let mut last_met = f64::NEG_INFINITY;
         let mut looked_at = (self.outcome.steps, self.t);
@@ -994,19 +999,44 @@ impl<'a> Follower<'a> {
                 }
                 return Err(self.left_domain(step.t, &step.x));
             }
+            step.jacobian = None;
             if self.options.method == Method::Radau5 {
                 step.jacobian = Some(self.finite_jacobian(step.t, &step.x));
             }
+            let mut no_series = None;
             if self.options.method == Method::Taylor {
-                if let Err(error) = self.expand(&mut step) {
-                    if self.land_at_an_edge()? || self.comes_to_rest(self.t, true) {
+                no_series = match self.expand(&mut step) {
+                    Ok(state) => state,
+                    Err(_) if self.land_at_an_edge()? || self.comes_to_rest(self.t, true) => {
                         continue;
                     }
-                    return Err(error);
-                }
+                    Err(error) => return Err(error),
+                };
                 // If switches or events are frequent, a step is no longer than the time between
                 // them.
-                h = self.step_of_series(&step)?.min(if h > 0.0 { h } else { f64::INFINITY });
+                let longest = if h > 0.0 { h } else { f64::INFINITY };
+                match no_series {
+                    None => {
+                        (implicit, leaving) = (0.0, 0);
+                        h = self.step_of_series(&step)?.min(longest);
+                    }
+                    Some(_) if self.land_at_an_edge()? || self.comes_to_rest(self.t, true) => {
+                        continue;
+                    }
+                    Some(state) if leaving == MOST_LEAVING => {
+                        return Err(self.has_no_series(&step, state));
+                    }
+                    // Implicit steps leave a root of zero.
+                    Some(_) => {
+                        leaving += 1;
+                        step.series = None;
+                        step.jacobian = Some(self.finite_jacobian(step.t, &step.x));
+                        if implicit == 0.0 {
+                            implicit = self.first_step(&room);
+                        }
+                        h = implicit.min(longest);
+                    }
+                }
             } else if self.options.method == Method::Lsoda {
                 self.take_up(&mut step);
                 h = if h > 0.0 { h } else { f64::INFINITY };
@@ -1025,24 +1055,27 @@ impl<'a> Follower<'a> {
                     h = 0.0;
                     continue;
                 }
-                return Err(self.left_domain(self.t, &step.x.clone()));
+                return Err(match no_series {
+                    Some(state) => self.has_no_series(&step, state),
+                    None => self.left_domain(self.t, &step.x.clone()),
+                });
             };
             if self.leaves_rest(&step) {
                 continue;
             }
             let stopped = to_stop && !rejected;
             let most = if rejected { 1.2 } else { 5.0 };
+            let factor = match error {
+                0.0 => most,
+                _ => (0.9 * rough_pow(error, -0.2)).clamp(0.2, most),
+            };
+            if no_series.is_some() {
+                implicit = factor * wanted;
+            }
             let h_next = match self.options.method {
                 // The next step's series, or the history, says it.
                 Method::Taylor | Method::Lsoda => f64::INFINITY,
-                _ => {
-                    wanted
-                        * if error > 0.0 {
-                            (0.9 * rough_pow(error, -0.2)).clamp(0.2, most)
-                        } else {
-                            most
-                        }
-                }
+                _ => wanted * factor,
             };
             let found = self.find(&step, &list, &parts, &mut last_values);
             let earliest = found.iter().map(|(theta, _)| *theta).fold(f64::INFINITY, f64::min);
@@ -1202,7 +1235,17 @@ impl<'a> Follower<'a> {
     ) -> Option<Accepted> {
         let mut scale = std::mem::take(&mut self.scale);
         let accepted = match self.options.method {
-            Method::Lsoda => self.multistep_within(step, longest, &mut scale, list),
+            Method::Lsoda => {
+                let made = self.multistep_within(step, longest, &mut scale, list);
+                if made.is_none() && self.begins_at_a_root(step) {
+                    (step.multistep, step.series) = (None, None);
+                    step.jacobian = Some(self.finite_jacobian(step.t, &step.x));
+                    let length = longest.min(self.first_step(&step.k[0]));
+                    self.step_in_units(step, length, &mut scale, list)
+                } else {
+                    made
+                }
+            }
             _ => self.step_in_units(step, longest, &mut scale, list),
         };
         self.scale = scale;
@@ -1216,6 +1259,8 @@ impl<'a> Follower<'a> {
         scale: &mut Vec<f64>,
         list: &mut Vec<(Sought, f64)>,
     ) -> Option<Accepted> {
+        /// So often a step without numbers is made shorter before it is made implicit.
+        const EXPLICIT: usize = 8;
         let mut length = longest;
         let (mut noise, mut noted) = (None, step.series.is_some());
         for tried in 0..=MOST_SHORTENINGS {
@@ -1251,6 +1296,15 @@ impl<'a> Follower<'a> {
                         search::SHORTER
                     }
                 }
+            } else if error.is_nan()
+                && tried == EXPLICIT
+                && step.explicit()
+                && self.begins_at_a_root(step)
+            {
+                // Stages beyond zero are no numbers, however short the step is.
+                step.jacobian = Some(self.finite_jacobian(step.t, &step.x));
+                length = longest;
+                1.0
             } else if error.is_nan() {
                 0.1
             } else {

@@ -229,6 +229,11 @@ impl Step {
         }
     }
 
+    /// Whether it is one of the explicit Runge-Kutta method.
+    pub fn explicit(&self) -> bool {
+        self.jacobian.is_none() && self.series.is_none()
+    }
+
     /// Power of the step's length with which the error falls.
     pub fn power(&self) -> f64 {
         self.series

@@ -127,7 +127,9 @@ impl Follower<'_> {
         });
         let tried = method.length();
         let field = Field(RefCell::new(self));
-        if method.advance(&field, t, &x, &scale, t_end).is_err() {
+        let made = method.advance(&field, t, &x, &scale, t_end);
+        // Where stages are no numbers it gets shorter until it has no length.
+        if made.is_err() || !(method.time() > t) {
             return Err(tried);
         }
         // To the end of the longest step it goes but for a few roundings.

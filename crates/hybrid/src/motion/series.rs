@@ -82,11 +82,12 @@ pub(super) fn order(options: &Options) -> usize {
 }
 
 impl Follower<'_> {
-    /// Gives a step the series of the motion from where it begins.
+    /// Gives a step the series of the motion from where it begins, or the state that has none there,
+    /// as at a root of zero.
     ///
     /// # Errors
     /// If the motion has none there, or is a mixture that is chosen anew at every point.
-    pub(super) fn expand(&mut self, step: &mut Step) -> Result<(), HybridError> {
+    pub(super) fn expand(&mut self, step: &mut Step) -> Result<Option<usize>, HybridError> {
         let n = self.n;
         let stuck = |why: String| HybridError::Stuck { t: step.t, x: step.x.clone(), why };
         if !self.corners.is_empty() || self.dependent {
@@ -135,7 +136,7 @@ impl Follower<'_> {
         }
         self.variables[..n].copy_from_slice(&step.x);
         self.variables[n] = step.t;
-        let Some(known) = self.expansions.known.get_mut(&key) else { return Ok(()) };
+        let Some(known) = self.expansions.known.get_mut(&key) else { return Ok(None) };
         let mut start: Vec<f64> = known.inputs.iter().map(|i| self.variables[*i]).collect();
         let mut values = vec![0.0; known.followed.len()];
         known.values.evaluate(&self.variables, &mut values);
@@ -154,10 +155,11 @@ impl Follower<'_> {
         series.rounding = followed.into_iter().map(|what| self.rounding_of(what)).collect();
         let broken = |terms: &Vec<f64>| !terms.iter().all(|c| c.is_finite());
         match series.terms[..n].iter().position(broken) {
-            None => Ok(()),
-            // Fast growth of large numbers, far from a pole.
+            None => Ok(None),
+            // Fast growth of large numbers, far from a pole; of small ones beside a root of zero.
             Some(i)
                 if series.terms[i][2].is_finite()
+                    && series.terms[i][0].abs() >= 1.0
                     && (series.terms[i][0] / series.terms[i][1]).abs()
                         > 1e3 * f64::EPSILON * step.t.abs() =>
             {
@@ -169,17 +171,23 @@ impl Follower<'_> {
                 )))
             }
             // Numbers too large, as before a pole.
-            Some(i) if series.terms[i][2].is_finite() => Err(self.left_domain(step.t, &step.x)),
-            Some(i) => {
-                let definition = self.model.definition();
-                let (name, field) =
-                    (&definition.states[i].name, &definition.modes[self.config.mode].field[i]);
-                Err(stuck(format!(
-                    "the motion has no Taylor series in {name}, `{field}`, as at a root of zero: \
-                        follow it by --method dopri5 or radau5"
-                )))
+            Some(i) if series.terms[i][2].is_finite() && series.terms[i][0].abs() >= 1.0 => {
+                Err(self.left_domain(step.t, &step.x))
             }
+            root => Ok(root),
         }
+    }
+
+    /// The error for a state that has no series where a step begins.
+    pub(super) fn has_no_series(&self, step: &Step, state: usize) -> HybridError {
+        let definition = self.model.definition();
+        let name = &definition.states[state].name;
+        let field = &definition.modes[self.config.mode].field[state];
+        let why = format!(
+            "the motion has no Taylor series in {name}, `{field}`, as at a root of zero: follow it \
+                by --method dopri5 or radau5"
+        );
+        HybridError::Stuck { t: step.t, x: step.x.clone(), why }
     }
 
     /// Rounding error of a followed function at zero, where its terms cancel.

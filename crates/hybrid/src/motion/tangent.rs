@@ -132,6 +132,12 @@ impl Follower<'_> {
         jacobian
     }
 
+    /// Whether the field has an infinite slope where a step begins, as a root has at zero: an
+    /// implicit step may leave it.
+    pub(super) fn begins_at_a_root(&mut self, step: &Step) -> bool {
+        self.jacobian(step.t, &step.x).iter().any(|slope| !slope.is_finite())
+    }
+
     /// The derivative of the field in the direction `v`, sliding included.
     fn slope_along(&mut self, t: f64, x: &[f64], v: &[f64]) -> Vec<f64> {
         let n = self.n;
