@@ -80,7 +80,8 @@ pub enum Method {
     Dopri5,
     /// Radau IIA, implicit: for motion that is stiff between switches or in sliding.
     Radau5,
-    /// Taylor series of the motion, of an order that the tolerance decides: for many digits.
+    /// Taylor series of the motion, of an order that the tolerance decides: for many digits. A root
+    /// of zero, which has none, is left by steps of Radau IIA, here and by the other methods.
     Taylor,
     /// Adams and BDF formulas of variable order, chosen automatically: for smooth stretches that
     /// are long beside the time that the order takes to grow, stiff or not.
