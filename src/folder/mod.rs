@@ -21,6 +21,7 @@ mod page;
 pub mod words;
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
 use std::ops::Range;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
@@ -419,16 +420,25 @@ impl Files {
             names.push(name);
         }
         names.sort();
-        let same = |one: &String, other: &String| one != other && one.eq_ignore_ascii_case(other);
-        let mut pairs = names.iter().flat_map(|one| names.iter().map(move |other| (one, other)));
-        if let Some((one, other)) = pairs.find(|(one, other)| same(one, other)) {
-            let why = format!(
-                "{part}/{one}.toml and {part}/{other}.toml differ in case alone, and are one file \
-                    on some machines: give one of them another name"
-            );
-            return Err(FolderError::Missing(why));
-        }
         Ok(names)
+    }
+
+    /// Refuses files of a part of the folder whose names differ in case alone.
+    fn has_no_twins(&self, part: &str) -> Result<(), FolderError> {
+        let Files::Disk(root) = self else { return Ok(()) };
+        let entries = fs::read_dir(root.join(part)).into_iter().flatten().flatten();
+        let mut names: Vec<String> =
+            entries.filter_map(|entry| entry.file_name().into_string().ok()).collect();
+        names.sort_by_key(|name| (name.to_ascii_lowercase(), name.clone()));
+        let twins = names.windows(2).find(|pair| pair[0].eq_ignore_ascii_case(&pair[1]));
+        let Some([one, other]) = twins else { return Ok(()) };
+        let [one, other] = [one, other].map(|name| Path::new(part).join(name));
+        Err(FolderError::Missing(format!(
+            "{} and {} differ in case alone, and are one file on some machines: give one of them \
+                another name",
+            one.display(),
+            other.display()
+        )))
     }
 
     /// A file of the folder, if it is there.
@@ -490,6 +500,9 @@ impl Folder {
             ));
         }
         let readings = readings(&origin, &about)?;
+        for part in ["", "figures", "systems", "data"] {
+            files.has_no_twins(part)?;
+        }
         let mut folder = Self {
             root: root.to_owned(),
             files,

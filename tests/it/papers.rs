@@ -536,11 +536,20 @@ fn names_that_differ_in_case_alone_are_refused() {
     let (code, _, said) = paper(&["make", "--quiet"], &root);
     assert!(code == 2 && said.contains("panel `a` and panel `A` differ in case"), "{said}");
     change(&root, "figures/fig1.toml", "label = \"A\"", "label = \"b\"");
-    fs::copy(root.join("figures/fig1.toml"), root.join("figures/Fig1.toml")).unwrap();
-    // Where they are one file there is nothing to refuse.
-    if fs::read_dir(root.join("figures")).unwrap().count() == 2 {
-        let (code, _, said) = paper(&["make", "--quiet"], &root);
-        assert!(code == 2 && said.contains("figures/Fig1.toml and figures/fig1.toml"), "{said}");
+    let systems: Vec<_> = fs::read_dir(root.join("systems")).unwrap().flatten().collect();
+    let system = systems[0].file_name().into_string().unwrap();
+    for (part, name) in [("figures", "fig1.toml"), ("systems", system.as_str())] {
+        let (one, other) = (root.join(part).join(name), root.join(part).join(name.to_uppercase()));
+        let count = || fs::read_dir(root.join(part)).unwrap().count();
+        let before = count();
+        fs::copy(one, &other).unwrap();
+        // Where they are one file there is nothing to refuse.
+        if count() > before {
+            let (code, _, said) = paper(&["make", "--quiet"], &root);
+            let twins = format!("{part}/{} and {part}/{name} differ in case", name.to_uppercase());
+            assert!(code == 2 && said.contains(&twins), "{said}");
+            fs::remove_file(other).unwrap();
+        }
     }
 }
 

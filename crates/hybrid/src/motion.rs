@@ -648,7 +648,7 @@ const FORGET_BY: f64 = 0.1;
 /// Steps between two words on the time reached.
 const STEPS_BETWEEN_WORDS: u64 = 64;
 
-/// A root of zero is left by so many implicit steps, whose length grows fivefold, or it is not left.
+/// A root of zero is left by so many implicit steps, whose length grows fivefold, or not at all.
 const MOST_LEAVING: u32 = 1000;
 
 /// So many steps that take a run less than this part of its time would not end.

@@ -82,8 +82,8 @@ pub(super) fn order(options: &Options) -> usize {
 }
 
 impl Follower<'_> {
-    /// Gives a step the series of the motion from where it begins, or the state that has none there,
-    /// as at a root of zero.
+    /// Gives a step the series of the motion from where it begins, or says which state has none
+    /// there, as at a root of zero.
     ///
     /// # Errors
     /// If the motion has none there, or is a mixture that is chosen anew at every point.
