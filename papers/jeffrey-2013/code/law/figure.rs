@@ -766,7 +766,8 @@ fn draw_selection(answers: &[Arc<Answer>]) -> Sheet {
             "(a–d) Linearised about the canard, a transition function enters through its slope \
                 there alone: *ε*/*φ*′ takes the place of *ε*. *κ* is *φ*′ on \
              the canard divided by tanh’s: {}. What is left after that is the shape of the \
-             function.",
+             function. In (c, d), points that would cover each other are left out about the jumps; \
+             the tables have all.",
             factors.join(", ")
         ))
         .footer(format!(
