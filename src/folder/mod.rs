@@ -21,7 +21,6 @@ mod page;
 pub mod words;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
 use std::ops::Range;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
@@ -40,7 +39,7 @@ use crate::paper::{Camera, Figure, FigurePanel, ParameterReading, Picture, Repea
 use crate::record::FileError;
 use crate::record::files::read_text;
 use crate::record::manifest::is_plain_name;
-use crate::record::{first_link, read_tree};
+use crate::record::{self, first_link, read_tree};
 use crate::system::Diagnostic;
 use crate::system::diagnostic::nearest;
 
@@ -426,10 +425,8 @@ impl Files {
     /// Refuses files of a part of the folder whose names differ in case alone.
     fn has_no_twins(&self, part: &str) -> Result<(), FolderError> {
         let Files::Disk(root) = self else { return Ok(()) };
-        let entries = fs::read_dir(root.join(part)).into_iter().flatten().flatten();
-        let mut names: Vec<String> =
-            entries.filter_map(|entry| entry.file_name().into_string().ok()).collect();
-        names.sort_by_key(|name| (name.to_ascii_lowercase(), name.clone()));
+        let mut names = record::names(&root.join(part));
+        names.sort_by_key(|name| name.to_ascii_lowercase());
         let twins = names.windows(2).find(|pair| pair[0].eq_ignore_ascii_case(&pair[1]));
         let Some([one, other]) = twins else { return Ok(()) };
         let [one, other] = [one, other].map(|name| Path::new(part).join(name));

@@ -74,9 +74,9 @@ impl Question for GeneralOrbit {
 
     /// Facts: `states` (their names), `point`, `period`, `multipliers` (real and imaginary parts,
     /// the largest first), `gap` (how far the orbit is from closed, relative to its largest
-    /// state) and, from 5 % on, `moved` (how far it lies from where the motion had settled, relative
-    /// to the size of a state). Of a branch also the tables `branch` and `bifurcations` and the fact
-    /// `end`, as of [`ClosedOrbit`](super::ClosedOrbit).
+    /// state) and, from 5 % on, `moved` (how far it lies from where the motion had settled,
+    /// relative to the size of a state). Of a branch also the tables `branch` and `bifurcations`
+    /// and the fact `end`, as of [`ClosedOrbit`](super::ClosedOrbit).
     fn compute(&self, _: &dyn Ask, monitor: &dyn Monitor) -> Result<Answer, JobError> {
         let model = match &self.along {
             Some(along) => at(&self.run.model, along, along.from)?,

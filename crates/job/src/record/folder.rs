@@ -55,6 +55,16 @@ pub fn read_tree(folder: &Path, wanted: &dyn Fn(&str) -> bool) -> Result<Tree, F
     Ok(Tree { files, dangling })
 }
 
+/// Names of what is in a folder, sorted; none if it cannot be listed. Names that are not Unicode
+/// are passed over.
+pub fn names(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut names: Vec<String> =
+        entries.filter_map(|entry| entry.file_name().into_string().ok()).collect();
+    names.sort();
+    names
+}
+
 /// The first symbolic link in `folder`, at any depth, or itself; none if there is no such folder.
 ///
 /// # Errors
