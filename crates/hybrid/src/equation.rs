@@ -90,6 +90,8 @@ pub struct Equation {
     values: BTreeMap<String, f64>,
     /// The switching functions, each once.
     pub guards: Vec<Guard>,
+    /// The first of the guards that the conditions of events alone ask.
+    of_fields: usize,
     by_text: HashMap<String, (usize, bool)>,
     /// The tables' data.
     pub tables: Vec<Table>,
@@ -143,6 +145,41 @@ fn difference(a: &Expression, b: &Expression) -> Expression {
     }
 }
 
+/// What a > b says of the least or the greatest of several, one comparison for each; none if it is
+/// no comparison of such. So equations have the surfaces on which they change, and no other ones.
+fn of_each(a: &Expression, b: &Expression) -> Option<Expression> {
+    /// No more comparisons for one.
+    const MOST: usize = 64;
+    fn count(e: &Expression) -> usize {
+        match e {
+            Expression::Apply(General::Min | General::Max, list) => list.iter().map(count).sum(),
+            _ => 1,
+        }
+    }
+    let greater = |a: &Expression, b: &Expression| {
+        Expression::Greater(Box::new(a.clone()), Box::new(b.clone()))
+    };
+    let all = |all: bool, parts: Vec<Expression>| {
+        parts.into_iter().reduce(|one, other| {
+            let (one, other) = (Box::new(one), Box::new(other));
+            if all { Expression::And(one, other) } else { Expression::Or(one, other) }
+        })
+    };
+    let zero = |e: &Expression| matches!(e, Expression::Number(n) if n.value() == 0.0);
+    match (a, b) {
+        (Expression::Sub(a, b), c) if zero(c) => of_each(a, b),
+        (c, Expression::Sub(a, b)) if zero(c) => of_each(b, a),
+        (a, b) if count(a).saturating_mul(count(b)) > MOST => None,
+        (Expression::Apply(f @ (General::Min | General::Max), list), b) => {
+            all(*f == General::Min, list.iter().map(|one| greater(one, b)).collect())
+        }
+        (a, Expression::Apply(f @ (General::Min | General::Max), list)) => {
+            all(*f == General::Max, list.iter().map(|one| greater(a, one)).collect())
+        }
+        _ => None,
+    }
+}
+
 impl Equation {
     /// Finds the switching functions of a system; `section` is watched beside its events.
     ///
@@ -164,6 +201,7 @@ impl Equation {
         let mut equation = Self {
             values: model.values()?,
             guards: Vec::new(),
+            of_fields: 0,
             by_text: HashMap::new(),
             tables,
             watched: watched.clone(),
@@ -186,6 +224,7 @@ impl Equation {
         for (e, rough) in terms.iter().zip(named.collect::<Vec<_>>()) {
             equation.find(e, false, !rough)?;
         }
+        equation.of_fields = equation.guards.len();
         for e in &conditions {
             equation.find(e, true, true)?;
         }
@@ -396,6 +435,11 @@ impl Equation {
         wants_condition: bool,
         smooth: bool,
     ) -> Result<(), EquationError> {
+        if let Expression::Greater(a, b) = e
+            && let Some(each) = of_each(a, b)
+        {
+            return self.find(&each, true, smooth);
+        }
         match e {
             Expression::Name(name) if wants_condition => match self.term(name).cloned() {
                 Some(term) if term.is_condition() => return Ok(()),
@@ -592,7 +636,10 @@ impl Equation {
         known: &mut HashMap<&'a str, bool>,
     ) -> bool {
         match e {
-            Expression::Greater(a, b) => self.positive(&difference(a, b), at),
+            Expression::Greater(a, b) => match of_each(a, b) {
+                Some(each) => self.holds(&each, at),
+                None => self.positive(&difference(a, b), at),
+            },
             Expression::And(a, b) => self.holds_with(a, at, known) && self.holds_with(b, at, known),
             Expression::Or(a, b) => self.holds_with(a, at, known) || self.holds_with(b, at, known),
             Expression::Not(a) => !self.holds_with(a, at, known),
@@ -611,6 +658,11 @@ impl Equation {
     fn positive(&self, e: &Expression, at: &Configuration) -> bool {
         let (i, flipped) = self.guard(e, false);
         !self.rests(i, at) && (at.sides[i] > 0.0) != flipped
+    }
+
+    /// Whether a guard is asked by the conditions of events alone.
+    pub(crate) fn is_of_conditions(&self, guard: usize) -> bool {
+        guard >= self.of_fields
     }
 
     /// Whether a guard rests at zero: comparisons see equality, and a sign is 0.
@@ -1138,7 +1190,10 @@ impl Writer<'_> {
 
     fn condition(&mut self, e: &Expression) -> bool {
         match e {
-            Expression::Greater(a, b) => self.positive(&difference(a, b)),
+            Expression::Greater(a, b) => match of_each(a, b) {
+                Some(each) => self.condition(&each),
+                None => self.positive(&difference(a, b)),
+            },
             Expression::And(a, b) => self.condition(a) && self.condition(b),
             Expression::Or(a, b) => self.condition(a) || self.condition(b),
             Expression::Not(a) => !self.condition(a),

@@ -654,6 +654,8 @@ const MOST_LEAVING: u32 = 1000;
 /// So many steps that take a run less than this part of its time would not end.
 const STEPS_BETWEEN_LOOKS: u64 = 16384;
 const NO_TIME: f64 = 1e-12;
+/// Taylor series that move so little, as a share of the run, would take more steps than there are.
+const LITTLE_TIME: f64 = 1e-6;
 
 /// Scale of each state's error in a step.
 fn scale_now(follower: &Follower, step: &Step, out: &mut Vec<f64>) {
@@ -966,7 +968,12 @@ impl<'a> Follower<'a> {
             }
             if self.outcome.steps >= looked_at.0 + STEPS_BETWEEN_LOOKS {
                 let before = std::mem::replace(&mut looked_at, (self.outcome.steps, self.t)).1;
-                if self.t - before <= NO_TIME * (self.options.t_end - self.options.t_start) {
+                let share = (self.t - before) / (self.options.t_end - self.options.t_start);
+                // Before the end of a root's domain a series reaches as far as the motion does.
+                if self.options.method == Method::Taylor && share <= LITTLE_TIME {
+                    return Err(self.left_domain(self.t, &self.x.clone()));
+                }
+                if share <= NO_TIME {
                     let why =
                         "steps, events or switches follow each other without end in no time: \
                         describe by one [[event]] what happens there, or give another --method"
@@ -1020,6 +1027,12 @@ impl<'a> Follower<'a> {
                     None => {
                         (implicit, leaving) = (0.0, 0);
                         h = self.step_of_series(&step)?.min(longest);
+                        // Before a switch at which a root ends series reach ever less far.
+                        let short = h < SHORT_STEP * (self.options.t_end - self.options.t_start);
+                        if short && self.breaks_ahead(10.0 * h) && self.land_at_an_edge()? {
+                            h = 0.0;
+                            continue;
+                        }
                     }
                     Some(_) if self.land_at_an_edge()? || self.comes_to_rest(self.t, true) => {
                         continue;

@@ -293,18 +293,25 @@ impl Step {
                 }
             }
             let Some(change) = solve_any(&matrix, &right, 0.0) else { return false };
+            let moved: Vec<bool> = z.iter().map(|z| *z != 0.0).collect();
             z.iter_mut().zip(&change).for_each(|(z, d)| *z += d);
             // A state that comes back to zero is as large as on its way, in the iterations, too.
             z.iter().enumerate().for_each(|(k, z)| reach[k % n] = reach[k % n].max(z.abs()));
-            let size = change.iter().enumerate().fold(0.0_f64, |most, (k, d)| {
+            // Of all states, and of those that had moved before: others come one after another.
+            let [mut size, mut again] = [0.0_f64; 2];
+            for (k, d) in change.iter().enumerate() {
                 let relative = d.abs() / reach[k % n];
-                if most.is_nan() || relative.is_nan() { f64::NAN } else { most.max(relative) }
-            });
+                size =
+                    if size.is_nan() || relative.is_nan() { f64::NAN } else { size.max(relative) };
+                if moved[k] {
+                    again = again.max(relative);
+                }
+            }
             if size <= SETTLED || (size <= 1e-11 && size >= 0.5 * last) {
                 settled = true;
                 break;
             }
-            if size.is_nan() || size > 2.0 * last {
+            if size.is_nan() || again > 2.0 * last {
                 return false;
             }
             last = size;

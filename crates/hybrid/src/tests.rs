@@ -3798,3 +3798,163 @@ fn no_method_crosses_a_pole() {
         }
     }
 }
+
+/// Force as a function of place with an edge where it is continuous: SciPy's DOP853 at 1e-13. The
+/// motion runs along the edge from outside, where sides and rounding are the same thing.
+#[test]
+fn edges_of_continuous_conditions_are_kinks() {
+    let text = "states = ['x', 'v']\nstart = [2, 0.5]\n\
+        f = ['v', 'if(abs(s) < 0.02, -50*s, -sign(s))']\n[let]\ns = 'x + v*abs(v)/2'";
+    for method in Method::ALL {
+        let end = end_of(text, 8.0, method).unwrap();
+        near(end[0], -0.001_934_968_164, 1e-9);
+        near(end[1], 0.012_128_743_98, 1e-9);
+    }
+    // What an event asks for is met however continuous the fields are; so is a jump of a slope that
+    // is infinite, and what is continuous at one point alone.
+    let asked = "states = ['x']\nstart = [0]\nf = ['if(x > 1, 1, x + 1 - x)']\n[[event]]\n\
+        when = 'x > 1'\nstop = true";
+    let outcome = run(&model(asked), 3.0).1.unwrap();
+    near(outcome.t, 1.0, 1e-12);
+    let point = "states = ['x', 'y']\nstart = [0.1, -1]\nf = ['if(x > 0, y, -y)', '1']";
+    for method in Method::ALL {
+        // Sliding on x = 0 from y = -0.9 to 0, where it is left to either side.
+        assert!(end_of(point, 3.0, method).unwrap_err().contains("not decided"));
+    }
+}
+
+/// The longer of three queues are served: comparisons with the greatest of several have the
+/// surfaces on which they change, and no others.
+#[test]
+fn the_longest_queue_is_served() {
+    let text = "states = ['x', 'y', 'z']\nstart = [3, 2, 1]\n\
+        f = ['0.3 - if(x >= max(y, z), 1, 0)', '0.3 - if(y - max(x, z) > 0, 1, 0)',\n\
+        '0.3 - if(0 < z - max(x, y), 1, 0)']";
+    for method in Method::ALL {
+        // The longest alone falls to 2.3, two together to 1.9 at t = 3.
+        for (t, want) in [(1.5, [2.2, 2.2, 1.45]), (2.9, [1.92, 1.92, 1.87])] {
+            let end = end_of(text, t, method).unwrap();
+            end.iter().zip(want).for_each(|(end, want)| near(*end, want, 1e-9));
+        }
+    }
+    let of = |text: &str| {
+        let text =
+            format!("states = ['x', 'y', 'z']\nstart = [3, 2, 1]\nf = [\"{text}\", '0', '0']");
+        let equation = crate::Equation::new(&model(&text), None).unwrap();
+        equation.switching_functions()
+    };
+    assert_eq!(of("if(x < min(y, z), 1, 2)"), ["y - x", "z - x"]);
+    assert_eq!(of("if(max(x, y) > min(1, z), 1, 2)"), ["x - 1", "x - z", "y - 1", "y - z"]);
+    assert_eq!(of("max(x, y)"), ["y - x"]);
+}
+
+/// Roots that begin or end at a switch written with `if`: weirs, contacts after Hertz. By SciPy's
+/// DOP853 at 1e-13, and t = -2 u - ln(1 - 2 u) with u^2 = S - 1/2.
+#[test]
+fn roots_begin_and_end_at_conditions() {
+    let weir =
+        |start: f64, force: &str| format!("states = ['S']\nstart = [{start}]\nf = ['{force}']");
+    let last = |text: &str, t: f64, method: Method| {
+        *end_of(text, t, method)
+            .unwrap_or_else(|e| panic!("{method:?}: {e}\n{text}"))
+            .last()
+            .unwrap()
+    };
+    let gauge = "states = ['S', 'Q']\nstart = [0, 0]\n\
+        f = ['0.5', 'if(S > 0.5, (S - 0.5)^1.5, 0) - Q']";
+    let contact = "states = ['v', 'x']\nstart = [0, 0.4159]\n\
+        f = ['1 - if(x > 0.5, 50*(x - 0.5)^1.5*(1 + 0.3*v), 0) - 0.1*v', 'v']";
+    for method in Method::ALL {
+        near(last(gauge, 3.0, method), 0.489_995_53, 1e-8);
+        near(last(contact, 3.0, method), 0.517_126_98, 1e-8);
+        let falls = "-0.5 - if(S > 0.5, 2*(S - 0.5)^1.5, 0)";
+        near(last(&weir(0.7, falls), 3.0, method), -0.823_524_72, 1e-8);
+        near(
+            last(&weir(0.3298, "0.5 - sqrt(max(S - 0.5, 0))"), 3.0, method),
+            0.736_958_505_6,
+            1e-9,
+        );
+        for i in 0..40 {
+            let start = 0.01 + 0.0103 * f64::from(i);
+            let rises = ["if(S > 0.5, sqrt(S - 0.5), 0)", "sqrt(max(S - 0.5, 0))"];
+            let [one, other] =
+                rises.map(|flow| last(&weir(start, &format!("0.5 - {flow}")), 3.0, method));
+            near(one, other, 1e-9);
+        }
+    }
+    // No switch is at the end of this root's domain.
+    for method in Method::ALL {
+        let error = end_of(&weir(0.0, "1 + sqrt(1 - S)"), 3.0, method).unwrap_err();
+        assert!(error.contains("leaves the domain"), "{method:?}: {error}");
+    }
+}
+
+/// A condition about what stays equal, up to rounding, is not met again and again.
+#[test]
+fn conditions_about_what_stays_equal_rest() {
+    let text = "states = ['u', 'y']\nstart = [0.5, 0.1]\nf = ['cos(t)', 'cos(t)']\n[[event]]\n\
+        when = 'u - y > 0.4'\nset = { u = 'u' }";
+    let play = "states = ['u', 'y']\nstart = [0, 0]\n[modes.free]\nf = ['cos(t)', '0']\n\
+        [modes.up]\nf = ['cos(t)', 'cos(t)']\n[[event]]\nwhen = 'u - y > 0.4'\n\
+        from = 'free'\nmode = 'up'\n[[event]]\nwhen = 'cos(t) < 0'\nfrom = 'up'\nmode = 'free'";
+    for method in Method::ALL {
+        let end = end_of(text, 3.0, method).unwrap();
+        near(end[0], 0.5 + 3.0_f64.sin(), 1e-8);
+        // The play's own way is that of u less 0.4, up to u = 1.
+        let end = end_of(play, 3.0, method).unwrap();
+        near(end[1], 0.6, 1e-8);
+    }
+}
+
+/// A condition on a surface that is slid upon sees equality, whichever way the equations write it.
+#[test]
+fn conditions_see_equality_where_motion_slides() {
+    let counted = |f: &str, from: f64, when: &str, method: Method| {
+        let text = format!(
+            "states = ['h', 'n']\nstart = [{from}, 0]\nf = ['{f}', '0']\n[[event]]\n\
+             when = '{when}'\nset = {{ n = 'n + 1' }}"
+        );
+        end_of(&text, 4.0, method).unwrap()[1]
+    };
+    for method in Method::ALL {
+        for f in ["-sign(h - 1)", "sign(1 - h)", "if(h < 1, 1, -1)", "2*heaviside(1 - h) - 1"] {
+            for (from, when, want) in [
+                (0.0, "h >= 1", 1.0),
+                (0.0, "h > 1", 0.0),
+                (0.0, "not (h < 1)", 1.0),
+                (0.0, "2*h > 2 and t > 0.5", 0.0),
+                (2.0, "h <= 1", 1.0),
+                (2.0, "h < 1", 0.0),
+                (2.0, "1 > h or h < -1", 0.0),
+            ] {
+                let found = counted(f, from, when, method);
+                assert_eq!(found, want, "{method:?}: {f} from {from}, {when}");
+            }
+        }
+        // Sliding ends at t = 3: above the surface from then on.
+        let lifted = "-sign(h - 1) + max(t - 2, 0)";
+        for (when, want) in [("h > 1", 1.0), ("h >= 1", 1.0), ("h > 1 and t < 2.9", 0.0)] {
+            assert_eq!(counted(lifted, 0.0, when, method), want, "{method:?}: {when}");
+        }
+    }
+}
+
+/// Contacts after Hertz: the slope of x^1.5 at 0 is 0. By central differences of runs, and the
+/// closed orbit by SciPy's DOP853 at 1e-12.
+#[test]
+fn tangents_pass_powers_at_zero() {
+    for contact in ["20*max(x - 0.3, 0)^1.5", "if(x > 0.3, 20*(x - 0.3)^1.5, 0)"] {
+        let text = format!(
+            "states = ['x', 'v']\nstart = [0.1, 0]\nf = ['v', '0.5*cos(t) - x - {contact} - 0.2*v']"
+        );
+        let model = model(&text);
+        let options = Options { t_end: 5.0, ..Options::default() };
+        let found = crate::motion::sensitivity::sensitivities(&model, &options, &[]).unwrap();
+        let want = [[0.229_457, -0.056_699], [0.325_660, 1.522_792]];
+        for (i, row) in want.iter().enumerate() {
+            for (j, want) in row.iter().enumerate() {
+                near(found.by_start[i][j], *want, 1e-5);
+            }
+        }
+    }
+}

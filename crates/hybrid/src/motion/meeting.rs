@@ -123,7 +123,10 @@ impl Follower<'_> {
                 self.decide(&slid, &none)?;
             }
             // Equations with kinks alone are Lipschitz: no infinity of them is in finite time.
-            for guard in crossed.into_iter().filter(|guard| !self.equation.guards[*guard].kink) {
+            for guard in crossed {
+                if self.is_kink(guard) {
+                    continue;
+                }
                 let found = self.switch_trains[guard].note(self.t, 0.0);
                 accumulates = accumulates.or(found.map(|(t, error)| (guard, t, error)));
             }

@@ -1,5 +1,6 @@
 //! Conditions that a step is searched for, and those that it may have jumped over.
 
+use twofold_num::random::RandomStream;
 use twofold_num::tape::Program;
 
 use super::*;
@@ -78,7 +79,7 @@ impl Follower<'_> {
     fn hides_a_kink(&mut self, step: &Step, guard: usize) -> bool {
         /// In units of a step's error: the zeros that the error makes are farther apart.
         const ERRORS: f64 = 10.0;
-        if !self.equation.guards[guard].kink {
+        if self.equation.guards[guard].whole {
             return false;
         }
         let (n, rtol) = (self.n, self.options.rtol);
@@ -89,7 +90,9 @@ impl Follower<'_> {
             step.at(theta, &mut x);
             (step.t + theta * step.h, x)
         });
-        if !places.iter().all(|(t, x)| self.equation.value(&expression, *t, x).abs() <= small) {
+        let near =
+            |(t, x): &(f64, Vec<f64>)| self.equation.value(&expression, *t, x).abs() <= small;
+        if !places.iter().all(near) || !self.is_kink(guard) {
             return false;
         }
         let mut other = self.config.clone();
@@ -110,6 +113,120 @@ impl Follower<'_> {
                 ((here[i] - there[i]) * step.h).abs() <= error
             })
         })
+    }
+
+    /// Whether the equations are continuous where this function is zero: by the way in which it is
+    /// written, or around the state, where the fields of both sides agree at points of the surface
+    /// that are drawn there, and part beside it in proportion to the distance.
+    pub(super) fn is_kink(&mut self, guard: usize) -> bool {
+        const DRAWN: usize = 6;
+        /// So far away are points drawn, in units of a state's size and of the run.
+        const SPREAD: f64 = 0.1;
+        /// Distances from the surface at which fields are compared, in the same units. Differences
+        /// like the square root of the distance are 30 times as large as this allows.
+        const BESIDE: [f64; 2] = [1e-3, 1e-6];
+        const ROUNDING: f64 = 1e-10;
+        if self.equation.guards[guard].kink {
+            return true;
+        }
+        if self.equation.guards[guard].whole || self.config.sides[guard] == 0.0 {
+            return false;
+        }
+        let n = self.n;
+        let own = self.config.clone();
+        let mut other = own.clone();
+        other.sides[guard] = -other.sides[guard];
+        self.ask_new(&mut other);
+        self.follow_sides(&mut other, &[guard]);
+        let tells = |event: &crate::definition::Event| match &event.when {
+            When::Becomes(e) => self.equation.holds(e, &own) != self.equation.holds(e, &other),
+            _ => false,
+        };
+        if self.model.definition().events().iter().any(tells) {
+            return false;
+        }
+        let sides = [own, other].map(|config| {
+            let variables = self.load(&config);
+            (self.equation.compiled_with(&config, &[guard]), variables)
+        });
+        let (asked, variables) = &sides[0];
+        let Some(place) = asked.place(guard) else { return false };
+        // Of events, too.
+        let values = |side: usize, at: &[f64]| {
+            let (compiled, variables) = &sides[side];
+            let mut variables = variables.clone();
+            variables[..=n].copy_from_slice(at);
+            let (mut field, mut watched) = (vec![0.0; n], vec![0.0; compiled.outputs]);
+            compiled.field.evaluate(&variables, &mut field);
+            compiled.watched.evaluate(&variables, &mut watched);
+            field.extend_from_slice(&watched[compiled.active.len()..]);
+            field
+        };
+        let span = self.options.t_end - self.options.t_start;
+        let mut sizes: Vec<f64> = (0..n).map(|i| self.size[i].max(self.x[i].abs())).collect();
+        sizes.push(span);
+        // The function's value, and the way towards its zero in units of sizes.
+        let towards = |at: &[f64]| {
+            let mut variables = variables.clone();
+            variables[..=n].copy_from_slice(at);
+            let mut watched = vec![0.0; asked.outputs];
+            asked.watched.evaluate(&variables, &mut watched);
+            let gradient = &asked.gradients(&variables)[place];
+            let mut way = vec![0.0; n];
+            for (variable, slope) in asked.touches[place].iter().zip(gradient) {
+                if *variable < n {
+                    way[*variable] = slope * sizes[*variable];
+                }
+            }
+            (watched[place], way)
+        };
+        let mut chance = RandomStream::new(0, guard as u64);
+        let here: Vec<f64> = self.x.iter().copied().chain([self.t]).collect();
+        let (mut largest, mut pairs) = (vec![0.0_f64; n + self.equation.watched.len()], Vec::new());
+        for _ in 0..DRAWN {
+            let mut at: Vec<f64> = here
+                .iter()
+                .zip(&sizes)
+                .map(|(x, size)| x + SPREAD * size * chance.uniform_in(-1.0, 1.0))
+                .collect();
+            let mut direction = Vec::new();
+            for step in 0..8 {
+                let (value, way) = towards(&at);
+                let length = way.iter().map(|w| w * w).sum::<f64>();
+                if !(length > 0.0 && value.is_finite()) {
+                    return false;
+                }
+                if step < 7 {
+                    let by = value / length;
+                    (0..n).for_each(|i| at[i] -= by * way[i] * sizes[i]);
+                } else if value.abs() > 1e-9 * length.sqrt() {
+                    return false;
+                }
+                direction = way.iter().map(|w| w / length.sqrt()).collect();
+            }
+            let three = [0.0, BESIDE[0], BESIDE[1]].map(|distance| {
+                let mut beside = at.clone();
+                (0..n).for_each(|i| beside[i] += distance * sizes[i] * direction[i]);
+                [0, 1].map(|side| values(side, &beside))
+            });
+            for value in three.iter().flatten() {
+                largest.iter_mut().zip(value).for_each(|(most, v)| *most = most.max(v.abs()));
+            }
+            pairs.push(three);
+            // A jump is seen at the first point.
+            let apart = |[a, b]: &[Vec<f64>; 2], i: usize| (a[i] - b[i]).abs();
+            let agree = pairs.iter().all(|[on, far, near]| {
+                (0..largest.len()).all(|i| {
+                    let rounding = ROUNDING * largest[i];
+                    let allowed = 5.0 * BESIDE[1] / BESIDE[0] * apart(far, i) + rounding;
+                    apart(on, i) <= rounding && apart(near, i) <= allowed
+                })
+            });
+            if !agree {
+                return false;
+            }
+        }
+        true
     }
 
     /// Bounds guards and watched expressions in a step by the states' [`Range`]s, if one of them is
@@ -680,6 +797,16 @@ impl Follower<'_> {
         h.max(1e3 * f64::EPSILON * self.t.abs()).min(span)
     }
 
+    /// Whether the field has no value where a straight motion is after this time.
+    pub(super) fn breaks_ahead(&mut self, ahead: f64) -> bool {
+        let (t, x) = (self.t, self.x.clone());
+        let (mut field, mut there) = (vec![0.0; self.n], vec![0.0; self.n]);
+        self.rhs(t, &x, &mut field);
+        let beyond: Vec<f64> = x.iter().zip(&field).map(|(x, f)| x + ahead * f).collect();
+        self.rhs(t + ahead, &beyond, &mut there);
+        there.iter().any(|f| !f.is_finite())
+    }
+
     /// No step goes across a switch at which an expression's domain ends, as that of |x|^0.5 does
     /// on either side. Very near to it the state is put onto the switch, and what holds there is
     /// decided; false if no switch is so near.
@@ -698,7 +825,8 @@ impl Follower<'_> {
             let closer = nearest.is_none_or(|(best, ..)| left < best);
             let open = !self.sliding.contains(guard) && !self.equation.guards[*guard].whole;
             if open
-                && left > 0.0
+                && left >= 0.0
+                && rates[place] * self.config.sides[*guard] < 0.0
                 && left <= 1e-9 * (self.options.t_end - self.options.t_start)
                 && closer
             {

@@ -284,6 +284,13 @@ impl Follower<'_> {
         }
     }
 
+    /// Whether nothing moves a guard, at this place among the rates: no term, or of one that the
+    /// conditions of events alone ask terms that cancel.
+    fn keeps_still(&self, guard: usize, rates: &Rates, place: usize) -> bool {
+        let cancels = || rates.first[place].abs() <= 1e-12 * rates.terms[place];
+        rates.stands_still(place) || self.equation.is_of_conditions(guard) && cancels()
+    }
+
     /// Gives the functions in `zero` that are zero all along on the lower sides that they are on,
     /// and that nothing leads or presses there, the side of what rests at zero: max(x, 0) where x
     /// is negative, a counter that nothing counts.
@@ -292,9 +299,9 @@ impl Follower<'_> {
         let mut some = false;
         let stays = |follower: &mut Self, config: &Configuration, guard: usize| {
             let (compiled, rates) = follower.rates_with(config, &[guard]);
-            compiled
-                .place(guard)
-                .is_some_and(|p| rates.stands_still(p) && follower.stays_a_little(config, guard))
+            compiled.place(guard).is_some_and(|p| {
+                follower.keeps_still(guard, &rates, p) && follower.stays_a_little(config, guard)
+            })
         };
         for _ in 0..zero.len() {
             let mut changed = false;
@@ -391,6 +398,50 @@ impl Follower<'_> {
         }) && self.stays_a_little(config, guard)
     }
 
+    /// Puts the state, which is on these surfaces to rounding, where the fields of both sides have
+    /// values: sqrt(x - 1) has none at x - 1 = -1e-16.
+    fn put_into_domain(&mut self, zero: &[usize]) {
+        /// Numbers that are tried on either side.
+        const TRIED: usize = 16;
+        let n = self.n;
+        for guard in zero.iter().copied() {
+            let Some(place) = self.compiled.place(guard).filter(|_| !self.slides[guard]) else {
+                continue;
+            };
+            let sides = [self.low(guard), self.high(guard)].map(|side| {
+                let mut config = self.config.clone();
+                config.sides[guard] = side;
+                self.ask_new(&mut config);
+                (self.equation.compiled(&config), self.load(&config))
+            });
+            let has_values = |x: &[f64]| {
+                sides.iter().all(|(compiled, variables)| {
+                    let (mut variables, mut field) = (variables.clone(), vec![0.0; n]);
+                    variables[..n].copy_from_slice(x);
+                    compiled.field.evaluate(&variables, &mut field);
+                    field.iter().all(|f| f.is_finite())
+                })
+            };
+            if has_values(&self.x) {
+                continue;
+            }
+            let gradient = &self.compiled.gradients(&self.load(&self.config))[place];
+            let states = self.compiled.touches[place].iter().copied().zip(gradient);
+            let moves = states
+                .filter(|(state, slope)| *state < n && **slope != 0.0)
+                .max_by(|a, b| (a.1 * self.x[a.0]).abs().total_cmp(&(b.1 * self.x[b.0]).abs()));
+            let Some((state, _)) = moves else { continue };
+            let (mut up, mut down) = (self.x.clone(), self.x.clone());
+            for _ in 0..TRIED {
+                (up[state], down[state]) = (up[state].next_up(), down[state].next_down());
+                if let Some(x) = [&up, &down].into_iter().find(|x| has_values(x)) {
+                    self.x.clone_from(x);
+                    break;
+                }
+            }
+        }
+    }
+
     /// As [`Follower::settle`], where what is slid upon is decided, too, but for the guards in
     /// `kept`.
     pub(super) fn decide(&mut self, zero: &[usize], kept: &[bool]) -> Result<(), HybridError> {
@@ -400,6 +451,7 @@ impl Follower<'_> {
             zero.iter().copied().filter(|g| self.compiled.place(*g).is_some()).collect();
         self.add_what_is_zero(&mut zero);
         zero.retain(|guard| !self.guard_held[*guard]);
+        self.put_into_domain(&zero);
         if zero.len() == 1 {
             // A speed that is only rounding may be a function that is zero, too.
             let config = self.config.clone();
@@ -449,7 +501,8 @@ impl Follower<'_> {
             };
             let made = rates_of(follower, config);
             let (config, place, rates, _) = &made;
-            let still = |i: usize| place[i].is_some_and(|p| rates.stands_still(p));
+            let still =
+                |i: usize| place[i].is_some_and(|p| follower.keeps_still(zero[i], rates, p));
             if (0..zero.len()).any(|i| !plus(i) && still(i)) {
                 let mut resting = config.clone();
                 if follower.let_rest(&mut resting, &zero, &[]) {
@@ -616,7 +669,8 @@ impl Follower<'_> {
             if set.len() == 1 {
                 let (low, _, d0, ..) = at(self, vec![false]);
                 let (high, _, d1, ..) = at(self, vec![true]);
-                if at(self, vec![false]).5[0] && d1[0] == 0.0 {
+                let free = d1[0] == 0.0 || self.equation.is_of_conditions(zero[set[0]]);
+                if at(self, vec![false]).5[0] && free {
                     ways[set[0]] = Way::Minus;
                     continue;
                 }
@@ -632,7 +686,7 @@ impl Follower<'_> {
                     continue;
                 }
                 // At a kink the fields differ by rounding, and so do speeds that are nearly zero.
-                if self.equation.guards[zero[set[0]]].kink && !at(self, vec![false]).5[0] {
+                if !at(self, vec![false]).5[0] && self.is_kink(zero[set[0]]) {
                     let present = self.config.sides[zero[set[0]]] == highs[set[0]];
                     let plus = if same_sign(d0[0], d1[0]) { d1[0] > 0.0 } else { present };
                     ways[set[0]] = if plus { Way::Plus } else { Way::Minus };
@@ -1509,9 +1563,14 @@ impl Follower<'_> {
     /// The events whose conditions hold now and did not before.
     pub(super) fn new_conditions(&mut self, definition: &crate::Definition) -> Vec<usize> {
         let mut new = Vec::new();
+        let mut at = self.config.clone();
+        // What is slid upon is equal to zero.
+        for guard in self.sliding.iter().filter(|guard| !self.equation.guards[**guard].whole) {
+            at.sides[*guard] = 0.0;
+        }
         for (i, event) in definition.events().iter().enumerate() {
             if let When::Becomes(e) = &event.when {
-                let now = self.equation.holds(e, &self.config);
+                let now = self.equation.holds(e, &at);
                 if now && !self.holds[i] {
                     new.push(i);
                 }

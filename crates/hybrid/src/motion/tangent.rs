@@ -73,7 +73,7 @@ impl Follower<'_> {
                         v[i] += step.h * a * kv[i];
                     }
                 }
-                k.push(self.slope_along(step.t + C[s] * step.h, &x, &v));
+                k.push(self.slope_beside(step.t + C[s] * step.h, &x, &v));
                 end = v;
             }
             let size = y.iter().chain(&end).fold(0.0_f64, |most, v| most.max(v.abs()));
@@ -125,10 +125,32 @@ impl Follower<'_> {
     }
 
     /// The Jacobian for iterations, which settle in short steps without a slope that is infinite,
-    /// as that of a root at zero.
+    /// as that of a root at zero. Where a root hides other slopes they are quotients.
     pub(super) fn finite_jacobian(&mut self, t: f64, x: &[f64]) -> Vec<f64> {
+        let n = self.n;
         let mut jacobian = self.jacobian(t, x);
-        jacobian.iter_mut().filter(|j| !j.is_finite()).for_each(|j| *j = 0.0);
+        let mut now = vec![0.0; n];
+        for j in 0..n {
+            let hidden: Vec<usize> = (0..n).filter(|i| !jacobian[i * n + j].is_finite()).collect();
+            if hidden.is_empty() {
+                continue;
+            }
+            self.rhs(t, x, &mut now);
+            let largest = self.size.iter().fold(0.0_f64, |most, size| most.max(*size));
+            let mut quotient = |part: f64| {
+                let by = part * 1e-8 * x[j].abs().max(self.size[j]).max(1e-3 * largest);
+                let (mut beside, mut there) = (x.to_vec(), vec![0.0; n]);
+                beside[j] += by;
+                self.rhs(t, &beside, &mut there);
+                let by = beside[j] - x[j];
+                there.iter().zip(&now).map(|(there, now)| (there - now) / by).collect::<Vec<f64>>()
+            };
+            let (near, far) = (quotient(1.0), quotient(8.0));
+            for i in hidden {
+                let same = (near[i] - far[i]).abs() <= 1e-2 * near[i].abs();
+                jacobian[i * n + j] = if same { near[i] } else { 0.0 };
+            }
+        }
         jacobian
     }
 
@@ -136,6 +158,34 @@ impl Follower<'_> {
     /// implicit step may leave it.
     pub(super) fn begins_at_a_root(&mut self, step: &Step) -> bool {
         self.jacobian(step.t, &step.x).iter().any(|slope| !slope.is_finite())
+    }
+
+    /// The derivative of the field in the direction `v`; where a power is zero, as x^1.5 at x = 0,
+    /// that of a state a little before or after, if it does not grow without bound.
+    fn slope_beside(&mut self, t: f64, x: &[f64], v: &[f64]) -> Vec<f64> {
+        /// In units of the time that a state takes to move by its size: the nearer one is taken.
+        const BESIDE: [f64; 2] = [1e-14, 1e-12];
+        let at = self.slope_along(t, x, v);
+        let finite = |slope: &Vec<f64>| slope.iter().all(|s| s.is_finite());
+        if finite(&at) {
+            return at;
+        }
+        let mut field = vec![0.0; self.n];
+        self.rhs(t, x, &mut field);
+        let times = field.iter().zip(&self.size).map(|(f, size)| size / f.abs());
+        let whole = times.filter(|time| *time > 0.0).fold(f64::INFINITY, f64::min);
+        for way in [1.0, -1.0] {
+            let [near, far] = BESIDE.map(|part| {
+                let by = way * part * whole;
+                let beside: Vec<f64> = x.iter().zip(&field).map(|(x, f)| x + by * f).collect();
+                self.slope_along(t + by, &beside, v)
+            });
+            let bounded = near.iter().zip(&far).all(|(near, far)| near.abs() <= 2.0 * far.abs());
+            if finite(&near) && finite(&far) && bounded {
+                return near;
+            }
+        }
+        at
     }
 
     /// The derivative of the field in the direction `v`, sliding included.
