@@ -124,6 +124,8 @@ pub struct Claim {
     pub note: String,
     /// Digest of the rule: the check and all its numbers.
     pub rule: Hash,
+    /// Digest of the claim's words: what it says, its quote and its place.
+    pub words: Hash,
     check: Check,
     odds: Option<OddsFile>,
     of: String,
@@ -214,6 +216,12 @@ pub struct Verdict {
     /// Whether the rule was changed when these data were already known.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub rule_after_data: bool,
+    /// Digest of the claim's words; files of older versions have none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub words: Option<Hash>,
+    /// Whether the words were changed when these data were already known.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub words_after_data: bool,
 }
 
 impl Verdict {
@@ -433,6 +441,7 @@ impl Claim {
             "check": check, "odds": odds, "of": c.of.get_ref(),
                 "and": c.and.as_ref().map(Spanned::get_ref),
         }));
+        let words = Hash::of_json(&json!([c.says, c.quote, c.place]));
         Ok(Self {
             id: c.id.into_inner(),
             place: c.place,
@@ -441,6 +450,7 @@ impl Claim {
             decided: c.decided.to_string(),
             note: c.note,
             rule,
+            words,
             check,
             odds,
             of: c.of.into_inner(),
@@ -571,6 +581,8 @@ impl Claim {
             found,
             odds,
             rule_after_data: false,
+            words: Some(self.words.clone()),
+            words_after_data: false,
         })
     }
 }

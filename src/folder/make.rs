@@ -57,16 +57,19 @@ pub struct Finding {
     /// Whether it is a claim whose rule was changed when its data were already known.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub rule_after_data: bool,
+    /// The same of a claim's words.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub words_after_data: bool,
 }
 
 impl Finding {
     /// For people.
     pub fn line(&self) -> String {
         let name = &self.name;
-        let known = if self.rule_after_data {
-            "; its rule was changed when the data were known"
-        } else {
-            ""
+        let known = match (self.rule_after_data, self.words_after_data) {
+            (true, _) => "; its rule was changed when the data were known",
+            (_, true) => "; its words were changed when the data were known",
+            _ => "",
         };
         match &self.state {
             State::Same => format!("{name}: same{known}"),
@@ -80,7 +83,7 @@ impl Finding {
     }
 
     fn of(name: &str, state: State) -> Self {
-        Self { name: name.to_owned(), state, rule_after_data: false }
+        Self { name: name.to_owned(), state, rule_after_data: false, words_after_data: false }
     }
 }
 
@@ -133,6 +136,9 @@ impl Folder {
                         Some(same) => same.rule_after_data,
                         None => !judged.is_empty(),
                     };
+                    found.words_after_data = judged
+                        .iter()
+                        .any(|v| v.words_after_data || v.words.is_some() && v.words != found.words);
                     executor.progress().line(&format!("scored {}", claim.id));
                     found
                 });
@@ -212,6 +218,14 @@ impl Folder {
                         if now.rule_after_data { ", changed when the data were known" } else { "" };
                     State::Differs { what: format!("rule{known}") }
                 }
+                (Ok(now), Some(old)) if old.words.is_some() && now.words != old.words => {
+                    let known = if now.words_after_data {
+                        ", changed when the data were known"
+                    } else {
+                        ""
+                    };
+                    State::Differs { what: format!("words{known}") }
+                }
                 (Ok(now), Some(old)) if now.decided != old.decided => {
                     State::Differs { what: "rule's date".into() }
                 }
@@ -226,8 +240,12 @@ impl Folder {
                 }
                 _ => State::Same,
             };
-            let rule_after_data = verdict.as_ref().is_ok_and(|now| now.rule_after_data);
-            findings.push(Finding { rule_after_data, ..Finding::of(&claim.id, state) });
+            let known = |what: fn(&Verdict) -> bool| verdict.as_ref().is_ok_and(what);
+            findings.push(Finding {
+                rule_after_data: known(|now| now.rule_after_data),
+                words_after_data: known(|now| now.words_after_data),
+                ..Finding::of(&claim.id, state)
+            });
         }
         for old in &before.verdicts {
             if !self.claims.iter().any(|c| c.id == old.claim) {
@@ -271,7 +289,7 @@ impl Folder {
                 "{name}: {why}; what fails is not blessed"
             ))));
         }
-        let changed: Vec<String> = findings
+        let mut changed: Vec<String> = findings
             .iter()
             .filter_map(|f| match &f.state {
                 State::Same | State::Failed { .. } => None,
@@ -280,6 +298,9 @@ impl Folder {
                 State::Gone => Some(format!("{} (gone)", f.name)),
             })
             .collect();
+        if self.outcomes()?.verdicts.iter().any(|v| v.words.is_none()) {
+            changed.push("claims (their words, which older versions did not keep)".into());
+        }
         if changed.is_empty() {
             return Ok(changed);
         }

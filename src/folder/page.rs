@@ -91,7 +91,11 @@ fn row(scored: &Scored<'_>) -> String {
             let word = outcome(v.agrees);
             (
                 format!("<span class=\"{word}\">{word}</span>: {}", escape(&v.found)),
-                v.rule_after_data,
+                match (v.rule_after_data, v.words_after_data) {
+                    (true, _) => "<br><strong>changed when its data were known</strong>",
+                    (_, true) => "<br><strong>its words changed when its data were known</strong>",
+                    _ => "",
+                },
             )
         }
         Err(why) => (
@@ -99,10 +103,9 @@ fn row(scored: &Scored<'_>) -> String {
                 "<span class=\"differs\">cannot be scored</span>: {}",
                 escape(&why.to_string())
             ),
-            false,
+            "",
         ),
     };
-    let after = if after { "<br><strong>changed when its data were known</strong>" } else { "" };
     format!(
         "<tr id=\"{}\"><td>{}</td><td>{}{quote}</td><td>{found}{note}</td><td>{}, fixed \
             {}{after}</td></tr>",

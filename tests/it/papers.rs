@@ -136,6 +136,25 @@ fn a_rule_that_changes_after_its_data_is_said_to() {
     assert!(code == 2 && said.contains("two outcomes of claim period"), "{said}");
 }
 
+/// So are the words of a claim, which say what its rule is a measure of.
+#[test]
+fn words_that_change_after_their_data_are_said_to() {
+    let place = small();
+    let root = place.path().join("p");
+    assert_eq!(paper(&["bless", "--reason", "first", "--quiet"], &root).0, 0);
+    change(&root, "claims.toml", "The period is 2 ln(", "The period is just 2 ln(");
+    let (code, out, _) = paper(&["check", "--quiet"], &root);
+    let said = "DIFFERS in its words, changed when the data were known";
+    assert!(code == 1 && out.matches(said).count() == 1, "{out}");
+    assert_eq!(paper(&["bless", "--reason", "other words", "--quiet"], &root).0, 0);
+    let (code, out, _) = paper(&["check", "--quiet"], &root);
+    let said = "same; its words were changed when the data were known";
+    assert!(code == 0 && out.matches(said).count() == 1, "{out}");
+    assert_eq!(paper(&["report", "--quiet"], &root).0, 0);
+    let page = fs::read_to_string(root.join("out/report.html")).unwrap();
+    assert!(page.contains("its words changed when its data were known"), "{page}");
+}
+
 /// So it is of a claim that is renamed, of other odds, and before anything is expected.
 #[test]
 fn a_rule_that_changes_is_seen_by_its_data() {

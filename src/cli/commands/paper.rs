@@ -118,7 +118,8 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         .iter()
         .map(|s| match &s.verdict {
             Ok(v) => json!({ "claim": v.claim, "outcome": outcome(v.agrees), "found": v.found,
-                "odds": v.odds, "decided": v.decided, "rule_after_data": v.rule_after_data }),
+                "odds": v.odds, "decided": v.decided, "rule_after_data": v.rule_after_data,
+                "words_after_data": v.words_after_data }),
             Err(why) => json!({ "claim": s.claim.id, "outcome": "failed",
                 "found": why.to_string() }),
         })
