@@ -145,8 +145,8 @@ fn difference(a: &Expression, b: &Expression) -> Expression {
     }
 }
 
-/// What a > b says of the least or the greatest of several, one comparison for each; none if it is
-/// no comparison of such. So equations have the surfaces on which they change, and no other ones.
+/// Comparison a > b of the least or the greatest of several as one for each of them; none if it is
+/// of no such. So equations have the surfaces on which they change, and no other ones.
 fn of_each(a: &Expression, b: &Expression) -> Option<Expression> {
     /// No more comparisons for one.
     const MOST: usize = 64;

@@ -44,7 +44,56 @@ impl Follower<'_> {
                 std::mem::swap(last, &mut self.samples[4]);
             }
         }
+        self.tell_rounding(step, list, parts, &mut found);
         found
+    }
+
+    /// Passes over zeros, right at the beginning of a step, of functions that the conditions of
+    /// events alone ask and that have no sign beyond rounding for a while, as those that leave zero
+    /// to third order.
+    fn tell_rounding(
+        &mut self,
+        step: &Step,
+        list: &[(Sought, f64)],
+        parts: &[(f64, f64)],
+        found: &mut Vec<(f64, Sought)>,
+    ) {
+        const EARLY: f64 = 1e-6;
+        /// A zero that counts has one side beyond rounding at so many times its place, or before.
+        const LATER: [f64; 4] = [0.5, 1.0, 2.0, 8.0];
+        let (mut at, mut value) = (vec![0.0; self.n], Vec::new());
+        for (theta, sought) in found.iter_mut().filter(|(theta, _)| *theta < EARLY) {
+            let Sought::Guard { guard, .. } = *sought else { continue };
+            let Some((_, side)) = list.iter().find(|(one, _)| one == sought) else { continue };
+            if self.equation.guards[guard].whole || !self.equation.is_of_conditions(guard) {
+                continue;
+            }
+            let expression = &self.equation.guards[guard].expression;
+            let rounding = 64.0 * f64::EPSILON * self.magnitude(expression);
+            let one = [(*sought, *side)];
+            let mut f = |theta: f64| {
+                step.at(theta, &mut at);
+                self.measure(&one, step.t + theta * step.h, &at, &mut value);
+                value[0]
+            };
+            if !LATER.iter().all(|later| f(later * *theta).abs() <= rounding) {
+                continue;
+            }
+            let whole = [(0.0, 1.0)];
+            let begin = LATER[3] * *theta;
+            let parts = if parts.is_empty() { &whole } else { parts };
+            *theta = f64::INFINITY;
+            // As far beyond zero as rounding may be.
+            let mut f = |theta: f64| f(theta) + side * rounding;
+            for (from, to) in parts.iter().map(|(from, to)| (from.max(begin), *to)) {
+                let v = PLACES.map(|place| f(from + place * (to - from)));
+                if let Some(next) = first(v, *side, from, to, &mut f, 0) {
+                    *theta = next;
+                    break;
+                }
+            }
+        }
+        found.retain(|(theta, _)| theta.is_finite());
     }
 
     /// Adds the first zeros if all conditions are sums of states, which are polynomials in a step

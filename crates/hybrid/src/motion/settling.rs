@@ -1564,7 +1564,7 @@ impl Follower<'_> {
     pub(super) fn new_conditions(&mut self, definition: &crate::Definition) -> Vec<usize> {
         let mut new = Vec::new();
         let mut at = self.config.clone();
-        // What is slid upon is equal to zero.
+        // Functions slid upon are equal to zero.
         for guard in self.sliding.iter().filter(|guard| !self.equation.guards[**guard].whole) {
             at.sides[*guard] = 0.0;
         }
