@@ -469,6 +469,8 @@ struct Follower<'a> {
     event_of: Vec<Option<usize>>,
     /// Whether each event's condition holds.
     holds: Vec<bool>,
+    /// Whether tables have stepped on to other pieces at this moment.
+    tables_step: bool,
     /// The largest size of each state so far.
     size: Vec<f64>,
     /// The same of late: forgotten as a state falls far below it, and where an event sets it.
@@ -858,6 +860,7 @@ impl<'a> Follower<'a> {
             left_watch: vec![0.0; watched],
             event_of,
             holds: vec![false; events.len()],
+            tables_step: false,
             size: x.iter().map(|v| v.abs()).collect(),
             lately: x.iter().map(|v| v.abs()).collect(),
             noise: vec![0.0; n],
@@ -1357,6 +1360,7 @@ impl<'a> Follower<'a> {
             .iter()
             .map(|g| self.compiled.place(*g).map_or(f64::NAN, |p| values[p]))
             .collect();
+        self.tables_step = config.pieces != self.config.pieces;
         self.adopt(config, sliding.clone());
         if !self.equation.tables.is_empty() {
             // A table's jump may carry switching functions over zero, or away from it.

@@ -3981,3 +3981,104 @@ fn contacts_let_go_to_third_order() {
         }
     }
 }
+
+/// References and stops that jump with the time: a relay that slides on one, with an event about the
+/// same surface, and a body that rests on the other.
+#[test]
+fn jumps_of_references_and_stops_are_followed() {
+    let relay = |speed: f64, u: &str| {
+        format!(
+            "states = ['x', 'n']\nstart = [0, 0]\nf = ['-{speed}*sign(x - u)', '0']\n[[event]]\n\
+             when = 'x < u'\nset = {{ n = 'n + t' }}\n[let]\nu = '{u}'"
+        )
+    };
+    let stop = |start: f64, r: f64, u: &str, du: &str| {
+        format!(
+            "states = ['x', 'v']\nstart = [{start}, 0]\nf = ['v', '-10']\n[[event]]\nwhen = 'x - u'\n\
+             direction = 'down'\nset = {{ v = 'du - {r}*(v - du)' }}\nafter_zeno = 'stick'\n[let]\n\
+             u = '{u}'\ndu = '{du}'"
+        )
+    };
+    for method in Method::ALL {
+        let is = |text: &str, t: f64, want: [f64; 2]| {
+            let end = end_of(text, t, method).unwrap_or_else(|e| panic!("{method:?}: {e}\n{text}"));
+            end.iter().zip(want).for_each(|(end, want)| near(*end, want, 1e-8));
+        };
+        // The event fires where the reference jumps up: at 3; at 1 and 3; at 1 and 2.
+        let steps = "if(t < 1, 0.25, if(t < 2, -0.87, if(t < 3, -0.97, 0.67)))";
+        is(&relay(3.0, steps), 3.95, [0.67, 3.0]);
+        let steps = "if(t < 1, 0.27, if(t < 2, 0.74, if(t < 3, 0.05, 0.48)))";
+        is(&relay(3.0, steps), 3.95, [0.48, 4.0]);
+        let steps = "if(t < 1, 0, if(t <= 2, 0.5, if(t < 3, 1, -0.5)))";
+        is(&relay(2.0, steps), 3.95, [-0.5, 3.0]);
+        // The floor sinks from under the body, which falls onto it again.
+        let sinks = stop(1.0, 0.3, "if(t < 2, 0, -0.5*(t - 2))", "if(t < 2, 0, -0.5)");
+        is(&sinks, 2.05, [-0.0125, -0.5]);
+        is(&sinks, 3.9, [-0.95, -0.5]);
+        is(&stop(1.0, 0.3, "if(t < 2, 0, -1)", "0"), 9.0, [-1.0, 0.0]);
+        // The speed of this one turns at pi, and throws the body up.
+        let turns = stop(0.5, 0.1, "0.1*abs(sin(t))", "0.1*cos(t)*sign(sin(t))");
+        is(&turns, 5.0, [0.1 * 5.0_f64.sin().abs(), -0.1 * 5.0_f64.cos()]);
+        let pi = std::f64::consts::PI;
+        is(&turns, pi + 0.001, [0.000_12 - 5e-6, 0.12 - 0.01]);
+    }
+}
+
+/// Events whose expressions see what slides, or are slid upon, happen once: where the motion comes,
+/// and where it leaves to the side that it came from.
+#[test]
+fn events_beside_sliding_happen_once() {
+    let counted = |f: &str, start: &str, when: &str, t: f64, method: Method| {
+        let text = format!(
+            "states = ['x', 'v', 'n']\nstart = [{start}, 0]\nf = ['v', '{f}', '0']\n[[event]]\n\
+             when = '{when}'\nset = {{ n = 'n + t' }}"
+        );
+        end_of(&text, t, method).unwrap_or_else(|e| panic!("{method:?}: {e}\n{text}"))[2]
+    };
+    for method in Method::ALL {
+        let is = |f: &str, start: &str, when: &str, t: f64, want: f64| {
+            near(counted(f, start, when, t, method), want, 1e-8);
+        };
+        is("-sign(v - 0.3)", "0, 0.3", "x - v", 2.0, 1.0);
+        // v comes to 0 from above and leaves it to below; then to above, at t = 3/2.
+        let pi = std::f64::consts::PI;
+        let lands = {
+            // v = 1.5 (1 - cos t) - t + what it had lost until sin t = 2/3; zero again at:
+            let from = (2.0_f64 / 3.0).asin();
+            let v = |t: f64| 1.5 * (from.cos() - t.cos()) - (t - from);
+            let (mut low, mut high) = (2.0, pi + 0.5);
+            for _ in 0..60 {
+                let middle = 0.5 * (low + high);
+                *(if v(middle) > 0.0 { &mut low } else { &mut high }) = middle;
+            }
+            low
+        };
+        is("1.5*sin(t) - sign(v)", "0, 0", "v", 4.0, lands);
+        // 0.3 - 1.5 t + t^2/2 = 0.
+        let arrives = 1.5 - (1.5_f64 * 1.5 - 0.6).sqrt();
+        is("t - 0.5 - sign(v)", "0, 0.3", "v", 3.0, arrives + 1.5);
+        let u = "if(t < 1, 0.94, if(t < 2, -0.08, if(t < 3, 0.25, 1.74)))";
+        is(&format!("{u} - x - sign(v - 0.5)"), "0, 0.5", "v - 0.5", 5.0, 9.416_261_266);
+    }
+}
+
+/// Functions of a sign follow it where sliding ends.
+#[test]
+fn functions_of_signs_follow_where_sliding_ends() {
+    for f in [
+        "clip(-sign(x), -0.5, 0.7)",
+        "min(max(sign(-x), -0.5), 0.7)",
+        "max(-0.5, min(0.7, -100*sign(x)))",
+        "if(sign(x) >= 0.5, -0.5, 0.7)",
+        "min(heaviside(-x), 1.2) - 0.5",
+        "if(abs(sign(x) - 1) < 0.5, -0.5, 0.7)",
+        "if(x > 0, -0.5, 0.7)",
+    ] {
+        let text = format!("states = ['x']\nstart = [0.01]\nf = ['{f} + 0.5*t']");
+        for method in Method::ALL {
+            // From x = 0 at t = 1 on.
+            let end = end_of(&text, 4.0, method).unwrap_or_else(|e| panic!("{method:?}: {e}\n{f}"));
+            near(end[0], 2.25, 1e-9);
+        }
+    }
+}

@@ -8,7 +8,7 @@ const MAY_HIDE: f64 = 1e3;
 
 /// The speed of a surface that sliding has just left is zero there: what a step's interpolant makes
 /// of it is less than this share of the speeds on its two sides.
-const TANGENT: f64 = 1e-3;
+pub(super) const TANGENT: f64 = 1e-3;
 
 impl Follower<'_> {
     /// First condition met in a step, with its place and all others in the same part of the step;

@@ -2,6 +2,9 @@
 
 use super::*;
 
+/// Smaller values of what is held at zero, and smaller speeds, relative to their sizes, are drift.
+const DRIFT: f64 = 1e-7;
+
 impl Follower<'_> {
     pub(super) fn meet(
         &mut self,
@@ -45,6 +48,7 @@ impl Follower<'_> {
                 Sought::Release(place) => opened.push(self.contacts[place]),
             }
         }
+        self.pass_in_time(&crossed);
         // Events that happen at this moment come first, and others that are met decide, too.
         if ceases && fired.is_empty() && crossed.is_empty() {
             let slid = self.sliding.clone();
@@ -73,6 +77,7 @@ impl Follower<'_> {
                 let rates = |follower: &mut Self, side: f64| {
                     let mut config = follower.config.clone();
                     config.sides[*guard] = side;
+                    follower.follow_sides(&mut config, &[*guard]);
                     let (compiled, rates) = follower.rates(&config);
                     let own = compiled.place(*guard).map_or(0.0, |place| rates.first[place]);
                     (own, rates.first[compiled.active.len()..].to_vec())
@@ -97,12 +102,15 @@ impl Follower<'_> {
                 zero.retain(|g| g != guard);
             }
             self.ask_new(&mut config);
+            let left: Vec<usize> = leave.iter().map(|(guard, _)| *guard).collect();
+            self.follow_sides(&mut config, &left);
             let rest: Vec<usize> =
                 self.sliding.iter().copied().filter(|g| zero.contains(g)).collect();
             self.adopt(config, rest);
         }
         let mut accumulates = None;
-        let switches = !(crossed.is_empty() && leave.is_empty());
+        let stepped = std::mem::take(&mut self.tables_step);
+        let switches = stepped || !(crossed.is_empty() && leave.is_empty());
         if !crossed.is_empty() {
             self.outcome.switches += 1;
             let sides = self.config.sides.clone();
@@ -132,6 +140,12 @@ impl Follower<'_> {
             }
         }
         if switches {
+            for i in self.part_from_stops()? {
+                passed.push(i);
+                if !self.pass(i, definition, &mut fired, observe) {
+                    return Ok(Some(Ending::Interrupted));
+                }
+            }
             self.rest_on_stops()?;
         }
         let jumps = if switches { self.watch_jumps(&held, &passed) } else { Vec::new() };
@@ -185,6 +199,50 @@ impl Follower<'_> {
             self.trains[contact.event] = Train::default();
         }
         self.hold_guards()
+    }
+
+    /// A function of the time alone is zero between two numbers, of which the later one counts: what
+    /// the equations say from its switch on is asked there.
+    fn pass_in_time(&mut self, crossed: &[usize]) {
+        const MOST_NUDGES: usize = 8;
+        for guard in crossed.iter().filter(|guard| !self.equation.guards[**guard].whole) {
+            let of_time = |place: usize| self.compiled.touches[place].iter().all(|v| *v == self.n);
+            if !self.compiled.place(*guard).is_some_and(of_time) {
+                continue;
+            }
+            let (e, side) = (&self.equation.guards[*guard].expression, self.config.sides[*guard]);
+            for _ in 0..MOST_NUDGES {
+                let value = self.equation.value(e, self.t, &self.x);
+                // Nothing is greater than what it is equal to.
+                let passed = value * side < 0.0 || value == 0.0 && side > 0.0;
+                if passed || self.t.next_up() > self.options.t_end {
+                    break;
+                }
+                self.t = self.t.next_up();
+            }
+        }
+    }
+
+    /// Ends contacts with stops whose place or speed has jumped. Returns the watched expressions of
+    /// those that strike the body.
+    fn part_from_stops(&mut self) -> Result<Vec<usize>, HybridError> {
+        let (compiled, rates) = self.rates(&self.config.clone());
+        let (mut parted, mut struck) = (Vec::new(), Vec::new());
+        for contact in &self.contacts {
+            let e = &self.equation.watched[contact.watched];
+            let place = compiled.active.len() + contact.watched;
+            let off = self.equation.value(e, self.t, &self.x).abs() > DRIFT * self.magnitude(e);
+            let moves = rates.first[place].abs() > DRIFT * rates.terms[place];
+            if off || moves {
+                parted.push(*contact);
+                // A place that jumps over the body is seen with the other expressions.
+                if !off && rates.first[place] * contact.above < 0.0 {
+                    struck.push(contact.watched);
+                }
+            }
+        }
+        self.open(parted)?;
+        Ok(struck)
     }
 
     /// Ends contacts at which a force that has jumped pulls.
@@ -319,10 +377,16 @@ impl Follower<'_> {
                 let (a, b) = (value(e, &old), value(e, &self.x));
                 (a - b).abs() <= 1e-12 * self.magnitude(e)
             };
+            let held = self.held.clone();
+            // A switch of this moment may have made them jump.
+            let is_zero = |guard: &usize| {
+                let asked = self.compiled.place(*guard).is_some();
+                !asked || self.slides[*guard] || self.fresh_guard[*guard]
+            };
             let zero: Vec<usize> = zero
                 .iter()
                 .copied()
-                .filter(|g| stays_zero(&self.equation.guards[*g].expression))
+                .filter(|g| is_zero(g) && stays_zero(&self.equation.guards[*g].expression))
                 .collect();
             let watched: Vec<usize> = (0..self.watch_side.len())
                 .filter(|i| self.fresh_watch[*i] && stays_zero(&self.equation.watched[*i]))
@@ -333,6 +397,10 @@ impl Follower<'_> {
             let struck = self.keep_contacts(definition, &old);
             self.hold_guards()?;
             for i in 0..self.watch_side.len() {
+                // Slid upon before and after: it is left to a side, or to the other one.
+                if held[i] && self.held[i] {
+                    continue;
+                }
                 let met = self.event_of[i].is_some_and(|event| fired.contains(&event));
                 // A function that the reset leaves alone is where it was, however near to zero.
                 let e = &self.equation.watched[i];
@@ -579,7 +647,7 @@ impl Follower<'_> {
     }
 
     /// The size of a watched value's speed where states are as large as they have been.
-    fn speeds(&self, field: &[f64], place: usize) -> f64 {
+    pub(super) fn speeds(&self, field: &[f64], place: usize) -> f64 {
         let by = |i: usize| self.second_along(field, Some(i))[place].abs();
         (0..self.n).map(|i| by(i) * self.size[i]).sum()
     }

@@ -6,6 +6,7 @@ use std::collections::HashMap;
 use twofold_num::Elementary as _;
 use twofold_system::expression::{Function, General};
 
+use super::locate::TANGENT;
 use super::*;
 use crate::equation::same_sign;
 
@@ -1289,7 +1290,8 @@ impl Follower<'_> {
             self.compiled.watched.evaluate(&self.variables, &mut values);
             let mut jumped = false;
             for (i, guard) in self.compiled.active.clone().into_iter().enumerate() {
-                if zero.contains(&guard) || self.fresh_guard[guard] {
+                let rests = self.equation.rests(guard, &config);
+                if zero.contains(&guard) || self.fresh_guard[guard] && !rests {
                     continue;
                 }
                 let g = &self.equation.guards[guard];
@@ -1479,6 +1481,18 @@ impl Follower<'_> {
             }
         }
         self.fresh_watch[i] = true;
+        // Where the motion slides or rests its speed is not that of one field.
+        if !self.sliding.is_empty() || !self.contacts.is_empty() {
+            let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; self.n]);
+            self.rhs(t, &x, &mut field);
+            self.variables[..self.n].copy_from_slice(&x);
+            self.variables[self.n] = t;
+            let slope = Self::along(&self.compiled, &self.variables, &field)[place];
+            if slope.abs() > 1e-11 * self.speeds(&field, place) {
+                self.watch_side[i] = slope.signum();
+                return;
+            }
+        }
         // A sum of states has a known slope.
         if let Some(sum) = &self.compiled.affine[place] {
             let n = self.n;
@@ -1491,6 +1505,12 @@ impl Follower<'_> {
                 let change = factor * if *variable == n { 1.0 } else { self.scratch[*variable] };
                 slope += change;
                 terms += change.abs();
+            }
+            // Sliding is left without a speed, and to the side that it is left to.
+            let left = self.left_watch[i];
+            if met && slope.abs() <= TANGENT * left.abs() {
+                self.watch_side[i] = left.signum();
+                return;
             }
             if met && slope.abs() > 1e-11 * terms {
                 self.watch_side[i] = slope.signum();
