@@ -3982,8 +3982,8 @@ fn contacts_let_go_to_third_order() {
     }
 }
 
-/// References and stops that jump with the time: a relay that slides on one, with an event about the
-/// same surface, and a body that rests on the other.
+/// References and stops that jump with the time: a relay that slides on one, with an event about
+/// the same surface, and a body that rests on the other.
 #[test]
 fn jumps_of_references_and_stops_are_followed() {
     let relay = |speed: f64, u: &str| {
@@ -3994,9 +3994,9 @@ fn jumps_of_references_and_stops_are_followed() {
     };
     let stop = |start: f64, r: f64, u: &str, du: &str| {
         format!(
-            "states = ['x', 'v']\nstart = [{start}, 0]\nf = ['v', '-10']\n[[event]]\nwhen = 'x - u'\n\
-             direction = 'down'\nset = {{ v = 'du - {r}*(v - du)' }}\nafter_zeno = 'stick'\n[let]\n\
-             u = '{u}'\ndu = '{du}'"
+            "states = ['x', 'v']\nstart = [{start}, 0]\nf = ['v', '-10']\n[[event]]\n\
+             when = 'x - u'\ndirection = 'down'\nset = {{ v = 'du - {r}*(v - du)' }}\n\
+             after_zeno = 'stick'\n[let]\nu = '{u}'\ndu = '{du}'"
         )
     };
     for method in Method::ALL {

@@ -201,8 +201,8 @@ impl Follower<'_> {
         self.hold_guards()
     }
 
-    /// A function of the time alone is zero between two numbers, of which the later one counts: what
-    /// the equations say from its switch on is asked there.
+    /// A function of the time alone is zero between two numbers, of which the later one counts: the
+    /// equations are asked there for what they say from its switch on.
     fn pass_in_time(&mut self, crossed: &[usize]) {
         const MOST_NUDGES: usize = 8;
         for guard in crossed.iter().filter(|guard| !self.equation.guards[**guard].whole) {
