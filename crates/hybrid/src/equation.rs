@@ -92,6 +92,8 @@ pub struct Equation {
     pub guards: Vec<Guard>,
     /// The first of the guards that the conditions of events alone ask.
     of_fields: usize,
+    /// Whether any equation has a root, a logarithm or a division.
+    pub(crate) has_domain_ends: bool,
     by_text: HashMap<String, (usize, bool)>,
     /// The tables' data.
     pub tables: Vec<Table>,
@@ -132,6 +134,22 @@ fn mirrored(e: &Expression) -> Expression {
         Expression::Neg(a) => (**a).clone(),
         other => Expression::Neg(Box::new(other.clone())),
     }
+}
+
+/// Whether an expression has a root, a power that is none of a whole number, a logarithm or a
+/// division.
+fn has_domain_ends(e: &Expression) -> bool {
+    let itself = match e {
+        Expression::Div(..) | Expression::RealPower(..) => true,
+        Expression::Power(_, exponent) => *exponent < 0,
+        Expression::Call(Function::Sqrt | Function::Ln | Function::Tan, _) => true,
+        Expression::Apply(
+            General::Asin | General::Acos | General::Log | General::Log10 | General::Atan2,
+            _,
+        ) => true,
+        _ => false,
+    };
+    itself || e.parts().into_iter().any(has_domain_ends)
 }
 
 /// a - b without needless parts.
@@ -202,6 +220,7 @@ impl Equation {
             values: model.values()?,
             guards: Vec::new(),
             of_fields: 0,
+            has_domain_ends: false,
             by_text: HashMap::new(),
             tables,
             watched: watched.clone(),
@@ -225,6 +244,7 @@ impl Equation {
             equation.find(e, false, !rough)?;
         }
         equation.of_fields = equation.guards.len();
+        equation.has_domain_ends = fields.iter().chain(&terms).any(has_domain_ends);
         for e in &conditions {
             equation.find(e, true, true)?;
         }

@@ -132,11 +132,16 @@ impl Follower<'_> {
             }
             // Equations with kinks alone are Lipschitz: no infinity of them is in finite time.
             for guard in crossed {
-                if self.is_kink(guard) {
+                if self.equation.guards[guard].kink {
                     continue;
                 }
                 let found = self.switch_trains[guard].note(self.t, 0.0);
-                accumulates = accumulates.or(found.map(|(t, error)| (guard, t, error)));
+                if let Some((t, error)) = found
+                    && accumulates.is_none()
+                    && !self.is_kink(guard)
+                {
+                    accumulates = Some((guard, t, error));
+                }
             }
         }
         if switches {
@@ -226,6 +231,9 @@ impl Follower<'_> {
     /// Ends contacts with stops whose place or speed has jumped. Returns the watched expressions of
     /// those that strike the body.
     fn part_from_stops(&mut self) -> Result<Vec<usize>, HybridError> {
+        if self.contacts.is_empty() {
+            return Ok(Vec::new());
+        }
         let (compiled, rates) = self.rates(&self.config.clone());
         let (mut parted, mut struck) = (Vec::new(), Vec::new());
         for contact in &self.contacts {

@@ -10,6 +10,9 @@ use super::locate::TANGENT;
 use super::*;
 use crate::equation::same_sign;
 
+/// Fields that move a state in a run by more than this part of its size apart are no rounding of
+/// one.
+const CLEAR_JUMP: f64 = 1e-3;
 /// Most surfaces on which a rule chooses a mixture.
 const MOST_CORNERS: usize = 3;
 /// Functions that meet of which all sides are tried to see which depend on each other.
@@ -452,7 +455,9 @@ impl Follower<'_> {
             zero.iter().copied().filter(|g| self.compiled.place(*g).is_some()).collect();
         self.add_what_is_zero(&mut zero);
         zero.retain(|guard| !self.guard_held[*guard]);
-        self.put_into_domain(&zero);
+        if self.equation.has_domain_ends {
+            self.put_into_domain(&zero);
+        }
         if zero.len() == 1 {
             // A speed that is only rounding may be a function that is zero, too.
             let config = self.config.clone();
@@ -687,7 +692,15 @@ impl Follower<'_> {
                     continue;
                 }
                 // At a kink the fields differ by rounding, and so do speeds that are nearly zero.
-                if !at(self, vec![false]).5[0] && self.is_kink(zero[set[0]]) {
+                let span = self.options.t_end - self.options.t_start;
+                let jumps = (0..self.n)
+                    .any(|i| (low[i] - high[i]).abs() * span > CLEAR_JUMP * self.size[i]);
+                let rests = at(self, vec![false]).5[0];
+                let is_kink = |follower: &mut Self| {
+                    let guard = zero[set[0]];
+                    follower.equation.guards[guard].kink || !jumps && follower.is_kink(guard)
+                };
+                if !rests && is_kink(self) {
                     let present = self.config.sides[zero[set[0]]] == highs[set[0]];
                     let plus = if same_sign(d0[0], d1[0]) { d1[0] > 0.0 } else { present };
                     ways[set[0]] = if plus { Way::Plus } else { Way::Minus };
