@@ -656,7 +656,7 @@ const MOST_LEAVING: u32 = 1000;
 /// So many steps that take a run less than this part of its time would not end.
 const STEPS_BETWEEN_LOOKS: u64 = 16384;
 const NO_TIME: f64 = 1e-12;
-/// Taylor series that move so little, as a share of the run, would take more steps than there are.
+/// Taylor series that move a run by so small a part of the time it has come would not end, either.
 const LITTLE_TIME: f64 = 1e-6;
 
 /// Scale of each state's error in a step.
@@ -971,12 +971,13 @@ impl<'a> Follower<'a> {
             }
             if self.outcome.steps >= looked_at.0 + STEPS_BETWEEN_LOOKS {
                 let before = std::mem::replace(&mut looked_at, (self.outcome.steps, self.t)).1;
-                let share = (self.t - before) / (self.options.t_end - self.options.t_start);
+                let made = self.t - before;
                 // Before the end of a root's domain a series reaches as far as the motion does.
-                if self.options.method == Method::Taylor && share <= LITTLE_TIME {
+                let little = made <= LITTLE_TIME * (self.t - self.options.t_start);
+                if self.options.method == Method::Taylor && little && self.breaks_ahead(made) {
                     return Err(self.left_domain(self.t, &self.x.clone()));
                 }
-                if share <= NO_TIME {
+                if made <= NO_TIME * (self.options.t_end - self.options.t_start) {
                     let why =
                         "steps, events or switches follow each other without end in no time: \
                         describe by one [[event]] what happens there, or give another --method"

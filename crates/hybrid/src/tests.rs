@@ -4082,3 +4082,34 @@ fn functions_of_signs_follow_where_sliding_ends() {
         }
     }
 }
+
+/// Tables that jump over an event's zero, or to equality and away from it, are met once each time.
+#[test]
+fn events_see_the_jumps_of_tables() {
+    let table = "[tables.u]\nfile = 'u.csv'\ntime = 't'\ncolumn = 'u'\ninterpolation = 'previous'";
+    let counts = |when: &str| {
+        format!(
+            "states = ['n']\nstart = [0]\nf = ['0']\n[[event]]\nwhen = '{when}'\n\
+             set = {{ n = 'n + t' }}\n{table}"
+        )
+    };
+    // The table jumps over the body, which then rises from 0.5 with speed 2.
+    let floor = format!(
+        "states = ['v', 'x']\nstart = [0, 1]\nf = ['-1', 'v']\n[[event]]\nwhen = 'x - u'\n\
+         direction = 'down'\nset = {{ v = '2' }}\n{table}"
+    );
+    for (text, rows, t_end, want) in [
+        (counts("u >= 2"), "0,0\n1,2\n2,0\n3,2\n4,0\n", 4.0, 1.0 + 3.0),
+        (counts("u < 2"), "0,2\n1,0\n2,2\n3,0\n4,0\n", 4.0, 1.0 + 3.0),
+        (counts("u - 2.5"), "0,3\n1,2\n2,3\n3,1\n4,0\n", 4.0, 1.0 + 2.0 + 3.0),
+        (floor, "0,0\n1,0.7\n3,0.7\n", 3.0, 0.5 + 2.0 * 2.0 - 2.0),
+    ] {
+        let model = model(&text).with_table("u", &format!("t,u\n{rows}")).unwrap();
+        for method in Method::ALL {
+            let options = Options { t_end, method, ..Options::default() };
+            let outcome = follow(&model, &options, &mut |_| true).unwrap();
+            assert_eq!(outcome.ending, Ending::Finished, "{method:?}: {text}");
+            near(*outcome.x.last().unwrap(), want, 1e-9);
+        }
+    }
+}
