@@ -35,6 +35,7 @@
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
 #![forbid(unsafe_code)]
 
+mod cells;
 pub mod data;
 pub mod definition;
 pub mod equation;

@@ -28,6 +28,7 @@ use twofold_num::linear::solve_any;
 use twofold_num::{Dual, Short};
 use twofold_system::Expression;
 
+use crate::cells::Cells;
 use crate::definition::{Direction, When};
 use crate::equation::{Compiled, Configuration, Equation, EquationError};
 use crate::model::Model;
@@ -427,6 +428,9 @@ struct Follower<'a> {
     /// Fields on all sides of the surfaces slid upon, for the rule that chooses among mixtures if
     /// these differ.
     corners: Vec<(Rc<Compiled>, Vec<f64>)>,
+    /// The sides of the surfaces slid upon that have points, where some are zero because others
+    /// are. The corners are theirs alone then.
+    cells: Option<Cells>,
     /// The surfaces of [`Intersection::Order`].
     order: Vec<usize>,
     /// Surfaces slid upon that know nothing of each other: the one that each state's derivative
@@ -840,6 +844,7 @@ impl<'a> Follower<'a> {
             along: vec![0.0; guards],
             base: Vec::new(),
             corners: Vec::new(),
+            cells: None,
             order,
             separate: None,
             dependent: false,

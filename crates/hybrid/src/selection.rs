@@ -256,7 +256,7 @@ fn stays(weights: &[f64], rates: &[Vec<f64>], k: usize) -> bool {
 /// The least square of the mixture's length under the conditions that weights sum to one, are not
 /// negative and keep all functions at zero: the conditions of Karush, Kuhn and Tucker for every set
 /// of fields that take part.
-fn shortest(fields: &[Vec<f64>], rates: &[Vec<f64>], k: usize) -> Option<Vec<f64>> {
+pub(crate) fn shortest(fields: &[Vec<f64>], rates: &[Vec<f64>], k: usize) -> Option<Vec<f64>> {
     let mut best: Option<(f64, Vec<f64>)> = None;
     for set in 1_usize..1 << fields.len() {
         let part: Vec<usize> = (0..fields.len()).filter(|v| set >> v & 1 == 1).collect();
@@ -441,15 +441,7 @@ fn is_diagonally_stable(m: &[f64], k: usize) -> bool {
         if all.iter().all(|[value, _]| *value <= 1e-12 * size) {
             return true;
         }
-        // The direction of its largest eigenvalue, by powers of what has none below zero.
-        let mut x: Vec<f64> = (0..k).map(|i| 1.0 + 0.1 * i as f64).collect();
-        for _ in 0..400 {
-            let image: Vec<f64> = (0..k)
-                .map(|i| size * x[i] + (0..k).map(|j| form[i * k + j] * x[j]).sum::<f64>())
-                .collect();
-            let length = image.iter().map(|v| v * v).sum::<f64>().sqrt();
-            x = image.iter().map(|v| v / length).collect();
-        }
+        let x = top_direction(&form, k);
         let gain = |i: usize| -x[i] * (0..k).map(|j| m[i * k + j] * x[j]).sum::<f64>();
         let cut: Vec<f64> = (0..k).map(gain).collect();
         let length = cut.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
@@ -460,6 +452,20 @@ fn is_diagonally_stable(m: &[f64], k: usize) -> bool {
         }
     }
     false
+}
+
+/// The direction of the largest eigenvalue of a symmetric matrix, by powers of what has none below
+/// zero.
+pub(crate) fn top_direction(form: &[f64], k: usize) -> Vec<f64> {
+    let size = form.iter().fold(0.0_f64, |sum, v| sum + v.abs());
+    let mut x: Vec<f64> = (0..k).map(|i| 1.0 + 0.1 * i as f64).collect();
+    for _ in 0..400 {
+        let image: Vec<f64> =
+            (0..k).map(|i| size * x[i] + dot(&form[i * k..(i + 1) * k], &x)).collect();
+        let length = dot(&image, &image).sqrt();
+        x = image.iter().map(|v| v / length).collect();
+    }
+    x
 }
 
 /// Whether mixtures of fields that stay on surfaces have more than one velocity: some component of
@@ -494,7 +500,7 @@ pub(crate) fn velocities_differ(fields: &[Vec<f64>], rates: &[Vec<f64>]) -> bool
     })
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
@@ -503,7 +509,7 @@ const NOT_NEW: f64 = 1e-9;
 
 /// The part of a row of numbers that is new beside an orthonormal basis, and its length; none if it
 /// is a sum of them to rounding.
-fn new_part(basis: &[Vec<f64>], row: &[f64]) -> Option<(Vec<f64>, f64)> {
+pub(crate) fn new_part(basis: &[Vec<f64>], row: &[f64]) -> Option<(Vec<f64>, f64)> {
     let mut new = row.to_vec();
     for q in basis.iter().chain(basis) {
         let share = dot(&new, q);
@@ -562,7 +568,7 @@ pub(crate) fn near_solution(a: &[f64], b: &[f64], about: f64) -> Option<(Vec<f64
 }
 
 /// The vector that a matrix of `k` rows maps to zero, if there is one and no other.
-fn null_vector(a: &[f64], k: usize) -> Option<Vec<f64>> {
+pub(crate) fn null_vector(a: &[f64], k: usize) -> Option<Vec<f64>> {
     let mut basis = Vec::new();
     for row in a.chunks(k) {
         basis.extend(new_part(&basis, row).map(|(new, _)| new));

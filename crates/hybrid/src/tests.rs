@@ -3557,6 +3557,45 @@ fn surfaces_that_depend_on_each_other_are_slid_upon_under_a_drift() {
     }
 }
 
+/// Servers that attend to the longest queue: of the patterns of signs of x - y, x - z and y - z two
+/// have no points, and no mixture has their fields. All queues shrink alike by what is served
+/// beyond what arrives.
+#[test]
+fn sides_that_have_no_points_take_no_part() {
+    let three = [
+        "'0.2 - if(x > max(y, z), 1, 0)', '0.25 - if(y > max(x, z), 1, 0)', \
+            '0.3 - if(z > max(x, y), 1, 0)'",
+        "'0.2 - if(x >= max(y, z), 1, 0)', '0.25 - if(y > x and y >= z, 1, 0)', \
+            '0.3 - if(z > x and z > y, 1, 0)'",
+        "'0.2 - if(x > y and x > z, 1, 0)', \
+            '0.25 - (1 - if(x > y and x > z, 1, 0))*if(y > z, 1, 0)', \
+            '0.3 - (1 - if(x > y and x > z, 1, 0))*if(y > z, 0, 1)'",
+    ];
+    let one_after_the_other = [Method::Dopri5, Method::Radau5, Method::Lsoda];
+    for method in one_after_the_other {
+        for f in three {
+            let text = format!("states = ['x', 'y', 'z']\nstart = [3, 2, 1.5]\nf = [{f}]");
+            let end = end_of(&text, 9.0, method).unwrap();
+            assert!(end.iter().all(|x| (x - 4.25 / 3.0).abs() < 1e-12), "{method:?} {end:?}");
+        }
+        // From t = 5.75 on the other two take all of the service: z grows by less than they shrink.
+        let text = format!("states = ['x', 'y', 'z']\nstart = [3, 2, 1.5]\nf = [{}]", three[0])
+            .replace("0.3 -", "0.3 - 0.1*t -");
+        let end = end_of(&text, 12.0, method).unwrap();
+        let z = |t: f64| 0.3 * t - 0.05 * t * t;
+        let met = (6.5 + 0.45 * 5.75 + z(5.75) - 5.75) / 3.0;
+        let want = [met - 0.275 * 6.25, met - 0.275 * 6.25, met + z(12.0) - z(5.75)];
+        for (x, want) in end.iter().zip(want) {
+            assert!((x - want).abs() < 1e-7, "{method:?} {end:?} {want}");
+        }
+        let four = "states = ['x', 'y', 'z', 'w']\nstart = [3, 2, 1.5, 1]\nf = [\
+            '0.2 - if(x > max(max(y, z), w), 1, 0)', '0.15 - if(y > max(max(x, z), w), 1, 0)', \
+            '0.1 - if(z > max(max(x, y), w), 1, 0)', '0.22 - if(w > max(max(x, y), z), 1, 0)']";
+        let end = end_of(four, 12.0, method).unwrap();
+        assert!(end.iter().all(|x| (x - 0.885).abs() < 1e-12), "{method:?} {end:?}");
+    }
+}
+
 /// Robertson's reactions (1966), which ODEPACK's LSODA is shown by: the sum of the three is kept,
 /// the event marks the time of a tenth, and a dose then restarts them.
 #[test]

@@ -869,9 +869,10 @@ impl Follower<'_> {
             follower.equation.compiled(config).field.evaluate(&v, &mut f);
             f
         };
-        let fields: Vec<Vec<f64>> = (0..1 << near.len())
-            .map(|vertex| velocity(&of_sides(vertex, self), &x, self))
-            .collect();
+        let cells = self.cells_of(&near.iter().map(|(_, guard)| *guard).collect::<Vec<_>>());
+        let vertices = cells.map_or((0..1 << near.len()).collect(), |cells| cells.patterns);
+        let fields: Vec<Vec<f64>> =
+            vertices.iter().map(|vertex| velocity(&of_sides(*vertex, self), &x, self)).collect();
         let left = self.options.t_end - t;
         if no_way && self.stops_at_equality(t, &x, &near, &fields, left) {
             return true;
@@ -890,7 +891,7 @@ impl Follower<'_> {
         // If mixtures differ, only one that all surfaces hold is known to stay.
         // Nor are all mixtures there of functions with one zero, whose sides belong together.
         let all_there = || settling::independent(&self.gradients_of(&near));
-        if (settling::mixtures_differ(&parts) || !all_there()) && !self.holds_still(&near, &moves) {
+        if (!all_there() || settling::mixtures_differ(&parts)) && !self.holds_still(&near, &moves) {
             return false;
         }
         if !nearest_of_hull(&parts).iter().all(|v| v.abs() <= 1e-6) {
@@ -903,7 +904,7 @@ impl Follower<'_> {
         }
         // A field that leads to its own side for a short time leads away.
         let brief = 1e-4 * moves.iter().map(|i| self.size[*i] / fastest[*i]).fold(left, f64::min);
-        for vertex in 0..fields.len() {
+        for vertex in vertices {
             let config = of_sides(vertex, self);
             let there = a_little_later(&mut |_, x| velocity(&config, x, self), t, &x, brief);
             let mut v = self.load(&config);

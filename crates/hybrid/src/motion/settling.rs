@@ -4,17 +4,19 @@ use std::cell::Cell;
 use std::collections::HashMap;
 
 use twofold_num::Elementary as _;
+use twofold_num::random::RandomStream;
 use twofold_system::expression::{Function, General};
 
 use super::locate::TANGENT;
 use super::*;
+use crate::cells;
 use crate::equation::same_sign;
 
 /// Fields that move a state in a run by more than this part of its size apart are no rounding of
 /// one.
 const CLEAR_JUMP: f64 = 1e-3;
 /// Most surfaces on which a rule chooses a mixture.
-const MOST_CORNERS: usize = 3;
+pub(super) const MOST_CORNERS: usize = 3;
 /// Functions that meet of which all sides are tried to see which depend on each other.
 const MOST_TRIED: usize = 4;
 
@@ -288,6 +290,64 @@ impl Follower<'_> {
         }
     }
 
+    /// Adds the functions that are zero because others are: x - z where x - y and y - z are.
+    fn add_what_follows(&self, zero: &mut Vec<usize>) {
+        if zero.len() < 2 {
+            return;
+        }
+        let new = |g: &usize| !zero.contains(g) && !self.guard_held[*g];
+        let at_zero = |g: &usize| self.side_of(*g).is_none();
+        let active = self.compiled.active.iter().copied();
+        for guard in active.filter(new).filter(at_zero).collect::<Vec<_>>() {
+            zero.push(guard);
+            if !self.values_around(zero).is_some_and(|values| cells::last_follows(&values)) {
+                zero.pop();
+            }
+        }
+    }
+
+    /// The values of functions at points drawn around the present one; none of more than are tried
+    /// together, of whole parts, and of functions that bend there.
+    fn values_around(&self, guards: &[usize]) -> Option<Vec<Vec<f64>>> {
+        /// Distance of the points, relative to the states' sizes, and what a bend makes of it.
+        const AROUND: f64 = 1e-3;
+        const BEND: f64 = 0.1;
+        let whole = |guard: &usize| self.equation.guards[*guard].whole;
+        if !(2..=MOST_TOGETHER).contains(&guards.len()) || guards.iter().any(whole) {
+            return None;
+        }
+        let mut chance = RandomStream::new(0, guards.len() as u64);
+        let largest = self.size.iter().fold(0.0_f64, |most, s| most.max(*s));
+        let sizes = self.size.iter().map(|size| size.max(1e-3 * largest));
+        let sizes: Vec<f64> = sizes.chain([self.options.t_end - self.options.t_start]).collect();
+        let change = |off: &[f64], sign: f64| -> Vec<f64> {
+            let x: Vec<f64> = self.x.iter().zip(off).map(|(x, off)| x + sign * off).collect();
+            let t = self.t + sign * off[self.n];
+            let of = |g: &usize| {
+                let e = &self.equation.guards[*g].expression;
+                self.equation.value(e, t, &x) - self.equation.value(e, self.t, &self.x)
+            };
+            guards.iter().map(of).collect()
+        };
+        let mut values = Vec::new();
+        for _ in 0..2 * guards.len() {
+            let off: Vec<f64> =
+                sizes.iter().map(|size| AROUND * (2.0 * chance.uniform() - 1.0) * size).collect();
+            let (ahead, back) = (change(&off, 1.0), change(&off, -1.0));
+            let is_line = |(a, b): (&f64, &f64)| (a + b).abs() <= BEND * a.abs().max(b.abs());
+            if !ahead.iter().zip(&back).all(is_line) {
+                return None;
+            }
+            values.push(ahead);
+        }
+        Some(values)
+    }
+
+    /// The cells around a meeting of surfaces, where some of these functions follow from others.
+    pub(super) fn cells_of(&self, guards: &[usize]) -> Option<Cells> {
+        Cells::of(&self.values_around(guards)?)
+    }
+
     /// Whether nothing moves a guard, at this place among the rates: no term, or of one that the
     /// conditions of events alone ask terms that cancel.
     fn keeps_still(&self, guard: usize, rates: &Rates, place: usize) -> bool {
@@ -455,6 +515,7 @@ impl Follower<'_> {
             zero.iter().copied().filter(|g| self.compiled.place(*g).is_some()).collect();
         self.add_what_is_zero(&mut zero);
         zero.retain(|guard| !self.guard_held[*guard]);
+        self.add_what_follows(&mut zero);
         if self.equation.has_domain_ends {
             self.put_into_domain(&zero);
         }
@@ -708,7 +769,11 @@ impl Follower<'_> {
                 }
             }
             let mut open = None;
+            let cells = self.cells_of(&set.iter().map(|i| zero[*i]).collect::<Vec<_>>());
             let found = possibilities(set.len(), |assignment| {
+                if cells.as_ref().is_some_and(|cells| !cells.has(assignment)) {
+                    return false;
+                }
                 let slides: Vec<usize> =
                     (0..set.len()).filter(|i| assignment[*i] == Way::Stay).collect();
                 let plus: Vec<bool> = assignment.iter().map(|w| *w == Way::Plus).collect();
@@ -726,6 +791,43 @@ impl Follower<'_> {
                 // A function that is zero all along on the side of another is no surface there.
                 if slides.iter().any(|s| rests[*s]) {
                     return false;
+                }
+                if let Some(cells) = cells.as_ref().and_then(|cells| cells.part(&slides)) {
+                    let (mut fields, mut speeds) = (Vec::new(), Vec::new());
+                    for cell in &cells.patterns {
+                        let mut on = plus.clone();
+                        slides.iter().enumerate().for_each(|(i, s)| on[*s] = cell >> i & 1 == 1);
+                        let (field, rates, ..) = at(self, on);
+                        fields.push(field);
+                        speeds.push(rates);
+                    }
+                    let own: Vec<Vec<f64>> = speeds
+                        .iter()
+                        .map(|rates| slides.iter().map(|s| rates[*s]).collect())
+                        .collect();
+                    if !(cells.depth(&own) > 0.0) {
+                        return false;
+                    }
+                    if self.options.intersection == Intersection::Undecided {
+                        if velocities_differ(&fields, &own) {
+                            open = Some(SEVERAL_VELOCITIES);
+                            return false;
+                        }
+                        if !cells.attract(&own) {
+                            open = Some(TURNS_AWAY);
+                            return false;
+                        }
+                    }
+                    let Some(weights) = self.weights_in_cells(&fields, &own) else { return false };
+                    let goes = |i: usize| {
+                        let rate: f64 = weights.iter().zip(&speeds).map(|(w, r)| w * r[i]).sum();
+                        match assignment[i] {
+                            Way::Plus => rate > 0.0,
+                            Way::Minus => rate < 0.0,
+                            Way::Stay => true,
+                        }
+                    };
+                    return (0..set.len()).all(goes);
                 }
                 let mut columns = Vec::new();
                 for s in &slides {
@@ -923,7 +1025,12 @@ impl Follower<'_> {
             on.count() > 1
         };
         let chooses = stay.iter().any(|i| self.equation.chooses(zero[*i]));
-        if stay.len() > 1 && (chooses || (0..self.n).any(on_one_state)) {
+        let guards: Vec<usize> = stay.iter().map(|i| zero[*i]).collect();
+        // Of cells the mixture is known.
+        if stay.len() > 1
+            && self.cells_of(&guards).is_none()
+            && (chooses || (0..self.n).any(on_one_state))
+        {
             let fields = |follower: &mut Self, on: &dyn Fn(usize) -> bool| {
                 vertex(follower, &|i| ways[i] == Way::Plus || (ways[i] == Way::Stay && on(i)))
                     .2
@@ -991,7 +1098,9 @@ impl Follower<'_> {
         }
         sliding.sort_unstable();
         self.adopt(config, sliding);
-        self.corners = Vec::new();
+        if self.cells.is_none() {
+            self.corners = Vec::new();
+        }
         let left = self.leave_by_jump(&zero, &before);
         if !left.is_empty() {
             let (rest, none) = (

@@ -3,8 +3,11 @@
 
 use std::rc::Rc;
 
+use super::settling::MOST_CORNERS;
 use super::*;
+use crate::cells;
 use crate::range::Range;
+use crate::selection::shortest;
 use crate::step::SETTLED;
 use twofold_num::Arithmetic as _;
 
@@ -58,10 +61,13 @@ impl Follower<'_> {
         // Surfaces that are left leave the others with the mixture of their corners.
         let mixed = !self.corners.is_empty() && self.separate.is_none() && self.sliding.len() > 1;
         self.corners = Vec::new();
-        if mixed {
+        self.cells = self.separate.is_none().then(|| self.cells_of(&self.sliding)).flatten();
+        if mixed || self.cells.is_some() {
             self.take_corners();
         }
-        if self.separate.is_none() {
+        if self.cells.is_some() {
+            self.dependent = true;
+        } else if self.separate.is_none() {
             for guard in self.sliding.clone() {
                 let mut flipped = self.config.clone();
                 flipped.sides[guard] = self.high(guard);
@@ -330,11 +336,13 @@ impl Follower<'_> {
         noise
     }
 
-    /// Prepares the fields on all sides of the surfaces slid upon.
+    /// Prepares the fields on all sides of the surfaces slid upon, where these have points.
     pub(super) fn take_corners(&mut self) {
         let k = self.sliding.len();
         let mut corners = Vec::new();
-        for vertex in 0..1_usize << k {
+        let has = |vertex: &usize| self.cells.as_ref().is_none_or(|c| c.patterns.contains(vertex));
+        let vertices: Vec<usize> = (0..1_usize << k).filter(has).collect();
+        for vertex in vertices {
             let mut config = self.config.clone();
             for (i, guard) in self.sliding.iter().enumerate() {
                 config.sides[*guard] =
@@ -342,7 +350,11 @@ impl Follower<'_> {
             }
             let sliding = self.sliding.clone();
             self.follow_sides(&mut config, &sliding);
-            corners.push((self.equation.compiled(&config), self.load(&config)));
+            let own = self.equation.compiled(&config);
+            let unasked: Vec<usize> =
+                sliding.into_iter().filter(|guard| own.place(*guard).is_none()).collect();
+            let compiled = self.equation.compiled_with(&config, &unasked);
+            corners.push((compiled, self.load(&config)));
         }
         self.corners = corners;
     }
@@ -390,14 +402,43 @@ impl Follower<'_> {
             weights: vec![f64::NAN; fields.len()],
             margins: vec![[f64::NAN; 2]; self.sliding.len()],
         };
-        let found = mixture(&self.rule(), &order, &fields, &rates).unwrap_or_else(none);
-        (found, fields, rates)
+        let found = if self.cells.is_some() {
+            let weights = self.weights_in_cells(&fields, &rates);
+            weights.map(|weights| Mixture { weights, margins: Vec::new() })
+        } else {
+            mixture(&self.rule(), &order, &fields, &rates)
+        };
+        (found.unwrap_or_else(none), fields, rates)
+    }
+
+    /// Weights of the fields around surfaces of which some are zero wherever others are.
+    pub(super) fn weights_in_cells(
+        &self,
+        fields: &[Vec<f64>],
+        rates: &[Vec<f64>],
+    ) -> Option<Vec<f64>> {
+        if self.options.intersection == Intersection::Undecided || !velocities_differ(fields, rates)
+        {
+            return Some(cells::weights(rates));
+        }
+        let few = self.options.intersection == Intersection::HullLeastNorm
+            && fields.len() <= 1 << MOST_CORNERS;
+        few.then(|| shortest(fields, rates, rates[0].len())).flatten()
     }
 
     /// Positive where the motion on the surfaces slid upon, with these fields around them, is the
     /// only one and has one velocity, or where a rule says so. What leads away to first order ends
     /// the sliding by its weights.
     pub(super) fn corners_hold(&self, fields: &[Vec<f64>], rates: &[Vec<f64>]) -> f64 {
+        if let Some(cells) = &self.cells {
+            /// Up to here a field that ceases to attract is told from one that leads away.
+            const CLEAR: f64 = 1e-4;
+            let depth = cells.depth(rates);
+            let attract = || depth < CLEAR || cells.attract(rates);
+            let decided = self.options.intersection != Intersection::Undecided
+                || !velocities_differ(fields, rates) && attract();
+            return if decided { depth + LITTLE } else { -1.0 };
+        }
         match rates {
             _ if self.options.intersection != Intersection::Undecided => 1.0,
             [a, b, c, d] if !velocities_differ(fields, rates) => {
