@@ -10,6 +10,7 @@ use std::cell::RefCell;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::rc::Rc;
 
+use twofold_num::random::RandomStream;
 use twofold_num::tape::{Program, Recorded};
 use twofold_num::{Arithmetic, Decimal, Dual, Elementary, Scalar, Tape};
 use twofold_system::Expression;
@@ -339,9 +340,15 @@ impl Equation {
     }
 
     fn sees_time(&self, e: &Expression) -> bool {
+        let is_table = |name: &str| self.definition.tables.iter().any(|(table, _)| table == name);
+        self.sees(e, &|name| name == "t" || is_table(name))
+    }
+
+    /// Whether an expression has one of these names, by itself or in a term.
+    fn sees(&self, e: &Expression, wanted: &dyn Fn(&str) -> bool) -> bool {
         let (mut open, mut seen) = (e.names(), HashSet::new());
         while let Some(name) = open.pop() {
-            if name == "t" || self.definition.tables.iter().any(|(table, _)| table == name) {
+            if wanted(name) {
                 return true;
             }
             if seen.insert(name) {
@@ -349,6 +356,81 @@ impl Equation {
             }
         }
         false
+    }
+
+    /// Whether anything depends on the time, events of the clock included.
+    pub fn is_driven(&self) -> bool {
+        self.depends_on_time()
+            || self.events_see_time()
+            || self.definition.events.iter().any(|event| {
+                matches!(event.when, When::At(_) | When::Every(_))
+                    || event.set.iter().any(|(_, e)| self.sees_time(e))
+            })
+    }
+
+    /// The first part of the equations that is not the same a time `period` later, at times from
+    /// `from` on and states up to these sizes. What follows a table that ends before is not looked
+    /// at.
+    pub fn not_the_same_after(&self, period: f64, from: f64, sizes: &[f64]) -> Option<String> {
+        /// Times and states at which the equations are compared, and the part of an expression's
+        /// largest size by which it may differ.
+        const TRIED: usize = 32;
+        const SAME: f64 = 1e-6;
+        let d = &self.definition;
+        let ends = |table: &str| {
+            let at = d.tables.iter().position(|(name, _)| name == table);
+            let last = at.and_then(|at| self.tables[at].knots.last());
+            last.is_some_and(|last| *last < from + 2.0 * period)
+        };
+        let mut chance = RandomStream::new(0, 0);
+        let mut drawn = |width: f64| (2.0 * chance.uniform() - 1.0) * width;
+        let places: Vec<(f64, Vec<f64>)> = (0..TRIED)
+            .map(|_| (from + period * drawn(1.0).abs(), sizes.iter().map(|s| drawn(*s)).collect()))
+            .collect();
+        let differs = |e: &Expression| {
+            if !self.sees_time(e) || self.sees(e, &ends) {
+                return false;
+            }
+            let pairs = places
+                .iter()
+                .map(|(t, x)| [*t, t + period].map(|t| self.value(e, t, x)))
+                .filter(|pair| pair.iter().all(|v| v.is_finite()));
+            let pairs: Vec<[f64; 2]> = pairs.collect();
+            let size = pairs.iter().flatten().fold(0.0_f64, |most, v| most.max(v.abs()));
+            pairs.iter().any(|[now, later]| (now - later).abs() > SAME * size)
+        };
+        let fields = d.modes.iter().flat_map(|mode| d.states.iter().zip(&mode.field));
+        if let Some((state, e)) = fields.into_iter().find(|(_, e)| differs(e)) {
+            return Some(format!("{}' = {e}", state.name));
+        }
+        // Sides of what decides between fields, of which the states that are tried may see one.
+        if let Some(guard) = self.guards.iter().find(|g| !g.whole && differs(&g.expression)) {
+            return Some(format!("the switching function {}", guard.expression));
+        }
+        for event in &d.events {
+            let start = &places[0].1;
+            let clock = match &event.when {
+                When::Zero(e, _) | When::Becomes(e) => differs(e).then(|| format!("when {e}")),
+                When::At(times) => {
+                    let within = |e: &&Expression| {
+                        let t = self.value(e, from, start);
+                        t > from && t <= from + period
+                    };
+                    times.iter().find(within).map(|e| format!("at {e}, once"))
+                }
+                When::Every(e) => {
+                    let count = period / self.value(e, from, start);
+                    let whole = (count - count.round()).abs() <= SAME * count;
+                    (!whole).then(|| format!("every {e}"))
+                }
+            };
+            let set = event.set.iter().find(|(_, e)| differs(e));
+            let set = set.map(|(i, e)| format!("sets {} = {e}", d.states[*i].name));
+            if let Some(what) = clock.or(set) {
+                return Some(format!("{} ({what})", event.name));
+            }
+        }
+        None
     }
 
     /// The parameters' values.

@@ -148,6 +148,11 @@ impl Model {
         crate::Equation::new(self, None).is_ok_and(|equation| equation.depends_on_time())
     }
 
+    /// Whether anything depends on the time, events of the clock included.
+    pub fn is_driven(&self) -> bool {
+        crate::Equation::new(self, None).is_ok_and(|equation| equation.is_driven())
+    }
+
     /// The data that determine the system's numbers: the file's content with these values, the
     /// tables' points, and the order of names where it is not alphabetical, since motion begins in
     /// the first mode.

@@ -3,16 +3,18 @@
 use serde_json::{Value, json};
 use twofold_analyse::branch::{self, BranchOptions, End, Newton, Orbit, ReturnMap, Trouble};
 use twofold_analyse::floquet::Returned;
+use twofold_hybrid::equation::EquationError;
 use twofold_hybrid::motion::tangent::{Return, closed_orbit, once_around};
-use twofold_hybrid::motion::{Outcome, Record, starts_on_an_event};
+use twofold_hybrid::motion::{Outcome, Record, follow_to_rest, starts_on_an_event};
 use twofold_hybrid::rests::rests;
-use twofold_hybrid::{Ending, HybridError, Model, Options, follow};
+use twofold_hybrid::{Ending, Equation, HybridError, Model, Options, follow};
 use twofold_integrate::Monitor;
 
 use super::answer::{Answer, Stop};
 use super::general::GeneralRun;
-use super::orbit::{Along, CLOSED, ITERATIONS, LEAST_CLOSED, ROUGHLY, branch_tables};
+use super::orbit::{Along, CLOSED, ITERATIONS, LEAST_CLOSED, ROUGHLY, at_rest, branch_tables};
 use super::question::{Ask, JobError, Question};
+use super::rest::{Rest, RestKind, Stability};
 
 /// A closed orbit of a general system, by Newton's method once the motion has settled, and its
 /// branch along a parameter if one is named.
@@ -37,6 +39,9 @@ const ANOTHER: f64 = 0.05;
 /// A return may take so many times the steps of the first orbit of a branch, or of this number.
 const LONGEST: u64 = 100;
 const LEAST_STEPS: u64 = 1000;
+
+/// Points of a map are of this size at least, in their units.
+const LEAST_SIZE: f64 = 1e-2;
 
 /// A settling that ends on an event is repeated so many times, by this share longer each time.
 const LONGER: u32 = 8;
@@ -72,7 +77,8 @@ impl Question for GeneralOrbit {
         self.settle
     }
 
-    /// Facts: `states` (their names), `point`, `period`, `multipliers` (real and imaginary parts,
+    /// Facts where the motion comes to a rest: that of [`ClosedOrbit`](super::ClosedOrbit). Else
+    /// `states` (their names), `point`, `period`, `multipliers` (real and imaginary parts,
     /// the largest first), `gap` (how far the orbit is from closed, relative to its largest
     /// state) and, from 5 % on, `moved` (how far it lies from where the motion had settled,
     /// relative to the size of a state). Of a branch also the tables `branch` and `bifurcations`
@@ -88,8 +94,16 @@ impl Question for GeneralOrbit {
             Return::Period(period) => (self.settle / period).ceil() * period,
             Return::Crossings(_) => self.settle,
         };
+        if let Return::Period(period) = self.after {
+            self.has_period(&model, period)?;
+            options.t_end = options.t_start + period;
+        }
         if settle > 0.0 {
             let begin = options.clone();
+            let (mut settled, rest) = self.rest_after(&model, &begin, (settle, STILL), monitor)?;
+            if let Some(rest) = rest {
+                return Ok(at_rest(&model.coordinates(), &rest));
+            }
             for times in 0..=LONGER {
                 let longer = 1.0 + f64::from(times) * LONGER_BY;
                 let settling = Options {
@@ -97,8 +111,12 @@ impl Question for GeneralOrbit {
                     record: Record::Times { every: f64::INFINITY },
                     ..begin.clone()
                 };
-                let end =
-                    follow(&model, &settling, &mut |point| monitor.reached(point.t).is_continue())?;
+                let end = match settled.take() {
+                    Some(end) => end,
+                    None => follow(&model, &settling, &mut |point| {
+                        monitor.reached(point.t).is_continue()
+                    })?,
+                };
                 if end.ending == Ending::Interrupted {
                     return Err(JobError::Interrupted);
                 }
@@ -114,8 +132,27 @@ impl Question for GeneralOrbit {
             Return::Period(period) => Strobe::new(&model, &mut options, period)?,
             Return::Crossings(_) => None,
         };
-        let mut found = closed_orbit(&model, &options, &self.after)?;
+        let mut found = match closed_orbit(&model, &options, &self.after) {
+            Err(HybridError::NoOrbit(why)) => {
+                // The motion may rest after a longer time.
+                let longest = options.t_end - options.t_start;
+                return match self.rest_after(&model, &options, (longest, COMES), monitor)?.1 {
+                    Some(rest) => Ok(at_rest(&model.coordinates(), &rest)),
+                    None => Err(HybridError::NoOrbit(why).into()),
+                };
+            }
+            other => other?,
+        };
         let found_here = found.x.clone();
+        if found.is_point && matches!(self.after, Return::Crossings(_)) {
+            let options = Options { start: Some(found.x), mode: found.mode, ..options };
+            let rest = rest_near(&model, &options)?;
+            return rest.map(|rest| at_rest(&model.coordinates(), &rest)).ok_or_else(|| {
+                let why = "the search came to a point where nothing turns, and no rest is known \
+                    there: start farther from it (--start), or give another section (--section)";
+                HybridError::NoOrbit(why.into()).into()
+            });
+        }
         if let Some(strobe) = &strobe {
             found.x = strobe.reached(&model, &options, found.x)?;
         }
@@ -184,6 +221,57 @@ impl Question for GeneralOrbit {
 }
 
 impl GeneralOrbit {
+    /// Refuses a period after which the equations are not the same.
+    fn has_period(&self, model: &Model, period: f64) -> Result<(), JobError> {
+        let equation = Equation::new(model, None).map_err(HybridError::from)?;
+        let start = model.start().map_err(EquationError::from).map_err(HybridError::from)?;
+        let start = self.run.options.start.clone().or(start).unwrap_or_default();
+        let largest = start.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+        let size = |x: &f64| if largest == 0.0 { 1.0 } else { x.abs().max(0.1 * largest) };
+        let sizes: Vec<f64> = start.iter().map(size).collect();
+        match equation.not_the_same_after(period, self.run.options.t_start, &sizes) {
+            Some(what) => Err(HybridError::Bad(format!(
+                "--period: {what} is not the same {period} later: give the period of what depends \
+                    on the time, with all its digits, or with --returns a multiple of it"
+            ))
+            .into()),
+            None => Ok(()),
+        }
+    }
+
+    /// The motion's end after a time, and the attracting rest from which it moves no farther then
+    /// than a part of its states' size, if there is one; of what is driven neither.
+    fn rest_after(
+        &self,
+        model: &Model,
+        from: &Options,
+        (time, within): (f64, f64),
+        monitor: &dyn Monitor,
+    ) -> Result<(Option<Outcome>, Option<Rest>), JobError> {
+        if model.is_driven() {
+            return Ok((None, None));
+        }
+        let options = Options {
+            t_end: from.t_start + time,
+            record: Record::Times { every: f64::INFINITY },
+            ..from.clone()
+        };
+        let (end, rests) = follow_to_rest(
+            model,
+            &options,
+            &mut |_| true,
+            &|t| monitor.reached(t).is_continue(),
+            STAYS * time,
+            &|size| within * size,
+        )?;
+        if end.ending == Ending::Interrupted {
+            return Err(JobError::Interrupted);
+        }
+        let there = Options { start: Some(end.x.clone()), mode: end.mode, ..options };
+        let rest = if rests { rest_near(model, &there)? } else { None };
+        Ok((Some(end), rest.filter(|rest| rest.stability == Stability::Attracts)))
+    }
+
     /// The unit of each state, a power of two: its size on a way with these bounds, or at the start
     /// if it has come to zero since, to rounding. Of a state that is zero it is the largest one.
     fn units(&self, bounds: &[[f64; 2]]) -> Vec<f64> {
@@ -211,6 +299,46 @@ impl GeneralOrbit {
         };
         sizes.iter().map(unit).collect()
     }
+}
+
+/// A motion rests that moves no more than this part of its states' size for this part of its run
+/// longer; where no orbit is found, one that is near an attracting rest comes to it.
+const STILL: f64 = 1e-6;
+const STAYS: f64 = 0.05;
+const COMES: f64 = 1e-2;
+/// A rest is near if it is not farther away than this part of a state.
+const NEAR: f64 = 1e-3;
+
+/// The rest near the start of `options`, in its mode.
+fn rest_near(model: &Model, options: &Options) -> Result<Option<Rest>, HybridError> {
+    let start = options.start.clone().unwrap_or_default();
+    let began = model.start().map_err(EquationError::from)?.unwrap_or_default();
+    let largest = start.iter().chain(&began).fold(0.0_f64, |most, x| most.max(x.abs()));
+    let width = |i: usize| {
+        let size = began.get(i).map_or(0.0, |x| x.abs()).max(start[i].abs());
+        NEAR * if largest == 0.0 { 1.0 } else { size.max(0.1 * largest) }
+    };
+    let within: Vec<(f64, f64)> =
+        (0..start.len()).map(|i| (start[i] - width(i), start[i] + width(i))).collect();
+    let found = rests(model, &within).unwrap_or_default().into_iter();
+    let apart = |x: &[f64]| {
+        let shares = x.iter().zip(&start).enumerate().map(|(i, (a, b))| (a - b).abs() / width(i));
+        shares.fold(0.0, f64::max)
+    };
+    let nearest = found
+        .filter(|rest| rest.mode == options.mode)
+        .min_by(|a, b| apart(&a.x).total_cmp(&apart(&b.x)));
+    Ok(nearest.map(|rest| {
+        let kind = rest.kind();
+        let stability = match () {
+            () if kind.starts_with("stable") => Stability::Attracts,
+            () if kind.starts_with("unstable") || kind.ends_with("saddle") => Stability::Repels,
+            () => Stability::Neutral,
+        };
+        let kind =
+            if rest.on.is_empty() { RestKind::Equilibrium } else { RestKind::PseudoEquilibrium };
+        Rest { kind, state: rest.x, eigenvalues: rest.eigenvalues, stability }
+    }))
 }
 
 /// The moment at which periods are counted, where an event comes then: what is zero at a start is
@@ -323,10 +451,11 @@ impl Map<'_> {
         }
         let lengths = turn.bounds.iter().zip(&self.units).map(|([low, high], u)| (high - low) / u);
         let mut extent = lengths.map(|length| length * length).sum::<f64>().sqrt();
-        // A point of a map has no extent: it is closed to a share of its size, or of one.
+        // A point of a map has no extent: it is closed to a share of its size, or where that is
+        // small, as where a border is at zero, to one of its unit.
         if self.has_points() {
             extent = u.iter().fold(extent, |most, x| most.max(x.abs()));
-            extent = if extent > 0.0 { extent } else { 1.0 };
+            extent = if extent > 0.0 { extent.max(LEAST_SIZE) } else { 1.0 };
         }
         let point = self.measured(&turn.end);
         Ok(Returned {
@@ -425,6 +554,56 @@ mod tests {
         assert!((moved - half * half * half).abs() < 1e-6, "{moved}");
         let settled = Executor::quiet().ask(&GeneralOrbit { settle: 10.0, ..question }).unwrap();
         assert!(settled.fact::<f64>("moved").is_err());
+    }
+
+    fn orbit(text: &str, settle: f64, after: Return) -> Result<Arc<Answer>, JobError> {
+        let mut run = run(text, 1e3);
+        if let Return::Crossings(_) = after {
+            run.options.record = Record::Section(expression("x", &run.model).unwrap());
+        }
+        Executor::quiet().ask(&GeneralOrbit { run, settle, after, along: None })
+    }
+
+    /// Where the motion settles on a rest, or is on its way to one, it is said, whether it lies on
+    /// the section or beside it.
+    #[test]
+    fn a_rest_is_no_closed_orbit() {
+        for damping in ["0.02", "0.2", "1.5"] {
+            for at in ["0", "1", "-1e-3"] {
+                let f = format!("states = ['x', 'v']\nstart = [1.5, 0]\nf = ['v', '{at} - x");
+                for f in
+                    [format!("{f} - {damping}*v']"), format!("{f} - {damping}*v - 0*sign(x)']")]
+                {
+                    for settle in [20.0, 200.0] {
+                        let answer = orbit(&f, settle, Return::Crossings(1)).unwrap();
+                        let rest: Rest = answer.fact("rest").unwrap();
+                        let at: f64 = at.parse().unwrap();
+                        assert!((rest.state[0] - at).abs() < 1e-9, "{rest:?} {f}");
+                        assert_eq!(rest.stability, Stability::Attracts, "{f}");
+                    }
+                }
+            }
+        }
+    }
+
+    /// What comes back after a time that is no period of the equations is no closed orbit.
+    #[test]
+    fn a_period_is_one_of_the_equations() {
+        let field = "states = ['x']\nstart = [1]\nf = ['-x + cos(t)']";
+        let clock = "states = ['x']\nstart = [0.3]\nf = ['0']\n[[event]]\nevery = 1\n\
+            set = { x = '2.6*x*(1 - x)' }";
+        let switch = "states = ['x']\nstart = [12]\nf = ['if(x > 20 + mod(t, 4), -x, 24 - x)']";
+        for (text, wrong, right) in [
+            (field, 3.0, 2.0 * std::f64::consts::PI),
+            (field, 6.28, 4.0 * std::f64::consts::PI),
+            (clock, 0.5, 2.0),
+            (clock, 1.5, 1.0),
+            (switch, 3.0, 4.0),
+        ] {
+            let said = orbit(text, 20.0, Return::Period(wrong)).unwrap_err().to_string();
+            assert!(said.contains(&format!("is not the same {wrong} later")), "{said}");
+            assert!(orbit(text, 20.0, Return::Period(right)).is_ok(), "{text}");
+        }
     }
 
     /// Settling ends in the second mode, from which the first one would not come back.
@@ -616,6 +795,32 @@ mod tests {
             assert_eq!(changes.len(), 1, "{slope} {changes:?}");
             assert_eq!(changes[0].0, "discontinuity-induced", "{slope}");
             assert!(changes[0].1.abs() <= changes[0].2 && changes[0].2 < 1e-4, "{changes:?}");
+        }
+    }
+
+    /// The same wherever the border lies in the parameter; where the branch turns back at it the
+    /// interval holds it, too.
+    #[test]
+    fn borders_lie_anywhere() {
+        for (at, low, high) in [
+            ("0.414", "0.705", "-1.84"),
+            ("-3", "-0.125", "0.821"),
+            ("0.02", "0.5", "-1.5"),
+            ("0", "0.383", "1.928"),
+            ("0", "0.5", "1.6"),
+        ] {
+            let border: f64 = at.parse().unwrap();
+            let text = format!(
+                "states = ['x']\nstart = [-1]\nf = ['0']\n[parameters]\nm = {}\n[[event]]\n\
+                 every = 1\nset = {{ x = 'm - ({at}) + if(x < 0, {low}*x, {high}*x)' }}",
+                border - 0.1
+            );
+            let found = branch(&text, 1.0, 200.0, along("m", border - 0.1, border + 0.1));
+            let changes = changes_of(&found, "m");
+            assert_eq!(changes.len(), 1, "{text} {changes:?}");
+            assert_eq!(changes[0].0, "discontinuity-induced", "{text}");
+            let off = (changes[0].1 - border).abs();
+            assert!(off <= changes[0].2 && changes[0].2 < 1e-4, "{text} {changes:?}");
         }
     }
 

@@ -158,7 +158,7 @@ impl Question for ClosedOrbit {
         self.validate()?;
         let (guess, returns) = match self.guess(executor)? {
             Guess::Loop { point, returns } => (point, returns),
-            Guess::Rest(rest) => return Ok(self.at_rest(&rest)),
+            Guess::Rest(rest) => return Ok(at_rest(&self.names(), &rest)),
         };
         let value = self.along.as_ref().map_or(0.0, |a| a.from);
         let mut map =
@@ -180,7 +180,7 @@ impl Question for ClosedOrbit {
             Ok(first) => first,
             Err(trouble) => {
                 return match self.rest_instead(&trouble, &guess, value)? {
-                    Some(rest) => Ok(self.at_rest(&rest)),
+                    Some(rest) => Ok(at_rest(&self.names(), &rest)),
                     None => Err(map.error(trouble.said)),
                 };
             }
@@ -206,6 +206,14 @@ impl Question for ClosedOrbit {
         answer.tables.extend(branch_tables(&along.parameter, &self.names(), &found));
         Ok(answer.with_fact("end", &found.end))
     }
+}
+
+/// The answer where there is a rest and no closed orbit.
+pub(super) fn at_rest<S: AsRef<str>>(names: &[S], rest: &Rest) -> Answer {
+    let columns = names.iter().map(|name| Column::numbers(name.as_ref())).collect::<Vec<_>>();
+    let mut table = Table::new("rest", columns);
+    table.push(rest.state.iter().map(|x| Entry::Number(*x)));
+    Answer::of_tables(vec![table]).with_fact("rest", rest)
 }
 
 /// Set on which the motion from the start settles: a first guess.
@@ -235,14 +243,6 @@ impl ClosedOrbit {
             apart(&r.state, point) <= AT_REST * apart(&r.state, guess).max(apart(point, guess))
         };
         Ok(rest::near(&system, switch, point).filter(there))
-    }
-
-    /// The answer where there is a rest and no closed orbit.
-    fn at_rest(&self, rest: &Rest) -> Answer {
-        let columns = self.names().into_iter().map(|n| Column::numbers(&n)).collect::<Vec<_>>();
-        let mut table = Table::new("rest", columns);
-        table.push(rest.state.iter().map(|x| Entry::Number(*x)));
-        Answer::of_tables(vec![table]).with_fact("rest", rest)
     }
 
     fn validate(&self) -> Result<(), JobError> {

@@ -187,6 +187,11 @@ impl Arguments {
             return Err(CliError::no_effect(*flag, why));
         }
         let driven = run.model.depends_on_time();
+        if self.period.is_some() && !run.model.is_driven() {
+            let why = "nothing in the equations depends on the time; leave it out, and give \
+                --section, or ask for rests (twofold rests)";
+            return Err(CliError::no_effect("--period", why));
+        }
         let after = match (self.period, &run.options.record) {
             (Some(_), Record::Section(_)) => {
                 return Err(CliError::no_effect(
@@ -298,6 +303,16 @@ fn of_general(arguments: &Arguments, question: &GeneralOrbit) -> Result<Exit, Cl
         other => other?,
     };
     let fact = |e| CliError::Job(JobError::Fact(e));
+    let names = question.run.model.coordinates();
+    let about = json!({ "kind": question.kind(), "question": question.json() });
+    if answer.facts.contains_key("rest") {
+        let bytes = match format {
+            Format::Json => encode::json(&answer, &about),
+            Format::Csv => encode::csv(&answer.tables[0], &about),
+            Format::Text => at_rest(&names, &answer.fact("rest").map_err(fact)?).into_bytes(),
+        };
+        return finish(&answer, &progress, out, &bytes);
+    }
     let multipliers: Vec<[f64; 2]> = answer.fact("multipliers").map_err(fact)?;
     let point: Vec<f64> = answer.fact("point").map_err(fact)?;
     let (period, gap): (f64, f64) =
@@ -305,8 +320,6 @@ fn of_general(arguments: &Arguments, question: &GeneralOrbit) -> Result<Exit, Cl
     let largest = multipliers.first().map_or(0.0, |[re, im]| (re * re + im * im).sqrt());
     // Where none is close to 1 it is not looked for.
     let error: f64 = answer.fact("multiplier_error").unwrap_or(0.0);
-    let names = question.run.model.coordinates();
-    let about = json!({ "kind": question.kind(), "question": question.json() });
     let bytes = match (format, answer.table("branch")) {
         (Format::Json, _) => encode::json(&answer, &about),
         (Format::Csv, Some(branch)) => {
@@ -415,7 +428,8 @@ fn along(text: &str) -> Result<Along, CliError> {
 fn text(question: &ClosedOrbit, answer: &Answer) -> Result<String, CliError> {
     let fact = |e| CliError::Job(JobError::Fact(e));
     if answer.facts.contains_key("rest") {
-        return Ok(at_rest(question, &answer.fact("rest").map_err(fact)?));
+        let rest = answer.fact("rest").map_err(fact)?;
+        return Ok(at_rest(&question.system.coordinates(), &rest));
     }
     let period: f64 = answer.fact("period").map_err(fact)?;
     let point: Vec<f64> = answer.fact("point").map_err(fact)?;
@@ -512,9 +526,8 @@ fn complex(numbers: &[[f64; 2]], error: f64) -> String {
 }
 
 /// The rest for people.
-fn at_rest(question: &ClosedOrbit, rest: &Rest) -> String {
-    let names = question.system.coordinates();
-    let state = state_in_words(&names, &rest.state);
+fn at_rest(names: &[&str], rest: &Rest) -> String {
+    let state = state_in_words(names, &rest.state);
     let stability = match (rest.stability, rest.rate()) {
         (RestStability::Attracts, Some(rate)) => {
             format!("attracts, by {rate:.6e} per unit time in the end")

@@ -2,7 +2,7 @@
 //! multipliers outside the unit circle changes (Seydel 2010, sec. 7.4; Kuznetsov 2004, ch. 5).
 
 use super::{Bifurcation, Change, Newton, Orbit, ReturnMap, Scales, Trouble};
-use super::{ITERATIONS, arclength, distance};
+use super::{ITERATIONS, apart, arclength, distance};
 use twofold_num::elementary::sqrt;
 
 /// Two that differ are halved so many times, to tell multipliers that leave the circle from others
@@ -74,7 +74,11 @@ pub(super) fn changes(
     newton: Newton,
 ) -> Vec<Bifurcation> {
     if a.events != b.events {
-        return vec![between(Change::DiscontinuityInduced, a, b)];
+        // Where the parameter turns the border lies beyond both, by what the states are apart.
+        let mut change = between(Change::DiscontinuityInduced, a, b);
+        let beyond = apart(&a.point, &b.point, scales.state) * scales.parameter;
+        change.uncertainty = change.uncertainty.max(beyond);
+        return vec![change];
     }
     let neutral = on_circle(a).min(on_circle(b));
     let mut found: Vec<Bifurcation> = Vec::new();

@@ -910,7 +910,12 @@ pub struct ClosedOrbit {
     pub gap: f64,
     /// The largest distance of a state from where the search began, in units of its size.
     pub moved: f64,
+    /// Whether it is a point to rounding of the way that the search went, and not an orbit.
+    pub is_point: bool,
 }
+
+/// A way around that is shorter than this part of a search's way is none.
+const POINT: f64 = 1e-3;
 
 /// A gap, in units of the states' largest size, that may be the integration's error.
 const CLOSED: f64 = 1e-8;
@@ -1004,7 +1009,10 @@ pub fn closed_orbit(
         }
         if off < gap_of(&best) {
             let multipliers = multipliers_of(&matrix, n, after);
+            let lengths = bounds.iter().map(|[low, high]| high - low);
+            let way = began.iter().zip(&x).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             let mut found = ClosedOrbit {
+                is_point: lengths.fold(0.0, f64::max) <= POINT * way,
                 x: x.clone(),
                 mode,
                 period: time,
@@ -1048,7 +1056,8 @@ pub fn closed_orbit(
     }
     Err(HybridError::NoOrbit(format!(
         "Newton's method found no closed orbit (the best return was {:e} off): start nearer \
-            (--start), or let the motion settle longer",
+            (--start), let the motion settle longer (--settle), or give the number of turns after \
+            which it closes (--returns)",
         gap_of(&best)
     )))
 }
