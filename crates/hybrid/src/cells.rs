@@ -92,7 +92,7 @@ impl Cells {
         speeds
     }
 
-    /// How deep zero lies in the hull of the cells' rates, the distance from its nearest facet;
+    /// The depth of zero in the hull of the cells' rates, the distance from its nearest facet;
     /// negative outside.
     pub fn depth(&self, rates: &[Vec<f64>]) -> f64 {
         let (r, speeds) = (self.basis.len(), self.speeds(rates));
