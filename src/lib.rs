@@ -99,6 +99,7 @@ pub use twofold_verify as verify;
 pub mod paper {
     pub use twofold_paper::*;
 
+    pub mod code;
     pub mod figures;
 }
 

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::progress::Progress;
 use super::recompute::recompute;
 use super::speak::{complain, print_json};
-use super::words::{Method, Readings};
+use super::words::Method;
 use super::{CliError, Exit, LONG_VERSION, in_pool, interrupt};
 use crate::integrate::filippov::ExitRule;
 use crate::job::spec::{RunSpec, SwitchSpec};
@@ -37,9 +37,9 @@ pub struct FigureFlags {
     /// Folder to write to; a folder named after the figure is made in it.
     #[arg(long, value_name = "DIR", default_value = "target/figures")]
     out: PathBuf,
-    /// Parameter reading [default: all].
-    #[arg(long, value_enum, value_name = "READING")]
-    reading: Option<Readings>,
+    /// Reading of the parameters: the name of one of the figure's, or all [default: all].
+    #[arg(long, value_name = "READING")]
+    reading: Option<String>,
     /// One panel only, such as "ii"; the picture is marked.
     #[arg(long, value_name = "PANEL")]
     only: Option<String>,
@@ -96,6 +96,9 @@ impl StoreFlags {
     }
 }
 
+/// Every reading.
+const ALL: &str = "all";
+
 /// The definition of a figure's flags, with its own name, description and examples.
 fn command(figure: &Figure) -> clap::Command {
     // Clap keeps names for as long as the program runs, and a program has one figure.
@@ -104,13 +107,15 @@ fn command(figure: &Figure) -> clap::Command {
     let about =
         format!("{id}: {}. Written as PNG, SVG and PDF, with its numbers as CSV.", figure.title);
     let mut examples = format!("Examples:\n  {id} --out pictures\n  {id} --json --quiet");
-    if figure.pictures.iter().any(|p| p.reading.is_some()) {
-        examples += &format!("\n  {id} --reading printed");
+    let reading = figure.pictures.iter().find_map(Picture::reading_name);
+    let reading = reading.map_or(String::new(), |name| format!(" --reading {name}"));
+    if !reading.is_empty() {
+        examples += &format!("\n  {id}{reading}");
     }
     if let Some(panel) = figure.pictures.iter().flat_map(|p| &p.panels).next() {
         let several = figure.pictures.iter().any(|p| p.panels.len() > 1);
         let only = if several { format!(" --only {}", panel.label) } else { String::new() };
-        let reading = if figure.pictures.len() > 1 { " --reading printed" } else { "" };
+        let reading = if figure.pictures.len() > 1 { &reading } else { "" };
         examples += &format!(
             "\n  {id} --t-end 100\n  {id}{only}{reading} --print-spec > spec.json && twofold run \
                 --spec spec.json"
@@ -380,6 +385,20 @@ fn refuse_idle(figures: &[Figure], arguments: &FigureFlags) -> Result<(), CliErr
             format!("{names}: the same in every reading; leave it out"),
         ));
     }
+    if let Some(name) = &arguments.reading {
+        let mut known: Vec<&str> = Vec::new();
+        for reading in pictures().filter_map(Picture::reading_name).chain([ALL]) {
+            if !known.contains(&reading) {
+                known.push(reading);
+            }
+        }
+        if !known.contains(&name.as_str()) {
+            return Err(CliError::Usage(format!(
+                "--reading {name}: {names} has no such reading; known are {}",
+                known.join(", ")
+            )));
+        }
+    }
     let wanted = |panel: &&FigurePanel| {
         arguments.only.as_deref().is_none_or(|only| panel.label == label(only))
     };
@@ -422,8 +441,10 @@ fn select(mut figure: Figure, arguments: &FigureFlags) -> Result<Figure, CliErro
         figure.pictures.retain(|p| p.panels.iter().any(|q| q.label == label));
         figure.pictures.iter_mut().for_each(|p| p.keep_only(label));
     }
-    let readings = arguments.reading.unwrap_or_default();
-    figure.pictures.retain(|p| readings.wants(p.reading_name()));
+    let wanted = arguments.reading.as_deref().filter(|name| *name != ALL);
+    figure
+        .pictures
+        .retain(|p| wanted.is_none_or(|name| p.reading_name().is_none_or(|r| r == name)));
     let alterations = Alterations {
         seed: arguments.seed,
         t_end: arguments.t_end,

@@ -10,17 +10,17 @@ use clap::ValueEnum;
 
 use super::CliError;
 use super::models::{each_once, known, named, names_a_file};
-use super::words::{History, Inside, KickLaw, Method, Reading, Relaxation, Transition};
+use super::words::{History, Inside, KickLaw, Method, Relaxation, Transition};
 use crate::hybrid::Model;
 use crate::integrate;
 use crate::integrate::filippov::{ExitRule, Side, SlidingLaw};
 use crate::integrate::{Kick, Schedule, StepCap, Tolerance};
-use crate::jeffrey_2013;
 use crate::job::spec::*;
 use crate::job::sweep::{Axis, Coordinate};
 use crate::job::translation::{MOST_STATES, model_with};
 use crate::num::decimal::DecimalError;
 use crate::num::{Decimal, Short};
+use crate::paper::{ParameterReading, code};
 use crate::record::files::{read_text, read_text_from};
 use crate::system::{self, Definition, ParameterError, System};
 
@@ -38,10 +38,9 @@ pub struct RunFlags {
     /// take smoothed and filippov.
     #[arg(long, value_enum, help_heading = "System")]
     pub switch: Option<Switch>,
-    /// Parameters of the caricature: alpha = 1e-3 as the paper prints it, or 1e-1 as its figures
-    /// suggest; beta = 1e-5 [default: printed].
-    #[arg(long, value_enum, help_heading = "System")]
-    pub reading: Option<Reading>,
+    /// Reading of the caricature's paper: a set of its parameters by name.
+    #[arg(long, value_name = "READING", help = reading_help(), help_heading = "System")]
+    pub reading: Option<String>,
     /// The caricature's alpha, the strength of its drift [default: the reading's].
     #[arg(long, allow_hyphen_values = true, help_heading = "System")]
     pub alpha: Option<f64>,
@@ -193,6 +192,9 @@ pub struct RunFlags {
     pub spec: Option<PathBuf>,
 }
 
+/// The system without --system.
+const DEFAULT_SYSTEM: &str = "caricature";
+
 /// Flags of the switch that a system with h, plus and minus gets when it is read as a general one.
 pub const SWITCH: [&str; 4] = ["--switch", "--eps", "--transition", "--sigma"];
 
@@ -256,7 +258,7 @@ struct Effect {
 
 impl RunFlags {
     fn system_name(&self) -> &str {
-        self.system.as_deref().unwrap_or("caricature")
+        self.system.as_deref().unwrap_or(DEFAULT_SYSTEM)
     }
     fn caricature(&self) -> bool {
         matches!(self.system_name(), "caricature" | "caricature-as-printed")
@@ -332,7 +334,10 @@ const EFFECTS: [Effect; 43] = {
         when(
             "--reading",
             |f| f.reading.is_some(),
-            |f, _| f.caricature() && !f.gives_what_readings_differ_in(&|_| false),
+            |f, _| {
+                !code::readings(f.system_name()).is_empty()
+                    && !f.gives_what_readings_differ_in(&|_| false)
+            },
             "a reading gives the caricature's alpha and beta; leave it out with other systems, or \
                 where those that readings differ in are given",
         ),
@@ -567,6 +572,8 @@ enum Misuse {
             leave it out where nothing has to be chosen"
     )]
     ExitOfExponent(String),
+    #[error("--reading {name}: there is no such reading; known are {known}")]
+    NoSuchReading { name: String, known: String },
     #[error("--switch delayed needs its delay: give one by --delay, such as --delay 0.001")]
     NoDelay,
     #[error("--switch relay needs its band: give half its width by --band, such as --band 0.001")]
@@ -895,12 +902,33 @@ impl RunFlags {
     /// Whether each number in which the readings differ is given, by a flag or as `varied` says: a
     /// reading is then of no use.
     fn gives_what_readings_differ_in(&self, varied: &dyn Fn(&str) -> bool) -> bool {
-        let values =
-            jeffrey_2013::Reading::ALL.map(|r| [r.caricature().alpha, r.caricature().beta]);
-        let numbers = [("alpha", self.alpha.is_some()), ("beta", self.beta.is_some())];
-        numbers.into_iter().enumerate().all(|(i, (name, flag))| {
-            flag || self.sets(name) || varied(name) || values.iter().all(|v| v[i] == values[0][i])
+        let readings = code::readings(self.system_name());
+        let numbers = || readings.iter().flat_map(|reading| &reading.parameters);
+        numbers().all(|(name, value)| {
+            let own = self.own_parameters().iter().any(|(own, flag)| own == name && flag.is_some());
+            let same = |(other, number): &(String, f64)| other != name || number == value;
+            own || self.sets(name) || varied(name) || numbers().all(same)
         })
+    }
+
+    /// Parameters that have flags of their own, with what these give.
+    fn own_parameters(&self) -> [(&'static str, Option<f64>); 4] {
+        [
+            ("alpha", self.alpha),
+            ("beta", self.beta),
+            ("v_plus", self.v_plus),
+            ("v_minus", self.v_minus),
+        ]
+    }
+
+    /// The reading of the system's parameters, if it has any.
+    fn parameter_reading(&self) -> Result<Option<ParameterReading>, Misuse> {
+        let mut readings = code::readings(self.system_name());
+        let Some(name) = &self.reading else { return Ok(readings.into_iter().next()) };
+        let known = readings.iter().map(|r| r.name.clone()).collect::<Vec<_>>().join(", ");
+        readings.retain(|r| r.name == *name);
+        let unknown = || Misuse::NoSuchReading { name: name.clone(), known };
+        readings.pop().map(Some).ok_or_else(unknown)
     }
 
     /// The system that --system, --reading, --set and the caricature's own flags describe.
@@ -928,20 +956,16 @@ impl RunFlags {
             Some(system) => system,
             None => from_file(name)?,
         };
-        if self.caricature() {
-            let reading =
-                jeffrey_2013::Reading::from(self.reading.unwrap_or(Reading::Printed)).caricature();
-            let values = [
-                ("alpha", self.alpha.unwrap_or(reading.alpha)),
-                ("beta", self.beta.unwrap_or(reading.beta)),
-                ("v_plus", self.v_plus.unwrap_or(reading.v_plus)),
-                ("v_minus", self.v_minus.unwrap_or(reading.v_minus)),
-            ];
-            for (parameter, value) in values {
-                let flag = format!("--{}", parameter.replace('_', "-"));
-                let refused = |e: ParameterError| Misuse::Own { flag, problem: e.to_string() };
-                system = system.with(parameter, value).map_err(refused)?;
-            }
+        let reading = self.parameter_reading()?;
+        let read = reading.iter().flat_map(|reading| &reading.parameters);
+        let read = read.map(|(name, value)| ("--reading".to_owned(), name.as_str(), *value));
+        let own = self.own_parameters().into_iter().filter(|_| self.caricature());
+        let own = own.filter_map(|(name, value)| {
+            Some((format!("--{}", name.replace('_', "-")), name, value?))
+        });
+        for (flag, parameter, value) in read.chain(own) {
+            let refused = |e: ParameterError| Misuse::Own { flag, problem: e.to_string() };
+            system = system.with(parameter, value).map_err(refused)?;
         }
         for text in &self.set {
             let refused = |problem: String| Misuse::Set { text: text.clone(), problem };
@@ -1021,6 +1045,21 @@ impl RunFlags {
             _ => return Err(wrong()),
         })
     }
+}
+
+/// Help of --reading: the readings with their numbers.
+fn reading_help() -> String {
+    let number = |(name, value): &(String, f64)| format!("{name} = {}", Short(*value));
+    let said = |reading: &ParameterReading| {
+        let numbers: Vec<String> = reading.parameters.iter().map(number).collect();
+        format!("{} ({})", reading.name, numbers.join(", "))
+    };
+    let readings = code::readings(DEFAULT_SYSTEM);
+    let first = readings.first().map_or("none", |reading| &reading.name);
+    let readings = readings.iter().map(said).collect::<Vec<_>>().join(", ");
+    format!(
+        "Parameters of the caricature, by a reading of its paper: {readings} [default: {first}]"
+    )
 }
 
 /// A length: a finite number, or the word inf.

@@ -48,7 +48,7 @@ pub fn print(text: &str) -> Result<(), CliError> {
 /// As [`print()`].
 pub fn print_json<T: serde::Serialize>(value: &T) -> Result<(), CliError> {
     let text = serde_json::to_string_pretty(value)
-        .expect("what is printed is plain data: string keys, no failing serialisers");
+        .expect("what is shown is plain data: string keys, no failing serialisers");
     // In JSON controls stand only in strings. Those below a space are escaped already, the others
     // may be.
     let escaped: String = text

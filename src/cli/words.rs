@@ -3,7 +3,6 @@
 use clap::ValueEnum;
 
 use crate::integrate;
-use crate::jeffrey_2013;
 use crate::system;
 
 /// Mirrors an enum of another crate: same variants, documented for `--help`.
@@ -101,16 +100,6 @@ mirror! {
     }
 }
 
-mirror! {
-    /// A reading of the paper's parameters.
-    Reading = jeffrey_2013::Reading {
-        /// As printed: alpha = 1e-3, beta = 1e-5.
-        Printed,
-        /// One digit changed: alpha = 1e-1, beta = 1e-5.
-        Reconstructed,
-    }
-}
-
 /// A transition function of the smoothed switch, without the numbers that other flags give.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Transition {
@@ -124,30 +113,6 @@ pub enum Transition {
     Erf,
 }
 
-/// Readings to make.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum Readings {
-    /// As printed.
-    Printed,
-    /// With the digit changed.
-    Reconstructed,
-    /// Both.
-    #[default]
-    All,
-}
-
-impl Readings {
-    /// Whether a picture of this reading is wanted.
-    pub fn wants(self, reading: Option<&str>) -> bool {
-        let is = |of: jeffrey_2013::Reading| reading == Some(of.word());
-        match self {
-            Readings::All => true,
-            Readings::Printed => !is(jeffrey_2013::Reading::Reconstructed),
-            Readings::Reconstructed => !is(jeffrey_2013::Reading::Printed),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -158,12 +123,6 @@ mod tests {
             let word = Method::of(method);
             assert_eq!(integrate::Method::from(word), method);
             assert_eq!(word.to_possible_value().unwrap().get_name(), method.name());
-        }
-        for reading in jeffrey_2013::Reading::ALL {
-            assert_eq!(
-                Reading::of(reading).to_possible_value().unwrap().get_name(),
-                reading.word()
-            );
         }
     }
 }

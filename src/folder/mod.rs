@@ -32,6 +32,7 @@ use toml::Spanned;
 use crate::cli::flags::Use;
 use crate::job::spec::RunSpec;
 use crate::job::{Answer, AnyQuestion};
+use crate::paper::code::{self, Code};
 use crate::paper::draw::plot::{self, Look, PictureKind};
 use crate::paper::plots::{self, Columns, Drawing, Plot, Plots, Points, Recorded};
 use crate::paper::verdict::Claim as PanelClaim;
@@ -70,6 +71,8 @@ pub struct Folder {
     pub about: About,
     /// The file that says so.
     common: Origin,
+    /// The code that it names.
+    pub(crate) code: Option<Code>,
     /// Its figures, in the order of their names.
     pub figures: Vec<Figure>,
     /// The part of the paper that each figure shows, in the same order.
@@ -153,6 +156,9 @@ pub struct About {
     /// Questions that it leaves open.
     #[serde(default)]
     pub open: Vec<String>,
+    /// Code in this program that has more of the paper's figures, which `twofold figure` makes, and
+    /// the runs of `repeats`: "jeffrey-2013".
+    code: Option<Spanned<String>>,
     /// Words that hold for every run of a panel.
     #[serde(default)]
     run: Words,
@@ -497,6 +503,13 @@ impl Folder {
             ));
         }
         let readings = readings(&origin, &about)?;
+        let code = about.code.as_ref().map(|name| {
+            code::named(name.get_ref()).ok_or_else(|| {
+                let why = format!("this program has no code called `{}`", name.get_ref());
+                FolderError::at(&origin, name.span(), why, Some("leave `code` out".into()))
+            })
+        });
+        let code = code.transpose()?;
         for part in ["", "figures", "systems", "data"] {
             files.has_no_twins(part)?;
         }
@@ -510,6 +523,7 @@ impl Folder {
             columns: Vec::new(),
             about,
             common: origin,
+            code,
         };
         folder.read_measures()?;
         for name in folder.files.names("figures")? {
@@ -657,7 +671,7 @@ impl Folder {
                 shown.repeats = panel
                     .repeats
                     .as_ref()
-                    .map(|name| Self::repeats(origin, name, &reading.name))
+                    .map(|name| self.repeats(origin, name, &reading.name))
                     .transpose()?;
                 let question: AnyQuestion = Recorded::Surfaces(shown.run.clone()).question();
                 panels.push(shown);
@@ -774,12 +788,13 @@ impl Folder {
 
     /// The runs that repeat a panel: "STUDY/NAME".
     fn repeats(
+        &self,
         origin: &Origin,
         name: &Spanned<String>,
         reading: &str,
     ) -> Result<Repeats, FolderError> {
         let found = name.get_ref().split_once('/').and_then(|(study, panel)| {
-            let count = twofold_jeffrey_2013::counts(study, reading)?;
+            let count = (self.code?.counts)(study, reading)?;
             Some(Repeats { panel: panel.to_owned(), count })
         });
         found.ok_or_else(|| {

@@ -7,17 +7,11 @@
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use crate::folder::{Embedded, Folder};
+use crate::folder::Folder;
 use crate::paper::Figure;
 use crate::record::{FileBytes, FileError, read_tree};
 
-pub use twofold_jeffrey_2013::data;
-
-/// Folder of the paper in the sources.
-pub const FOLDER: &str = "papers/jeffrey-2013";
-
-/// The paper's folder, so that an installed program can make and check its figures anywhere.
-pub const FILES: Embedded = twofold_papers::JEFFREY_2013;
+pub use super::code::{FILES, FOLDER, data};
 
 fn folder() -> &'static Folder {
     static OWN: OnceLock<Folder> = OnceLock::new();
@@ -29,7 +23,7 @@ fn folder() -> &'static Folder {
 
 /// Every figure, in the paper's order, then the project's own.
 pub fn all() -> Vec<Figure> {
-    let mut all = twofold_jeffrey_2013::all();
+    let mut all = folder().code.map_or(Vec::new(), |code| (code.figures)());
     all.extend(folder().figures.iter().cloned());
     // The paper's figures are numbered, those of the project are not: its list's order stays.
     all.sort_by_key(|f| if f.id.starts_with("fig") { (0, f.id.clone()) } else { (1, "".into()) });

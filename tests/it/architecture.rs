@@ -392,6 +392,58 @@ fn generic_crates_carry_no_word_of_one_paper() {
     }
 }
 
+/// Token of a source that names a paper or one of its readings: an identifier, or a text that is
+/// no example in a command's help. A built-in system's name is none.
+fn paper_token(source: &Source) -> Option<String> {
+    const WORDS: [&str; 6] = [
+        "printed",
+        "reconstructed",
+        "jeffrey",
+        "jeffrey_2013",
+        "twofold_jeffrey_2013",
+        "twofold_papers",
+    ];
+    let is_closed = |text: &str| text.len() > 1 && text.ends_with('"') && !text.ends_with("\\\"");
+    let says = |token: &str| {
+        let mut words = token.split(|c: char| !(c.is_alphanumeric() || c == '_'));
+        words.any(|w| WORDS.contains(&w.to_lowercase().as_str()))
+    };
+    // Texts of several lines are one token.
+    let mut tokens: Vec<String> = Vec::new();
+    for line in &source.tokens {
+        match tokens.last_mut().filter(|t| t.starts_with('"') && !is_closed(t)) {
+            Some(text) => *text += line,
+            None => tokens.push(line.clone()),
+        }
+    }
+    let is_example = |at: usize| at > 1 && tokens[at - 2] == "after_help" && tokens[at - 1] == "=";
+    let is_system = |token: &str| twofold::system::library::text(token.trim_matches('"')).is_some();
+    let foreign = |at: &usize| says(&tokens[*at]) && !is_example(*at) && !is_system(&tokens[*at]);
+    (0..tokens.len()).find(foreign).map(|at| tokens[at].clone())
+}
+
+#[test]
+fn one_module_of_the_command_knows_a_paper() {
+    for source in sources().iter().filter(|s| s.name.starts_with("src/")) {
+        // lib.rs gives the paper's crate to users under a name.
+        if !["src/paper/code.rs", "src/lib.rs"].contains(&source.name.as_str()) {
+            let token = paper_token(source);
+            assert!(token.is_none(), "{} names a paper: {token:?}", source.name);
+        }
+    }
+    let named = |text: &str| {
+        let tokens = twofold_digest::code(text).unwrap().0.lines().map(str::to_owned).collect();
+        let (name, text) = (String::new(), String::new());
+        paper_token(&Source { name, text, code: BTreeSet::new(), tokens }).is_some()
+    };
+    assert!(named("use twofold_jeffrey_2013::all;") && named("use crate::jeffrey_2013 as p;"));
+    assert!(
+        named("fn f() -> R { R::Printed }") && named("const A: &str = \"x --reading printed\";")
+    );
+    assert!(!named("#[command(after_help = \"x --reading printed\")]\nstruct A;"));
+    assert!(!named("/// As printed.\nconst A: &str = \"caricature-as-printed\";"));
+}
+
 #[test]
 fn the_rules_see_what_they_rule() {
     let all = sources();

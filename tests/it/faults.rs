@@ -120,6 +120,7 @@ fn wrong_numbers_are_named() {
             vec!["--eps", "no effect"],
         ),
         (vec!["--system", "wheel", "--reading", "printed"], vec!["--reading", "no effect"]),
+        (vec!["--reading", "other"], vec!["--reading other", "printed, reconstructed"]),
         (vec!["--seed", "5"], vec!["--seed", "random"]),
         (vec!["--section", "y=0", "--chord", "0.1"], vec!["--chord", "crossings"]),
         (vec!["--print-spec", "--format", "json"], vec!["--print-spec", "--format"]),

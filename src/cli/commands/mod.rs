@@ -136,8 +136,8 @@ fn input_to_be_replaced(words: &[String]) -> Option<String> {
 pub(super) fn usage(error: &clap::Error) -> Exit {
     // A closed stream loses the text without an error; help that cannot be written is an error as
     // any output is.
-    let printed = error.print().and_then(|()| std::io::Write::flush(&mut std::io::stdout()));
-    match printed {
+    let shown = error.print().and_then(|()| std::io::Write::flush(&mut std::io::stdout()));
+    match shown {
         _ if error.use_stderr() => Exit::Usage,
         Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
             complain(&format!("error: {e}"));

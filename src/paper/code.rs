@@ -1,0 +1,36 @@
+//! The paper that has code of its own beside its folder: the only module that names one.
+
+use super::{Count, Figure, ParameterReading};
+use twofold_jeffrey_2013::{Reading, all, counts};
+
+pub use twofold_jeffrey_2013::data;
+pub use twofold_jeffrey_2013::study::verdict_table;
+
+/// Folder of the paper in the sources.
+pub const FOLDER: &str = "papers/jeffrey-2013";
+
+/// The paper's folder, so that an installed program can make and check its figures anywhere: the
+/// path of each file there, and its text.
+pub const FILES: &[(&str, &str)] = twofold_papers::JEFFREY_2013;
+
+/// The readings of a built-in system's parameters. If none is named, commands take the first.
+pub fn readings(system: &str) -> Vec<ParameterReading> {
+    match system {
+        "caricature" | "caricature-as-printed" => Reading::ALL.map(Into::into).into(),
+        _ => Vec::new(),
+    }
+}
+
+/// Code of a paper.
+#[derive(Clone, Copy, Debug)]
+pub struct Code {
+    /// Its figures.
+    pub figures: fn() -> Vec<Figure>,
+    /// Counts the committed runs of a study that repeat a panel, by the names of study and reading.
+    pub counts: fn(&str, &str) -> Option<Count>,
+}
+
+/// The code that a paper's folder names.
+pub fn named(name: &str) -> Option<Code> {
+    (name == "jeffrey-2013").then_some(Code { figures: all, counts })
+}
