@@ -255,20 +255,21 @@ impl Folder {
         Ok(findings)
     }
 
-    /// Figures of which a manifest is expected, and of which the folder has no file.
+    /// Figures of which a manifest is expected, and which neither the folder nor its code has.
     fn figures_gone(&self) -> Result<Vec<String>, CliError> {
         let expected = self.expected();
         if !expected.exists() {
             return Ok(Vec::new());
         }
         let wanted = |path: &str| path.ends_with(".json") && path != "claims.json";
+        let of_code = self.code.map_or(Vec::new(), |code| (code.figures)());
         let mut gone = Vec::new();
         for file in record::read_tree(&expected, &wanted)?.files {
             let name = file.path.trim_end_matches(".json").to_owned();
             // Another file was not written by this program.
             let text = String::from_utf8_lossy(&file.bytes);
             let own = Manifest::parse(&text, &name).is_ok_and(|m| m.figure == name);
-            if own && !self.figures.iter().any(|f| f.id == name) {
+            if own && !self.figures.iter().chain(&of_code).any(|f| f.id == name) {
                 gone.push(name);
             }
         }

@@ -8,7 +8,7 @@ use assert_cmd::Command;
 use tempfile::TempDir;
 use twofold::folder::{Embedded, Folder};
 use twofold::jeffrey_2013::Reading;
-use twofold::paper::{ParameterReading, figures};
+use twofold::paper::{ParameterReading, code, figures};
 
 fn paper(arguments: &[&str], folder: &Path) -> (i32, String, String) {
     let (action, rest) = arguments.split_first().expect("an action");
@@ -724,6 +724,39 @@ fn what_is_expected_and_gone_is_missed_and_links_are_refused() {
         let (code, _, said) = paper(&["make", "--quiet"], &root);
         assert!(code == 2 && said.contains("leads out of the paper's folder"), "{said}");
     }
+}
+
+/// The figures that a paper's code makes are expected, though its folder has no file of them.
+#[test]
+fn figures_of_a_papers_code_are_kept() {
+    let own = Path::new(env!("CARGO_MANIFEST_DIR")).join(code::FOLDER);
+    let place = tempfile::tempdir().unwrap();
+    let root = place.path().join("p");
+    for part in ["figures", "expected"] {
+        fs::create_dir_all(root.join(part)).unwrap();
+    }
+    let files = ["paper.toml", "figures/fig5.toml", "expected/fig5.json", "expected/fig1.json"];
+    for file in files {
+        fs::copy(own.join(file), root.join(file)).unwrap();
+    }
+    let (code, out, said) = paper(&["check", "--quiet"], &root);
+    assert!(
+        code == 0 && out.contains("fig5-printed: same") && !out.contains("fig1"),
+        "{out}{said}"
+    );
+    let (code, out, _) = paper(&["bless", "--reason", "again", "--quiet"], &root);
+    assert!(code == 0 && out.contains("nothing changed"), "{out}");
+    change(&root, "paper.toml", "code = \"jeffrey-2013\"", "code = \"jeffrey\"");
+    let (code, _, said) = paper(&["check", "--quiet"], &root);
+    let wanted = ["no code called `jeffrey`", "paper.toml:", "leave `code` out"];
+    assert!(code == 2 && wanted.iter().all(|w| said.contains(w)), "{said}");
+    change(&root, "paper.toml", "code = \"jeffrey\"\n", "");
+    let (code, out, _) = paper(&["check", "--quiet"], &root);
+    assert!(code == 1 && out.contains("fig1: GONE"), "{out}");
+    // Its counts are its code's, too.
+    fs::copy(own.join("figures/fig9.toml"), root.join("figures/fig9.toml")).unwrap();
+    let (code, _, said) = paper(&["check", "--quiet"], &root);
+    assert!(code == 2 && said.contains("no committed runs are called `audit/9(i)`"), "{said}");
 }
 
 #[test]
