@@ -586,7 +586,7 @@ mod tests {
         }
     }
 
-    /// A state that comes back after a time that is no period of the equations is on no closed orbit.
+    /// A state that comes back after a time that is no period of the equations is on no orbit.
     #[test]
     fn a_period_is_one_of_the_equations() {
         let field = "states = ['x']\nstart = [1]\nf = ['-x + cos(t)']";
