@@ -473,6 +473,8 @@ struct Follower<'a> {
     event_of: Vec<Option<usize>>,
     /// Whether each event's condition holds.
     holds: Vec<bool>,
+    /// Events whose conditions become true at the run's very beginning.
+    at_start: Vec<usize>,
     /// Whether tables have stepped on to other pieces at this moment.
     tables_step: bool,
     /// The largest size of each state so far.
@@ -865,6 +867,7 @@ impl<'a> Follower<'a> {
             left_watch: vec![0.0; watched],
             event_of,
             holds: vec![false; events.len()],
+            at_start: Vec::new(),
             tables_step: false,
             size: x.iter().map(|v| v.abs()).collect(),
             lately: x.iter().map(|v| v.abs()).collect(),
@@ -913,6 +916,7 @@ impl<'a> Follower<'a> {
         }
         follower.rest_on_stops()?;
         follower.new_conditions(model.definition());
+        follower.at_start = follower.true_right_after(model.definition());
         Ok(follower)
     }
 
@@ -931,7 +935,8 @@ impl<'a> Follower<'a> {
 
     fn run(&mut self, observe: &mut dyn FnMut(&Point) -> bool) -> Result<Ending, HybridError> {
         let definition = self.model.definition().clone();
-        let mut clock = Clock::new(self)?;
+        let at_start = std::mem::take(&mut self.at_start);
+        let mut clock = Clock::new(self, &at_start)?;
         let mut step = Step::new(self.n);
         let mut h = 0.0;
         // The next implicit step where there is no series, and how many there were.

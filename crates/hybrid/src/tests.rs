@@ -3557,6 +3557,40 @@ fn surfaces_that_depend_on_each_other_are_slid_upon_under_a_drift() {
     }
 }
 
+/// A condition that is false where the motion starts and true right after becomes true there; one
+/// that holds at the start, or never, does not.
+#[test]
+fn a_condition_may_become_true_at_the_very_start() {
+    for (when, v, want) in [
+        ("x < 0", -1.0, 1),
+        ("x < 0", 1.0, 0),
+        ("x <= 0", -1.0, 0),
+        ("x <= 0", 1.0, 0),
+        ("not (x >= 0)", -1.0, 1),
+        ("x < 0 and y > 3", -1.0, 0),
+        ("x < 0 and y > 1", -1.0, 1),
+        ("t > 0", 1.0, 1),
+        ("t >= 0", 1.0, 0),
+        ("x - 1 + 1 < 0", -1.0, 1),
+    ] {
+        for method in Method::ALL {
+            let text = format!(
+                "states = ['x', 'y', 'n']\nstart = [0, 2, 0]\nf = ['{v}', '0', '0']\n[[event]]\n\
+                 when = '{when}'\nset = {{ n = 'n + 1' }}"
+            );
+            let end = end_of(&text, 1.0, method).unwrap();
+            assert_eq!(end[2], f64::from(want), "{when} {v} {method:?}");
+        }
+    }
+    // A ball thrown down at the floor bounces at once: up to 0.32 and back by t = 1.6.
+    let ball = "states = ['x', 'v']\nstart = [0, -2]\nf = ['v', '-2']\n[[event]]\nwhen = 'x < 0'\n\
+        set = { v = '-0.8*v' }";
+    for method in Method::ALL {
+        let end = end_of(ball, 2.0, method).unwrap();
+        near(end[0], 1.28 * 0.4 - 0.16, 1e-9);
+    }
+}
+
 /// Servers that attend to the longest queue: of the patterns of signs of x - y, x - z and y - z two
 /// have no points, and no mixture has their fields. All queues shrink alike by what is served
 /// beyond what arrives.

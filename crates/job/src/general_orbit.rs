@@ -595,7 +595,7 @@ mod tests {
         let switch = "states = ['x']\nstart = [12]\nf = ['if(x > 20 + mod(t, 4), -x, 24 - x)']";
         for (text, wrong, right) in [
             (field, 3.0, 2.0 * std::f64::consts::PI),
-            (field, 6.28, 4.0 * std::f64::consts::PI),
+            (field, 6.25, 4.0 * std::f64::consts::PI),
             (clock, 0.5, 2.0),
             (clock, 1.5, 1.0),
             (switch, 3.0, 4.0),
@@ -603,6 +603,22 @@ mod tests {
             let said = orbit(text, 20.0, Return::Period(wrong)).unwrap_err().to_string();
             assert!(said.contains(&format!("is not the same {wrong} later")), "{said}");
             assert!(orbit(text, 20.0, Return::Period(right)).is_ok(), "{text}");
+        }
+    }
+
+    /// Through a section where an event resets, from which the search begins: from 0 to 1 in ln 2.
+    #[test]
+    fn a_section_may_be_where_an_event_is() {
+        let text = "states = ['v', 'w']\nstart = [0, 0]\nf = ['2 - v', 'v - w']\n[[event]]\n\
+            when = 'v > 1'\nset = { v = '0' }";
+        for at in ["1", "0.5"] {
+            let mut run = run(text, 1e3);
+            run.options.record =
+                Record::Section(expression(&format!("v - {at}"), &run.model).unwrap());
+            let question =
+                GeneralOrbit { run, settle: 200.0, after: Return::Crossings(1), along: None };
+            let period: f64 = Executor::quiet().ask(&question).unwrap().fact("period").unwrap();
+            assert!((period - 2_f64.ln()).abs() < 1e-9, "{at} {period}");
         }
     }
 

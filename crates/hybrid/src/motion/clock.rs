@@ -21,7 +21,8 @@ pub(super) struct Clock {
 }
 
 impl Clock {
-    pub(super) fn new(follower: &Follower) -> Result<Self, HybridError> {
+    /// The clock of a run, which begins with the events `at_start`.
+    pub(super) fn new(follower: &Follower, at_start: &[usize]) -> Result<Self, HybridError> {
         let constant = |e: &Expression| {
             crate::value::evaluate(e, &|name| follower.equation.values().get(name).copied())
         };
@@ -72,6 +73,7 @@ impl Clock {
         for table in &follower.equation.tables {
             clock.once.extend(table.knots.iter().filter(|k| **k > follower.t).map(|k| (*k, None)));
         }
+        clock.once.extend(at_start.iter().map(|event| (follower.t, Some(*event))));
         clock.once.sort_by(|a, b| b.0.total_cmp(&a.0));
         Ok(clock)
     }

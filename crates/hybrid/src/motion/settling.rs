@@ -1702,6 +1702,22 @@ impl Follower<'_> {
         values
     }
 
+    /// The events whose conditions hold on the sides to which the motion goes and not where it is:
+    /// x < 0 from x = 0 downwards.
+    pub(super) fn true_right_after(&self, definition: &crate::Definition) -> Vec<usize> {
+        let mut here = self.config.clone();
+        for (guard, side) in here.sides.iter_mut().enumerate() {
+            if !self.equation.guards[guard].whole {
+                *side = self.side_of(guard).unwrap_or(0.0);
+            }
+        }
+        let becomes = |(i, event): (usize, &crate::definition::Event)| match &event.when {
+            When::Becomes(e) => (self.holds[i] && !self.equation.holds(e, &here)).then_some(i),
+            _ => None,
+        };
+        definition.events().iter().enumerate().filter_map(becomes).collect()
+    }
+
     /// The events whose conditions hold now and did not before.
     pub(super) fn new_conditions(&mut self, definition: &crate::Definition) -> Vec<usize> {
         let mut new = Vec::new();
