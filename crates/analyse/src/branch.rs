@@ -797,8 +797,21 @@ fn behind_grazing(
             next.events != last.events && sqrt(apart * apart + off * off) <= hop
         };
         let stays = || closed_orbit(map, beside, p, options.newton).ok().filter(other);
+        // At a fold without a slope those with other events are on the side that it comes from,
+        // and so far behind the border that the motion stays there.
+        let turns = || {
+            let near = |next: &Orbit| apart(&next.point, &last.point, scales.state) <= HOP * hop;
+            let behind = |far: f64| -> Vec<f64> {
+                beside.iter().zip(du).map(|(u, d)| u + far * hop * scales.state * d).collect()
+            };
+            [0.0, 4.0, 16.0].into_iter().find_map(|far| {
+                let p = 2.0 * last.parameter - p;
+                let back = closed_orbit(map, &behind(far), p, options.newton).ok();
+                back.filter(|next| next.events != last.events && near(next))
+            })
+        };
         let along = arclength(map, &guess, p, (du, dp), scales, options.newton);
-        if let Some(next) = along.ok().filter(other).or_else(stays) {
+        if let Some(next) = along.ok().filter(other).or_else(stays).or_else(turns) {
             return Some((next, hop));
         }
     }

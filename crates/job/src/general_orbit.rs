@@ -840,6 +840,33 @@ mod tests {
         }
     }
 
+    /// Flows that are on one side of a kink all along and then on the other have no switch on
+    /// either: a branch that goes on, one that turns back, and a map's that turns at a state which
+    /// is not zero.
+    #[test]
+    fn borders_are_seen_without_a_switch() {
+        let drive = "(m - 0.5)*(1 + 0.1*cos(2*pi*t))";
+        let goes_on = format!(
+            "states = ['x', 'v']\nstart = [-0.2, 0]\n\
+             f = ['v', '-x - if(x > 0, -0.3, 0.3)*v + {drive}']\n[parameters]\nm = 0.3"
+        );
+        let turns = format!(
+            "states = ['x']\nstart = [0.8]\nf = ['-(x - 1) + {drive} + 1.5*max(x - 1, 0)']\n\
+             [parameters]\nm = 0.3"
+        );
+        let map = "states = ['x']\nstart = [1.6]\nf = ['0']\n[parameters]\nm = 0.3\n[[event]]\n\
+            every = 1\nset = { x = '2 + m - 0.5 + if(x < 2, 0.5*(x - 2), 1.7*(x - 2))' }";
+        for (text, turns) in [(goes_on.as_str(), false), (&turns, true), (map, true)] {
+            let found = branch(text, 1.0, 60.0, along("m", 0.3, 0.7));
+            let changes = changes_of(&found, "m");
+            assert_eq!(changes.len(), 1, "{text} {changes:?}");
+            assert_eq!(changes[0].0, "discontinuity-induced", "{text}");
+            assert!((changes[0].1 - 0.5).abs() <= changes[0].2, "{text} {changes:?}");
+            let end: End = found.fact("end").unwrap();
+            assert_eq!(end, if turns { End::TurnedBack } else { End::Reached }, "{text}");
+        }
+    }
+
     /// Two equal blocks have two equal multipliers, exp(2 pi m): one point, m = 0. So has a pair of
     /// them, - exp(2 pi m), that turns by half.
     /// A wall at 0.5 that the orbit of x'' + 0.2 x' + x = p cos 2t touches where its amplitude

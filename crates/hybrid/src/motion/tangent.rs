@@ -41,6 +41,13 @@ pub(super) struct Tangents {
     pub flattened: bool,
     /// The pieces of resets that have acted, hashed.
     pub pieces: u64,
+    /// The sides that the motion was on, each once.
+    pub sides: Vec<String>,
+}
+
+/// FNV-1a (Fowler, Noll & Vo 1991), a piece at a time.
+fn hashed(hash: u64, piece: u64) -> u64 {
+    (hash ^ piece).wrapping_mul(0x0100_0000_01b3)
 }
 
 /// Field, gradient and speed before a condition is met.
@@ -62,6 +69,9 @@ impl Follower<'_> {
             *bounds = [bounds[0].min(*ends.0).min(*ends.1), bounds[1].max(*ends.0).max(*ends.1)];
         }
         tangents.sizes = step.x.iter().zip(&step.y).map(|(a, b)| a.abs().max(b.abs())).collect();
+        if !tangents.sides.contains(&self.signs) {
+            tangents.sides.push(self.signs.clone());
+        }
         for y in &mut tangents.vectors {
             let mut k: Vec<Vec<f64>> = Vec::with_capacity(7);
             let mut end = Vec::new();
@@ -465,10 +475,7 @@ impl Follower<'_> {
         }
         let mut hash = self.tangents.as_ref().map_or(0, |tangents| tangents.pieces);
         for (_, e) in set {
-            // FNV-1a (Fowler, Noll & Vo 1991), a piece at a time.
-            self.equation.pieces(e, self.t, old, &mut |piece| {
-                hash = (hash ^ piece as u64).wrapping_mul(0x0100_0000_01b3);
-            });
+            self.equation.pieces(e, self.t, old, &mut |piece| hash = hashed(hash, piece as u64));
         }
         let Some(tangents) = &mut self.tangents else { return };
         tangents.pieces = hash;
@@ -1079,7 +1086,7 @@ pub struct Turn {
     /// Bounds of each state on the way.
     pub bounds: Vec<[f64; 2]>,
     /// A number that tells it from a way with other events: of switches and events, and of the
-    /// pieces of resets that act, hashed.
+    /// sides that the motion is on and the pieces of resets that act, hashed.
     pub itinerary: usize,
     /// Steps on the way.
     pub steps: u64,
@@ -1170,7 +1177,11 @@ fn turn(
         );
         return Err(HybridError::NoOrbit(why));
     }
-    let Tangents { vectors, bounds, pieces, .. } = follower.tangents.take().unwrap_or_default();
+    let Tangents { vectors, bounds, pieces, sides, .. } =
+        follower.tangents.take().unwrap_or_default();
+    // In whatever order: where a period begins they are as many.
+    let of_sides = |signs: &String| signs.bytes().fold(0, |hash, b| hashed(hash, u64::from(b)));
+    let on = sides.iter().map(of_sides).fold(0, u64::wrapping_add);
     let mut matrix = vec![0.0; n * n];
     for (j, column) in vectors.iter().enumerate() {
         for i in 0..n {
@@ -1200,6 +1211,7 @@ fn turn(
         size: follower.size.iter().fold(0.0_f64, |most, s| most.max(*s)),
         bounds,
         steps: outcome.steps,
-        itinerary: (outcome.switches + outcome.events).wrapping_add(pieces) as usize,
+        itinerary: (outcome.switches + outcome.events).wrapping_add(pieces).wrapping_add(on)
+            as usize,
     })
 }
