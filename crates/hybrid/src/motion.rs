@@ -330,6 +330,19 @@ enum Sought {
     Repelling,
     /// A contact opens, by its place.
     Release(usize),
+    /// A kink of the field on the positive side of a surface slid upon, by its place among those.
+    Beyond(usize),
+}
+
+/// A kink of a field on the other side of a surface slid upon, whose function is another one there.
+#[derive(Clone, Copy, Debug)]
+struct Beyond {
+    /// The surface's place among those slid upon.
+    place: usize,
+    guard: usize,
+    side: f64,
+    /// Whether it has just been passed.
+    fresh: bool,
 }
 
 /// Times at which something happened again and again.
@@ -425,6 +438,8 @@ struct Follower<'a> {
     /// weight is one to rounding; else 0.
     along: Vec<f64>,
     base: Vec<(Rc<Compiled>, Vec<f64>)>,
+    /// Kinks of those fields.
+    beyond: Vec<Beyond>,
     /// Fields on all sides of the surfaces slid upon, for the rule that chooses among mixtures if
     /// these differ.
     corners: Vec<(Rc<Compiled>, Vec<f64>)>,
@@ -845,6 +860,7 @@ impl<'a> Follower<'a> {
             slides: vec![false; guards],
             along: vec![0.0; guards],
             base: Vec::new(),
+            beyond: Vec::new(),
             corners: Vec::new(),
             cells: None,
             order,

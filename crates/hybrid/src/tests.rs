@@ -3557,6 +3557,32 @@ fn surfaces_that_depend_on_each_other_are_slid_upon_under_a_drift() {
     }
 }
 
+/// Layers that are clipped beside a switch: on each side of what is slid upon the bounds are met
+/// elsewhere, before and while the motion slides. From (1.08, -1.35) on the field of h < 0 leads
+/// away, x' = 0.7 - 0.5 x.
+#[test]
+fn each_side_of_sliding_has_bounds_of_its_own() {
+    let clipped = |u: &str, start: &str| {
+        format!(
+            "states = ['x', 'y']\nstart = {start}\nf = ['-0.5*x + clip({u}, -0.5, 0.7)', '-0.2']"
+        )
+    };
+    let ways = [
+        "if(x + 0.8*y < 0, 0.9 - x - 1.1*y, -0.7*x + 0.3*y - 0.9)",
+        "if(x + 0.8*y >= 0, -0.7*x + 0.3*y - 0.9, 0.9 - x - 1.1*y)",
+        "if(-0.2 > x + 0.8*y - 0.2, 0.9 - x - 1.1*y, -0.7*x + 0.3*y - 0.9)",
+    ];
+    for (start, t_end, left) in [("[0.8, -1]", 10.0, 1.75), ("[0.5, 1]", 20.0, 11.75)] {
+        let want = 1.4 - 0.32 * (-0.5 * (t_end - left) as f64).exp();
+        for u in ways {
+            for method in Method::ALL {
+                let end = end_of(&clipped(u, start), t_end, method).unwrap();
+                assert!((end[0] - want).abs() < 1e-8, "{u} {start} {method:?} {end:?} {want}");
+            }
+        }
+    }
+}
+
 /// A condition that is false where the motion starts and true right after becomes true there; one
 /// that holds at the start, or never, does not.
 #[test]

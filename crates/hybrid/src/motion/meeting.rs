@@ -46,6 +46,18 @@ impl Follower<'_> {
                     ceases = true;
                 }
                 Sought::Release(place) => opened.push(self.contacts[place]),
+                Sought::Beyond(at) => self.pass_beyond(at),
+            }
+        }
+        for guard in crossed.clone() {
+            if self.is_kink_of_one_side(guard) {
+                let (mut config, sliding) = (self.config.clone(), self.sliding.clone());
+                config.sides[guard] = -config.sides[guard];
+                self.adopt(config, sliding);
+                self.fresh_guard[guard] = true;
+                self.outcome.switches += 1;
+                crossed.retain(|other| *other != guard);
+                zero.retain(|other| *other != guard);
             }
         }
         self.pass_in_time(&crossed);

@@ -71,6 +71,12 @@ impl Follower<'_> {
             list.push((Sought::Repelling, 1.0));
         }
         list.extend((0..self.contacts.len()).map(|place| (Sought::Release(place), 1.0)));
+        for (at, beyond) in self.beyond.iter_mut().enumerate() {
+            // From where it has been passed it leads away.
+            if !std::mem::take(&mut beyond.fresh) {
+                list.push((Sought::Beyond(at), beyond.side));
+            }
+        }
     }
 
     /// Whether the equations are continuous where this function is zero, and in the whole step it
@@ -407,6 +413,7 @@ impl Follower<'_> {
                     weight + self.rounding_along(place, plus)
                 }
                 Sought::Repelling => determinant,
+                Sought::Beyond(at) => self.value_beyond(self.beyond[at], t, x),
                 // A surface pushes and does not pull.
                 Sought::Release(place) => {
                     let mut field = vec![0.0; n];

@@ -119,7 +119,10 @@ impl Follower<'_> {
         self.note_noise(step);
         let also = self.noise.iter().map(|also| if also.is_finite() { *also } else { 0.0 });
         noise.iter_mut().zip(also).for_each(|(noise, also)| *noise = noise.max(also));
-        let signs = self.config.sides.iter().zip(&self.equation.guards);
+        let guards = &self.equation.guards;
+        let beyond = self.base.iter().map(|(_, variables)| &variables[n + 1..][..guards.len()]);
+        let signs = std::iter::once(&self.config.sides[..]).chain(beyond);
+        let signs = signs.flat_map(|sides| sides.iter().zip(guards));
         let key = Key {
             compiled: Rc::as_ptr(&self.compiled) as usize,
             signs: signs.map(|(side, guard)| guard.whole || *side > 0.0).collect(),
@@ -359,7 +362,7 @@ impl Follower<'_> {
                 c[0] += self.rounding_along(place, plus);
                 return Some(c);
             }
-            Sought::Pole(_) => return None,
+            Sought::Pole(_) | Sought::Beyond(_) => return None,
             // Whether fields turn away is no function with a series.
             Sought::Repelling if self.may_turn_away() => return None,
             Sought::Repelling => return own(Followed::Attraction),

@@ -156,11 +156,17 @@ impl Follower<'_> {
 
     /// Sides of guards that a configuration asks and the present one does not.
     pub(super) fn ask_new(&mut self, config: &mut Configuration) {
+        self.ask_but(config, &[]);
+    }
+
+    /// The same, but for guards that are known.
+    fn ask_but(&mut self, config: &mut Configuration, known: &[usize]) {
         for _ in 0..8 {
             let compiled = self.equation.compiled(config);
             let mut changed = false;
             for guard in &compiled.active {
                 if !self.compiled.active.contains(guard)
+                    && !known.contains(guard)
                     && let Some(side) = self.side_of(*guard)
                     && config.sides[*guard] != side
                 {
@@ -225,7 +231,8 @@ impl Follower<'_> {
             if !changed {
                 return;
             }
-            self.ask_new(config);
+            // Those that were asked here have got the sides of their values.
+            self.ask_but(config, &compiled.active);
         }
     }
 

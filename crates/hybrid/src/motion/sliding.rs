@@ -58,6 +58,7 @@ impl Follower<'_> {
         self.separate = self.separate();
         self.dependent = false;
         self.base = Vec::new();
+        self.beyond.clear();
         // Surfaces that are left leave the others with the mixture of their corners.
         let mixed = !self.corners.is_empty() && self.separate.is_none() && self.sliding.len() > 1;
         self.corners = Vec::new();
@@ -85,6 +86,7 @@ impl Follower<'_> {
                     near_solution(&matrix, &b, 0.5).is_some_and(|(_, rank)| rank < b.len());
             }
         }
+        self.find_beyond();
         self.hold_watched();
         self.signs = self
             .equation
@@ -99,6 +101,58 @@ impl Follower<'_> {
                 () => '-',
             })
             .collect();
+    }
+
+    /// Collects the kinks on the other sides of surfaces slid upon that are elsewhere there.
+    fn find_beyond(&mut self) {
+        for (place, (compiled, variables)) in self.base.iter().enumerate() {
+            let slid = self.sliding[place];
+            for (at, guard) in compiled.active.iter().enumerate() {
+                let is_kink = self.equation.guards[*guard].kink && !self.slides[*guard];
+                let jumps =
+                    self.equation.chooses(slid) || compiled.depends(self.n + at, self.n + 1 + slid);
+                let side = variables[self.n + 1 + guard];
+                if is_kink && jumps && side != 0.0 {
+                    self.beyond.push(Beyond { place, guard: *guard, side, fresh: false });
+                }
+            }
+        }
+    }
+
+    /// The value of a function on the other side of a surface slid upon.
+    pub(super) fn value_beyond(&mut self, beyond: Beyond, t: f64, x: &[f64]) -> f64 {
+        let (compiled, variables) = &mut self.base[beyond.place];
+        variables[..self.n].copy_from_slice(x);
+        variables[self.n] = t;
+        let mut values = vec![0.0; compiled.outputs];
+        compiled.watched.evaluate(variables, &mut values);
+        active_value(compiled, &values, beyond.guard)
+    }
+
+    /// Passes a kink on the other side of a surface slid upon.
+    pub(super) fn pass_beyond(&mut self, at: usize) {
+        let Beyond { place, guard, side, .. } = self.beyond[at];
+        let mut config = self.config.clone();
+        config.sides[self.sliding[place]] = self.high(self.sliding[place]);
+        let sliding = self.sliding.clone();
+        self.follow_sides(&mut config, &sliding);
+        config.sides[guard] = -side;
+        self.base[place] = (self.equation.compiled(&config), self.load(&config));
+        (self.beyond[at].side, self.beyond[at].fresh) = (-side, true);
+    }
+
+    /// Whether a kink of the field on the lower sides of what is slid upon is elsewhere on the
+    /// others: only this field changes there.
+    pub(super) fn is_kink_of_one_side(&mut self, guard: usize) -> bool {
+        let (t, x) = (self.t, self.x.clone());
+        let small = 1e-6 * self.magnitude(&self.equation.guards[guard].expression);
+        self.equation.guards[guard].kink
+            && !self.base.is_empty()
+            && (0..self.base.len()).all(|place| {
+                let other = Beyond { place, guard, side: 0.0, fresh: false };
+                let asked = self.base[place].0.place(guard).is_some();
+                asked && self.value_beyond(other, t, &x).abs() > small
+            })
     }
 
     /// The guards that the equations ask on other sides of what is slid upon, where `config` is the
