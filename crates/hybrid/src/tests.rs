@@ -3573,7 +3573,7 @@ fn each_side_of_sliding_has_bounds_of_its_own() {
         "if(-0.2 > x + 0.8*y - 0.2, 0.9 - x - 1.1*y, -0.7*x + 0.3*y - 0.9)",
     ];
     for (start, t_end, left) in [("[0.8, -1]", 10.0, 1.75), ("[0.5, 1]", 20.0, 11.75)] {
-        let want = 1.4 - 0.32 * (-0.5 * (t_end - left) as f64).exp();
+        let want = 1.4 - 0.32 * f64::exp(-0.5 * (t_end - left));
         for u in ways {
             for method in Method::ALL {
                 let end = end_of(&clipped(u, start), t_end, method).unwrap();
