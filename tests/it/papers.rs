@@ -355,7 +355,7 @@ fn papers_that_ship_are_reproduced() {
 fn what_is_wrong_in_a_folder_is_said_with_its_place() {
     let reading = "[readings.a]\nabout = \"\"\nextends = \"b\"\n[readings.b]\nabout \
         = \"\"\nextends = \"a\"\n[run]";
-    let cases: [(&str, &str, &str, &[&str]); 33] = [
+    let cases: [(&str, &str, &str, &[&str]); 36] = [
         (
             "paper.toml",
             "rtol = 1e-9",
@@ -528,6 +528,24 @@ fn what_is_wrong_in_a_folder_is_said_with_its_place() {
             "[[panel]]\nlabel = \"c\"\ndraw = \"columns\"\nof = \"fig1/a\"\nx = \"t\"\ny = \
                 [\"x\"]\nnames = []\n[[panel]]\nlabel = \"b\"",
             &["0 names for 1 columns", "fig1.toml"],
+        ),
+        (
+            "claims.toml",
+            "and = \"cycle\"",
+            "and = \"narrow-cycle\"",
+            &["`narrow-cycle` is the same as `of`", "claims.toml:", "name another"],
+        ),
+        (
+            "figures/fig1.toml",
+            "draw = \"series\"",
+            "draw = \"series\"\npoints = { name = \"a\", file = \"systems\" }",
+            &["systems: it is a folder", "fig1.toml:10:10"],
+        ),
+        (
+            "paper.toml",
+            "title =",
+            "code = \"none\"\ntitle =",
+            &["no code called `none`", "paper.toml:3:8", "leave `code` out"],
         ),
         (
             "measures.toml",
@@ -726,6 +744,30 @@ fn what_is_expected_and_gone_is_missed_and_links_are_refused() {
     }
 }
 
+/// Titles and captions are parts of a picture: with another one it is another picture, which is
+/// said until it is blessed, with a reason.
+#[test]
+fn titles_and_captions_that_change_are_differences() {
+    let place = small();
+    let root = place.path().join("p");
+    assert_eq!(paper(&["bless", "--reason", "first", "--quiet"], &root).0, 0);
+    for (old, new, layer) in [
+        ("A relay with hysteresis oscillates", "A relay oscillates", "pixels"),
+        ("title = \"w = 0.5\"", "title = \"w = 1/2\"", "pixels"),
+        ("The state against time", "The state over time", "PNG file"),
+    ] {
+        change(&root, "figures/fig1.toml", old, new);
+        let (code, out, _) = paper(&["check", "--quiet"], &root);
+        assert!(
+            code == 1 && out.contains(&format!("fig1: DIFFERS in its {layer}")),
+            "{new}: {out}"
+        );
+        assert_eq!(paper(&["bless", "--reason", new, "--quiet"], &root).0, 0);
+        let changes = fs::read_to_string(root.join("expected/CHANGES.md")).unwrap();
+        assert!(changes.ends_with(&format!("- {new}: fig1 ({layer})\n")), "{changes}");
+    }
+}
+
 /// The figures that a paper's code makes are expected, though its folder has no file of them.
 #[test]
 fn figures_of_a_papers_code_are_kept() {
@@ -757,6 +799,46 @@ fn figures_of_a_papers_code_are_kept() {
     fs::copy(own.join("figures/fig9.toml"), root.join("figures/fig9.toml")).unwrap();
     let (code, _, said) = paper(&["check", "--quiet"], &root);
     assert!(code == 2 && said.contains("no committed runs are called `audit/9(i)`"), "{said}");
+}
+
+/// A pipe, or a link to nothing, under the name of a paper's file is not taken for no file.
+#[cfg(unix)]
+#[test]
+fn pipes_and_links_to_nothing_are_refused() {
+    let pipe = |path: &Path| {
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        assert!(std::process::Command::new("mkfifo").arg(path).status().unwrap().success());
+    };
+    let link = |path: &Path| {
+        fs::remove_file(path).unwrap();
+        std::os::unix::fs::symlink("nowhere", path).unwrap();
+    };
+    let cases: [(&str, &dyn Fn(&Path), &str); 6] = [
+        ("figures/fig2.toml", &pipe, "neither a file nor a folder"),
+        ("figures/fig1.toml", &link, "neither a file nor a folder"),
+        ("claims.toml", &link, "a link that leads nowhere"),
+        ("paper.toml", &link, "a link that leads nowhere"),
+        ("out/fig1/fig1.png", &pipe, "a link, pipe or device"),
+        ("expected/fig1.json", &pipe, "a link, pipe or device"),
+    ];
+    for (file, make, says) in cases {
+        let place = small();
+        let root = place.path().join("p");
+        make(&root.join(file));
+        let (code, out, said) = paper(&["check", "--quiet"], &root);
+        assert!(code == 2 && said.contains(&format!("{file}: {says}")), "{file}: {out}{said}");
+    }
+}
+
+/// Expectations are not changed if the reason cannot be kept.
+#[test]
+fn nothing_is_blessed_without_a_record() {
+    let place = small();
+    let root = place.path().join("p");
+    fs::create_dir_all(root.join("expected/CHANGES.md")).unwrap();
+    let (code, _, said) = paper(&["bless", "--reason", "first", "--quiet"], &root);
+    assert!(code == 2 && said.contains("CHANGES.md: it is a folder"), "{said}");
+    assert_eq!(fs::read_dir(root.join("expected")).unwrap().count(), 1);
 }
 
 #[test]

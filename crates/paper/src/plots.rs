@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use serde_json::json;
+use twofold_hybrid::Model;
 use twofold_hybrid::motion::Record;
 use twofold_job::general::GeneralRun;
 use twofold_job::record::Hash;
@@ -16,8 +17,10 @@ use twofold_render::sheet::{
     MarkerStyle, PlanePanel, Sheet,
 };
 use twofold_render::style;
+use twofold_system::System;
 
 use super::draw::plot::{self, Crossed, Frame, Look};
+use super::wording;
 
 /// The panels of a picture.
 #[derive(Clone, Debug)]
@@ -184,11 +187,57 @@ impl Plots {
                 }
             }
         }
+        whole.footer.extend(self.parameters());
         Ok(whole)
+    }
+
+    /// Parameters of the panels' systems: those that all panels have in common, then each one's.
+    fn parameters(&self) -> Option<String> {
+        let all: Vec<Vec<(String, f64)>> = self.plots.iter().map(Plot::parameters).collect();
+        let shared = |p: &&(String, f64)| all.iter().all(|panel| panel.contains(p));
+        let common: Vec<_> = all.first()?.iter().filter(shared).collect();
+        let said = |list: &[&(String, f64)]| {
+            wording::numbers(list.iter().map(|(name, value)| (name.as_str(), *value)))
+        };
+        let mut parts = vec![(Vec::new(), said(&common))];
+        for (plot, panel) in self.plots.iter().zip(&all) {
+            let own = said(&panel.iter().filter(|p| !common.contains(p)).collect::<Vec<_>>());
+            let label = format!("({})", markup::literal(&plot.label));
+            match parts[1..].iter_mut().find(|(_, text)| *text == own) {
+                Some((labels, _)) => labels.push(label),
+                None => parts.push((vec![label], own)),
+            }
+        }
+        parts.retain(|(_, text)| !text.is_empty());
+        let parts: Vec<String> =
+            parts.into_iter().map(|(l, text)| format!("{} {text}", l.join(", "))).collect();
+        // Lines break between parameters, not beside a sign.
+        let text = parts.join("; ").trim_start().replace(" = ", "\u{a0}=\u{a0}");
+        (!parts.is_empty()).then_some(text)
     }
 }
 
 impl Plot {
+    /// Parameters of its system, but that along which a branch is followed.
+    fn parameters(&self) -> Vec<(String, f64)> {
+        let question = self.question.json();
+        let system = &question["system"];
+        let mut parameters: Vec<(String, f64)> =
+            match serde_json::from_value::<System>(system.clone()) {
+                Ok(system) => {
+                    system.parameters().map(|(name, v)| (name.into(), v.value())).collect()
+                }
+                Err(_) => {
+                    let Ok(model) = Model::from_json(system.clone()) else { return Vec::new() };
+                    let values = model.values().unwrap_or_default();
+                    let names = model.definition().parameters().iter().map(|p| p.name.clone());
+                    names.filter_map(|name| values.get(&name).map(|v| (name.clone(), *v))).collect()
+                }
+            };
+        parameters.retain(|(name, _)| question["along"]["parameter"] != *name);
+        parameters
+    }
+
     fn sheet(&self, answer: &Answer) -> Result<Sheet, String> {
         let mut sheet = match &self.drawing {
             Drawing::Run(recorded, look) => {
@@ -312,7 +361,7 @@ const READ_OFF: MarkerStyle =
 #[cfg(test)]
 mod tests {
     use super::*;
-    use twofold_hybrid::{Definition, Model, Options};
+    use twofold_hybrid::{Definition, Options};
     use twofold_job::{Column, Entry, Executor};
 
     fn ball() -> Recorded {
@@ -385,6 +434,46 @@ mod tests {
         };
         assert_eq!(titles(1), ["", "*t*"]);
         assert_eq!(titles(2), ["*t*", "*t*"]);
+    }
+
+    #[test]
+    fn a_picture_says_parameters_that_panels_share_and_each_ones_own() {
+        let panel = |label: &str, parameters: &str| {
+            let text =
+                format!("states = ['x']\nstart = [1]\nf = ['-x']\n[parameters]\n{parameters}");
+            let model = Model::new(Definition::from_toml(&text, "test").unwrap());
+            let run = GeneralRun { model, options: Options::default() };
+            Plot { label: label.into(), ..plane(&Recorded::General(run, None)) }
+        };
+        let said = |plots| {
+            let said = Plots { columns: 1, plots }.parameters();
+            said.map(|text| text.replace('\u{a0}', " "))
+        };
+        let [a, b] = ["k = 1e-5\nalpha = 0.3", "k = 1e-5\nalpha = 2"];
+        assert_eq!(said(vec![panel("a", "")]), None);
+        assert_eq!(said(vec![panel("a", a)]).unwrap(), "*k* = 10^{-5}, *α* = 0.3");
+        assert_eq!(
+            said(vec![panel("a", a), panel("b", b), panel("c", a)]).unwrap(),
+            "*k* = 10^{-5}; (a), (c) *α* = 0.3; (b) *α* = 2"
+        );
+        assert_eq!(said(vec![panel("a", "w = 2"), panel("b", "")]).unwrap(), "(a) *w* = 2");
+        let system = twofold_system::System::builtin("two-fold").unwrap();
+        let run = RunSpec {
+            system,
+            switch: twofold_job::spec::SwitchSpec::tanh(1e-3),
+            start: vec![0.2, 0.0, -1.0],
+            t_end: 1.0,
+            method: twofold_job::spec::MethodSpec::ndsolve_defaults(
+                twofold_integrate::Method::Dopri5,
+            ),
+            schedule: twofold_integrate::Schedule::default(),
+            observe: twofold_job::spec::Observation::Path { chord: 1e-3 },
+        };
+        let said_of_surfaces = said(vec![plane(&Recorded::Surfaces(run))]).unwrap();
+        assert!(said_of_surfaces.contains("*v* = −1.2, *w* = −1.4"), "{said_of_surfaces}");
+        let many: String = (0..20).map(|i| format!("p{i} = {i}\n")).collect();
+        let many = said(vec![panel("a", &many)]).unwrap();
+        assert!(many.matches(" = ").count() == 12 && many.ends_with(", …"), "{many}");
     }
 
     #[test]

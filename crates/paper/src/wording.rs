@@ -17,9 +17,19 @@ pub fn reading(reading: &ParameterReading) -> String {
 
 /// "*α* = 0.1, *β* = 10^{-5}".
 pub fn parameters(reading: &ParameterReading) -> String {
-    let said =
-        |(name, value): &(String, f64)| format!("{} = {}", markup::name(name), number(*value));
-    reading.parameters.iter().map(said).collect::<Vec<_>>().join(", ")
+    numbers(reading.parameters.iter().map(|(name, value)| (name.as_str(), *value)))
+}
+
+/// The same of any numbers; a long list is cut.
+pub fn numbers<'a>(named: impl IntoIterator<Item = (&'a str, f64)>) -> String {
+    const MOST: usize = 12;
+    let said = |(name, value)| format!("{} = {}", markup::name(name), number(value));
+    let mut all: Vec<String> = named.into_iter().map(said).collect();
+    if all.len() > MOST {
+        all.truncate(MOST);
+        all.push("…".into());
+    }
+    all.join(", ")
 }
 
 /// The system and its parameters.
@@ -49,13 +59,9 @@ pub fn system(system: &System) -> String {
             number(w.v_c)
         ),
         None => {
-            let said = |(name, value): (&str, &twofold_num::Decimal)| {
-                format!("{} = {}", markup::name(name), number(value.value()))
-            };
-            let parameters = system.parameters().map(said);
-            let title = system.definition().title();
-            let name = (!title.is_empty()).then(|| markup::literal(title));
-            name.into_iter().chain(parameters).collect::<Vec<_>>().join(", ")
+            let parameters = numbers(system.parameters().map(|(name, v)| (name, v.value())));
+            let title = markup::literal(system.definition().title());
+            [title, parameters].into_iter().filter(|s| !s.is_empty()).collect::<Vec<_>>().join(", ")
         }
     }
 }

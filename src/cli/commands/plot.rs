@@ -272,7 +272,14 @@ pub(super) fn general_small_print(run: &GeneralRun, end: f64) -> String {
     let (from, rtol) = (number(o.t_start), number(o.rtol));
     // A time that the run found has all digits.
     let to = if end == o.t_end { number(end) } else { format!("{end:.6}") };
-    format!("*t* = {from} … {to}, event-driven, {}, rtol {rtol}", o.method.name())
+    let values = run.model.values().unwrap_or_default();
+    let names = run.model.definition().parameters().iter().map(|p| p.name.as_str());
+    let parameters = wording::numbers(names.filter_map(|name| Some((name, *values.get(name)?))));
+    let comma = if parameters.is_empty() { "" } else { ", " };
+    format!(
+        "{parameters}{comma}*t* = {from} … {to}, event-driven, {}, rtol {rtol}",
+        o.method.name()
+    )
 }
 
 /// The run in words. The system's title, which stands above the picture, is not said again.
