@@ -315,6 +315,15 @@ impl Claim {
                 return Err(wrong(name.span(), why, format!("name one with {needs}")));
             }
         }
+        let asks = |source: &Source| (source.ask, source.question.json());
+        let same_read = c.and_read.as_ref().is_none_or(|r| c.read.as_ref() == Some(r));
+        if let (Some(name), Some(other)) = (&c.and, and)
+            && same_read
+            && asks(of) == asks(other)
+        {
+            let why = format!("`{}` is the same as `of`: the check is of nothing", name.get_ref());
+            return Err(wrong(name.span(), why, "name another panel or measure".into()));
+        }
         let number = |value: &Option<Spanned<f64>>, what: &str| match value {
             Some(v) if v.get_ref().is_finite() => Ok(*v.get_ref()),
             Some(v) => {

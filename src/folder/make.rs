@@ -305,6 +305,13 @@ impl Folder {
         if changed.is_empty() {
             return Ok(changed);
         }
+        // Read first: if it cannot be, nothing is written.
+        let log = self.expected().join("CHANGES.md");
+        let mut text = if log.exists() {
+            read_text(&log)?
+        } else {
+            "# Why expectations changed\n\n".to_owned()
+        };
         let mut pictures = made.pictures.iter();
         for figure in &self.figures {
             let manifest = Manifest {
@@ -329,12 +336,6 @@ impl Folder {
             serde_json::to_vec_pretty(&made.outcomes()).expect("verdicts are plain data");
         json.push(b'\n');
         record::write(&self.expected().join("claims.json"), &json)?;
-        let log = self.expected().join("CHANGES.md");
-        let mut text = if log.exists() {
-            read_text(&log)?
-        } else {
-            "# Why expectations changed\n\n".to_owned()
-        };
         text += &format!("- {reason}: {}\n", changed.join(", "));
         record::write(&log, text.as_bytes())?;
         Ok(changed)

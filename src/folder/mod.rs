@@ -40,7 +40,7 @@ use crate::paper::{Camera, Figure, FigurePanel, ParameterReading, Picture, Repea
 use crate::record::FileError;
 use crate::record::files::read_text;
 use crate::record::manifest::is_plain_name;
-use crate::record::{self, first_link, read_tree};
+use crate::record::{self, first_special};
 use crate::system::Diagnostic;
 use crate::system::diagnostic::nearest;
 
@@ -377,6 +377,10 @@ impl Files {
             Files::Disk(root) => {
                 let file = root.join(path);
                 let (Ok(whole), Ok(found)) = (root.canonicalize(), file.canonicalize()) else {
+                    if file.is_symlink() {
+                        let why = format!("{}: a link that leads nowhere", file.display());
+                        return Err(FolderError::Missing(why));
+                    }
                     return Ok(None);
                 };
                 if !found.starts_with(whole) {
@@ -395,13 +399,18 @@ impl Files {
     /// The TOML files of a part of the folder, by name.
     fn names(&self, part: &str) -> Result<Vec<String>, FolderError> {
         let paths: Vec<String> = match self {
-            Files::Disk(root) if root.join(part).is_dir() => {
-                let tree = read_tree(&root.join(part), &|path| {
-                    path.ends_with(".toml") && !path.contains('/')
-                })?;
-                tree.files.into_iter().map(|f| f.path).collect()
+            Files::Disk(root) => {
+                let folder = root.join(part);
+                let ours = |name: &String| name.ends_with(".toml") && !name.starts_with('.');
+                let found: Vec<String> = record::names(&folder).into_iter().filter(ours).collect();
+                let special = found.iter().map(|name| folder.join(name)).find(|f| !f.is_file());
+                let no_folder = (folder.exists() && !folder.is_dir()).then_some(folder);
+                if let Some(path) = special.or(no_folder) {
+                    let why = format!("{}: neither a file nor a folder of files", path.display());
+                    return Err(FolderError::Missing(why));
+                }
+                found
             }
-            Files::Disk(_) => Vec::new(),
             Files::Embedded(all) => all
                 .iter()
                 .filter_map(|f| f.0.strip_prefix(part)?.strip_prefix('/').map(str::to_owned))
@@ -467,10 +476,11 @@ impl Folder {
     pub fn read(root: &Path) -> Result<Self, FolderError> {
         // Files there are written, and would be through a link.
         for part in ["out", "expected"] {
-            if let Some(link) = first_link(&root.join(part))? {
+            if let Some(special) = first_special(&root.join(part))? {
                 return Err(FolderError::Missing(format!(
-                    "{}: a link, through which a foreign file could be written; remove it",
-                    link.display()
+                    "{}: a link, pipe or device, through which something foreign could be \
+                        written; remove it",
+                    special.display()
                 )));
             }
         }
@@ -900,8 +910,8 @@ impl Folder {
         if !Path::new(file).components().all(|c| matches!(c, Component::Normal(_))) {
             return Err(wrong(format!("the file `{file}` does not lie in this folder")));
         }
-        let text =
-            self.files.text(file)?.ok_or_else(|| wrong(format!("there is no file `{file}`")))?;
+        let text = self.files.text(file).map_err(|error| wrong(error.to_string()))?;
+        let text = text.ok_or_else(|| wrong(format!("there is no file `{file}`")))?;
         let mut rows = text
             .lines()
             .enumerate()

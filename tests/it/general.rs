@@ -520,8 +520,11 @@ fn wrong_files_and_flags_are_refused() {
     let one = ["sweep", "--system", "one.toml", "--over", "start.x=1,2", "--section", "x=0"];
     refused(at, &one, 2, &["two states or more"]);
     // A system with one switch still says what it lacks, and who has it.
-    fs::write(at.join("f.toml"), "states = ['x']\nh = 'x'\nplus = ['max(x, 1)']\nminus = ['1']")
-        .unwrap();
+    fs::write(
+        at.join("f.toml"),
+        "states = ['x']\nstart = [1]\nh = 'x'\nplus = ['max(x, 1)']\nminus = ['1']",
+    )
+    .unwrap();
     refused(
         at,
         &["run", "--system", "f.toml"],
@@ -941,7 +944,7 @@ fn scans_follow_attractors_up_and_down() {
             &["--over", "start.x=0,1", "--follow", "up", "--period", "1"][..],
             "begins where the run before ended",
         ),
-        (&["--over", "params.p=0,1"], "give --section, such as x=0, or --period"),
+        (&["--over", "params.p=0,1"], "give --period (any, of equations"),
         (&["--over", "params.q=0,1", "--period", "1"], "no parameter `q`"),
         (
             &["--over", "eps=0.1,0.2", "--period", "1"],
@@ -971,6 +974,41 @@ fn a_scan_shows_a_period_doubling() {
         found
     };
     assert_eq!((points(24.0).len(), points(25.0).len()), (1, 2));
+}
+
+/// At a section by its only state a system has one point, and a picture would show rounding.
+#[test]
+fn a_scan_of_one_state_is_no_section_of_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(
+        at.join("relay.toml"),
+        "states = ['x']\nstart = [1]\nh = 'x'\nplus = ['-1']\nminus = ['p']\n\
+        [parameters]\np = 1",
+    )
+    .unwrap();
+    fs::write(
+        at.join("driven.toml"),
+        "states = ['x']\nstart = [0]\nf = ['sin(t) - p*x']\n\
+        [parameters]\np = 1",
+    )
+    .unwrap();
+    for (system, section, over) in [
+        ("relay-hysteresis", "T=20", "params.k=0.1,0.2"),
+        ("relay-hysteresis", "(T - cold)*(T - warm) = 0", "params.k=0.1,0.2"),
+        ("relay.toml", "x=0", "params.p=1,2"),
+        ("driven.toml", "x=0", "params.p=1,2"),
+    ] {
+        let scan = ["scan", "--system", system, "--section", section, "--over", over];
+        refused(at, &scan, 2, &["it has one value", "give --period", "twofold orbit --along"]);
+    }
+    let driven = ["--system", "driven.toml", "--section", "sin(t)=0", "--t-end", "50"];
+    let table = scanned(at, &[&driven[..], &["--over", "params.p=1,2"]].concat());
+    // x = (p sin t - cos t)/(1 + p^2) in the end, seen at t = 0 and pi.
+    for (p, x) in table.numbers("params.p").iter().zip(table.numbers("x")) {
+        near(x.abs(), 1.0 / (1.0 + p * p), 1e-8);
+    }
+    assert!(table.len() >= 4);
 }
 
 /// Over two settings: a map of what general systems end on.

@@ -10,6 +10,7 @@ use crate::cli::progress::Progress;
 use crate::cli::speak::{Delivery, complain, deliver, is_standard_output, try_delivery};
 use crate::cli::{CliError, Exit, in_pool};
 use crate::draw::scan;
+use crate::hybrid::Model;
 use crate::hybrid::motion::Record;
 use crate::job::scan::{Basin, Follow, Scan};
 use crate::job::spec::Observation;
@@ -18,6 +19,7 @@ use crate::job::table::{Entry, Table};
 use crate::job::{self, encode};
 use crate::record::Hash;
 use crate::render::markup;
+use crate::system::Expression;
 
 use super::plot::{Format, general_small_print, small_print, write};
 
@@ -149,7 +151,7 @@ impl Arguments {
             match general::looked_at(&self.flags, self.period)? {
                 Some(run) => {
                     let options = &run.options;
-                    match options.record {
+                    match &options.record {
                         Record::Section(_)
                             if self.follow.is_some() && run.model.depends_on_time() =>
                         {
@@ -159,11 +161,18 @@ impl Arguments {
                                 --section".into(),
                         );
                         }
+                        Record::Section(section) if is_one_point(&run.model, section) => {
+                            return usage(ONE_STATE.into());
+                        }
                         Record::Times { every } if every.is_infinite() => {
+                            let states = run.model.coordinates();
+                            if states.len() == 1 {
+                                return usage(ONE_STATE.into());
+                            }
                             return usage(format!(
                                 "a scan needs a place or time to look at: give --section, such as \
                                 {}=0, or --period of equations that depend on the time",
-                                run.model.coordinates()[0]
+                                states[0]
                             ));
                         }
                         _ => {}
@@ -184,6 +193,9 @@ impl Arguments {
                 }
                 None => {
                     let spec = self.flags.spec(Use::Crossings)?;
+                    if spec.system.dimension() == 1 {
+                        return usage(ONE_STATE.into());
+                    }
                     let fixed = match spec.observe {
                         Observation::Section { coordinate, .. } => Some(coordinate),
                         _ => None,
@@ -281,6 +293,18 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
             Ok(Exit::Failed)
         }
     }
+}
+
+const ONE_STATE: &str = "a scan of one state needs a time to look at, since at a section by the \
+    state itself it has one value: give --period (any, of equations that do not depend on the \
+    time), or --section with a function of the time, such as sin(t)=0; a closed orbit's period is \
+    followed by twofold orbit --along";
+
+/// Whether a section of this system says what its one state is.
+fn is_one_point(model: &Model, section: &Expression) -> bool {
+    let parameters = model.definition().parameters().iter().map(|p| p.name.as_str());
+    let still: Vec<&str> = model.coordinates().into_iter().chain(parameters).collect();
+    model.coordinates().len() == 1 && section.names().iter().all(|name| still.contains(name))
 }
 
 /// A line of "name = value, name = value" without the values that every run of the scan has its own

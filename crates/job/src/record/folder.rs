@@ -65,11 +65,12 @@ pub fn names(folder: &Path) -> Vec<String> {
     names
 }
 
-/// The first symbolic link in `folder`, at any depth, or itself; none if there is no such folder.
+/// The first thing in `folder`, at any depth, or itself, that is neither a file nor a folder: a
+/// symbolic link, a pipe, a device. None if there is no such folder.
 ///
 /// # Errors
 /// If a folder in it cannot be read.
-pub fn first_link(folder: &Path) -> Result<Option<PathBuf>, FileError> {
+pub fn first_special(folder: &Path) -> Result<Option<PathBuf>, FileError> {
     let cannot = |path: &Path, source: io::Error| FileError {
         action: "read",
         path: path.to_owned(),
@@ -90,11 +91,10 @@ pub fn first_link(folder: &Path) -> Result<Option<PathBuf>, FileError> {
         for entry in entries {
             let path = entry.path();
             let kind = entry.file_type().map_err(|e| cannot(&path, e))?;
-            if kind.is_symlink() {
-                return Ok(Some(path));
-            }
             if kind.is_dir() {
                 open.push(path);
+            } else if !kind.is_file() {
+                return Ok(Some(path));
             }
         }
     }

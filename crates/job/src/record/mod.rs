@@ -18,7 +18,7 @@ pub mod journal;
 pub mod manifest;
 
 pub use files::{FileError, write};
-pub use folder::{FileBytes, Tree, first_link, names, read_tree, visit_tree};
+pub use folder::{FileBytes, Tree, first_special, names, read_tree, visit_tree};
 pub use hash::Hash;
 pub use journal::Journal;
 pub use manifest::{Layer, Manifest, PanelEntry, PictureEntry, VerdictEntry, listed};
