@@ -813,7 +813,9 @@ fn pipes_and_links_to_nothing_are_refused() {
         fs::remove_file(path).unwrap();
         std::os::unix::fs::symlink("nowhere", path).unwrap();
     };
-    let cases: [(&str, &dyn Fn(&Path), &str); 6] = [
+    /// The name of a case, what is done to the folder, what is said.
+    type Case<'a> = (&'a str, &'a dyn Fn(&Path), &'a str);
+    let cases: [Case; 6] = [
         ("figures/fig2.toml", &pipe, "neither a file nor a folder"),
         ("figures/fig1.toml", &link, "neither a file nor a folder"),
         ("claims.toml", &link, "a link that leads nowhere"),
