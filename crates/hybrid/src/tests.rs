@@ -3581,6 +3581,18 @@ fn each_side_of_sliding_has_bounds_of_its_own() {
             }
         }
     }
+    // Written by bounds of a sign, or by the values of both sides.
+    let written = |u: &str| {
+        format!(
+            "states = ['x', 'y']\nstart = [0.856, 0.002]\n\
+             f = ['-0.5*x + {u}', '0.6*y + x - 0.9']\n[let]\nh = '0.45 - x - 0.8*y'"
+        )
+    };
+    let want = end_of(&written("if(h > 0, 0.7, -0.5)"), 3.0, Method::Dopri5).unwrap()[0];
+    for method in Method::ALL {
+        let end = end_of(&written("clip(sign(h), -0.5, 0.7)"), 3.0, method).unwrap();
+        near(end[0], want, 1e-8);
+    }
 }
 
 /// A condition that is false where the motion starts and true right after becomes true there; one
