@@ -1063,9 +1063,9 @@ class Sweep:
 
     table: Table
     """The rows: first what was varied, then ``outcome``, ``period``, ``captured_at``,
-    ``settled_at``, ``radius``, ``rate``, ``rate_error``, ``turn``, ``exponent``,
-    ``exponent_error``, ``crossings``, ``end``, ``steps``, ``reason``. NaN where there is nothing to
-    say. Times are in the system's unit of time, rates and exponents per unit of time."""
+    ``settled_at``, ``radius``, ``rate``, ``turn``, ``exponent``, ``exponent_error``,
+    ``crossings``, ``end``, ``steps``, ``reason``. NaN where there is nothing to say. Times are in
+    the system's unit of time, rates and exponents per unit of time."""
     csv: Optional[bytes]
     """The same as the very bytes that ``twofold sweep --out FILE.csv`` writes; None for runs from a
     list of starts."""
@@ -1112,7 +1112,7 @@ def shifted(start: ArrayLike, runs: int, shift: float, state: int = 0) -> Floats
 
 _OUTCOME = {
     "outcome": "", "period": 0, "captured_at": None, "settled_at": None, "radius": None,
-    "rate": None, "rate_error": None, "turn": None, "exponent": None, "exponent_error": None,
+    "rate": None, "turn": None, "exponent": None, "exponent_error": None,
     "crossings": 0, "end": None, "steps": 0, "reason": "",
 }  # fmt: skip
 

@@ -372,7 +372,7 @@ fn twofold(folder: &Path, arguments: &[&str]) -> std::process::Output {
 }
 
 /// Content of each column. A column without a line here fails the test.
-const COLUMNS: [(&str, &str); 46] = [
+const COLUMNS: [(&str, &str); 45] = [
     ("t", "time"),
     ("x", "the first state; likewise each other state under its name"),
     ("y", ""),
@@ -425,11 +425,6 @@ const COLUMNS: [(&str, &str); 46] = [
     ("settled_at", "from this time on it is within tolerance of the orbit"),
     ("radius", "mean distance of the last returns, once settled, from the orbit"),
     ("rate", "rate of approach, per unit time"),
-    (
-        "rate_error",
-        "standard error of the line that `rate` is fitted by, as if its points were independent; \
-            where an approach turns or bends the true one is two to four times as large",
-    ),
     ("turn", "time of one turn around the orbit"),
     ("exponent", "largest Lyapunov exponent, per unit time"),
     ("exponent_error", "its standard error"),

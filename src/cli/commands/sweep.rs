@@ -13,7 +13,7 @@ use crate::cli::rows::{Pending, compute, journal_of};
 use crate::cli::speak::{complain, deliver, is_standard_output, try_delivery};
 use crate::cli::{CliError, Exit};
 use crate::job::question;
-use crate::job::sweep::{Axis, Base, Coordinate, Draws, Row, Rows, Shard, Sweep, Values};
+use crate::job::sweep::{Axis, Base, Coordinate, Draws, Row, Rows, Shard, Sweep, VERSION, Values};
 use crate::job::table::Entry;
 use crate::record::Journal;
 use crate::record::files::read;
@@ -421,7 +421,7 @@ fn json_of(rows: &Rows) -> Vec<u8> {
         .collect();
     let whole = json!({
         "format": "twofold-sweep",
-        "version": 2,
+        "version": VERSION,
         "sweep": rows.sweep().hash(),
         "spec": rows.sweep().run(),
         "over": rows.sweep().axes(),

@@ -50,7 +50,7 @@ use serde_json::{Value, json};
 pub use axis::{Axis, AxisError, Coordinate, FORMS, Values};
 pub use general::{GeneralEnding, GeneralOutcome};
 pub use outcome::{Ending, Outcome, OutcomeQuestion};
-pub use rows::{Row, Rows, RowsError};
+pub use rows::{Row, Rows, RowsError, VERSION};
 
 use super::classification::Classification;
 use super::executor::{Executor, Progress};

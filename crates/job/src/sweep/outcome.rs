@@ -39,8 +39,6 @@ pub struct Outcome {
     pub radius: Option<f64>,
     /// Rate of the approach per unit time.
     pub rate: Option<f64>,
-    /// Standard error of `rate`.
-    pub rate_error: Option<f64>,
     /// Time for one turn.
     pub turn: Option<f64>,
     /// Largest Lyapunov exponent per unit time, where it was needed.
@@ -110,7 +108,6 @@ impl Outcome {
             settled_at: cycle.and_then(|c| c.settled_at),
             radius: cycle.map(|c| c.radius),
             rate: approach.map(|r| r.per_time),
-            rate_error: approach.map(|r| r.standard_error),
             turn: cycle.map(|c| c.duration),
             exponent: evidence.lyapunov.map(|l| l.value),
             exponent_error: evidence.lyapunov.map(|l| l.standard_error),
@@ -137,7 +134,6 @@ impl Outcome {
             settled_at: None,
             radius: None,
             rate: None,
-            rate_error: None,
             turn: None,
             exponent: None,
             exponent_error: None,
@@ -338,11 +334,7 @@ mod tests {
                 (cycle.as_ref().map(|_| 1e-3), cycle.as_ref().map(|_| 4.5))
             );
             assert_eq!(found.period, if cycle.is_some() { 3 } else { 0 });
-            let approach = cycle.and_then(|c| c.approach);
-            assert_eq!(
-                (found.rate, found.rate_error),
-                (approach.map(|a| a.per_time), approach.map(|_| 1e-4))
-            );
+            assert_eq!(found.rate, cycle.and_then(|c| c.approach).map(|a| a.per_time));
             assert_eq!((found.exponent, found.exponent_error), (Some(0.25), Some(0.01)));
         }
     }

@@ -13,8 +13,9 @@ use crate::table::{Column, ColumnKind, Entry, Table};
 
 /// Name of the format in its files.
 const FORMAT: &str = "twofold-sweep";
-/// The version of that format. From version 2 on `data` is the digest of the heading, too.
-const VERSION: u64 = 2;
+/// The version of that format. From version 2 on `data` is the digest of the heading, too; version 3
+/// has no errors of rates.
+pub const VERSION: u64 = 3;
 /// Hexadecimal digits of a question's digest that a row carries: as many as fit a whole number of a
 /// table.
 const KEY: usize = 15;
@@ -54,7 +55,7 @@ pub enum RowsError {
 }
 
 /// The columns that every sweep has after its axes.
-fn found_columns() -> [Column; 16] {
+fn found_columns() -> [Column; 15] {
     let time = |name| Column::new(name, "1", ColumnKind::Number);
     [
         Column::integers("key"),
@@ -64,7 +65,6 @@ fn found_columns() -> [Column; 16] {
         time("settled_at"),
         time("radius"),
         time("rate"),
-        time("rate_error"),
         time("turn"),
         time("exponent"),
         time("exponent_error"),
@@ -89,7 +89,6 @@ impl Row {
             blank(outcome.settled_at),
             blank(outcome.radius),
             blank(outcome.rate),
-            blank(outcome.rate_error),
             blank(outcome.turn),
             blank(outcome.exponent),
             blank(outcome.exponent_error),
@@ -111,7 +110,7 @@ impl Row {
         let blank = || Entry::Number(f64::NAN);
         let mut cells = settings;
         cells.extend([key_entry(key), Entry::Word(FAILED.into()), Entry::Integer(0)]);
-        cells.extend((0..8).map(|_| blank()));
+        cells.extend((0..7).map(|_| blank()));
         cells.extend([
             Entry::Integer(0),
             blank(),
@@ -130,7 +129,7 @@ impl Row {
 
     /// Its outcome, in a word.
     pub fn outcome(&self) -> &str {
-        self.cell_from_last(15).word()
+        self.cell_from_last(14).word()
     }
 
     /// Why it failed, if it did.
@@ -141,7 +140,7 @@ impl Row {
 
     /// The leading digits of its question's digest.
     pub fn key(&self) -> i64 {
-        match self.cell_from_last(16) {
+        match self.cell_from_last(15) {
             Entry::Integer(key) => *key,
             _ => 0,
         }
@@ -163,7 +162,7 @@ impl Row {
         }
         // A cell whose settings make no question has no key.
         let key = sweep.key(self.number);
-        if *self.cell_from_last(16) != key_entry(key.as_ref()) {
+        if *self.cell_from_last(15) != key_entry(key.as_ref()) {
             return wrong("has the key of another question");
         }
         let plain = |b: u8| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'-';
@@ -552,7 +551,6 @@ mod tests {
             settled_at: Some(2.0),
             radius: Some(3.0),
             rate: Some(4.0),
-            rate_error: Some(5.0),
             turn: Some(6.0),
             exponent: Some(7.0),
             exponent_error: None,
@@ -578,7 +576,6 @@ mod tests {
             ("settled_at", 2.0),
             ("radius", 3.0),
             ("rate", 4.0),
-            ("rate_error", 5.0),
             ("turn", 6.0),
             ("exponent", 7.0),
             ("end", 9.0),
@@ -628,7 +625,7 @@ mod tests {
             ("why 1", "why 7", "not those that it was written with"),
             ("\n0.001,", "\n0.002,", "not those that it was written with"),
             ("twofold-sweep", "twofold-sweet", "does not say"),
-            ("\"version\":2", "\"version\":1", "does not say"),
+            ("\"version\":3", "\"version\":2", "does not say"),
             (NUMERICS, "another", "not those that it was written with"),
             ("\"rows\":2", "\"rows\":3", "not those that it was written with"),
             ("\"t_end\":60", "\"t_end\":61", "its spec is not the one"),
