@@ -438,7 +438,8 @@ impl Equation {
         &self.values
     }
 
-    fn term(&self, name: &str) -> Option<&Expression> {
+    /// The definition of a name under `[let]`.
+    pub(crate) fn term(&self, name: &str) -> Option<&Expression> {
         self.definition.terms.iter().find(|(n, _)| n == name).map(|(_, e)| e)
     }
 

@@ -4224,3 +4224,83 @@ fn events_see_the_jumps_of_tables() {
         }
     }
 }
+
+/// Functions that vanish at one moment and do not know of each other: two valves, two diodes, two
+/// friction elements that unload together. Of valves with inputs in closed form; the others by
+/// Radau IIA of SciPy with switches smoothed to 1e-5.
+#[test]
+fn valves_that_open_at_one_moment_open() {
+    let valves = "states = ['p', 'q']\nstart = [1, 1]\n\
+        f = ['if(p > 0, t - 2, max(t - 2, 0))', 'if(q > 0, t - 2, max(t - 2, 0))']";
+    let inputs = "states = ['p', 'q']\nstart = [0, 0]\n\
+        f = ['if(p >= 0.3, min(1 - t, 0), 1 - t)', 'if(q >= 0.2, min(1 - t^2, 0), 1 - t^2)']";
+    let diodes = "states = ['i', 'j']\nstart = [0.4, 0.5]\n\
+        f = ['if(i > 0, u - 0.1*i, max(u, 0))/0.3', 'if(j > 0, u - 0.2*j, max(u, 0))/0.5']\n\
+        [let]\nu = 'sin(t) - 0.5'";
+    let elements = "states = ['f', 'g']\nstart = [0, 0]\n\
+        f = ['if(f >= 0.3, min(2*v, 0), if(f <= -0.3, max(2*v, 0), 2*v))', \
+        'if(g >= 0.5, min(v, 0), if(g <= -0.5, max(v, 0), v))']\n[let]\nv = 'cos(t)'";
+    let both = "states = ['x', 'v', 'f', 'g']\nstart = [0, 0.5, 0, 0]\n\
+        f = ['v', 'cos(0.7*t) - 0.3*v - f - g', 'if(abs(f) < 0.3 or f*v < 0, 2*v, 0)', \
+        'if(abs(g) < 0.5 or g*v < 0, v, 0)']";
+    for method in Method::ALL {
+        let ends = |text: &str, t_end: f64, want: &[f64], within: f64| {
+            let found = end_of(text, t_end, method).unwrap();
+            found.iter().zip(want).for_each(|(v, want)| near(*v, *want, within));
+        };
+        ends(valves, 3.0, &[0.5, 0.5], 1e-9);
+        ends(inputs, 2.0, &[-0.2, 0.2 - 4.0 / 3.0], 1e-9);
+        ends(diodes, 15.0, &[1.68457, 0.95764], 2e-5);
+        ends(elements, 20.0, &[0.3, 0.5], 1e-9);
+        ends(both, 20.0, &[1.14561, 0.16726, 0.3, 0.5], 3e-5);
+    }
+}
+
+/// Valves and clamps that see the speed of a block which friction holds: on one side their speed is
+/// zero while it does, and where it begins to move it is so to second order.
+#[test]
+fn clamps_rest_while_friction_holds_a_block() {
+    let clamp = "states = ['v', 'i']\nstart = [0, -0.05]\n\
+        f = ['t - 0.2*sign(v)', 'if(i - v > 0, 0, 0.5)']";
+    let valve = "states = ['x', 'v']\nstart = [0, 0]\n\
+        f = ['if(x > 0, t - 1 - v, max(t - 1 - v, 0))', '-0.4*sign(v)']";
+    let windup = "states = ['v', 'i', 'u']\nstart = [0, 0, 0]\n\
+        f = ['u - 0.2*sign(v)', 'if(1 + i - 1.5*v > 1, 0, 0.5)', '8*(1 - u)']";
+    let limited = |limit: &str| {
+        format!(
+            "states = ['x', 'v']\nstart = [0.5, 0]\nf = ['{limit}', 'x - 0.4*sign(v) - 0.3']\n\
+             [let]\nu = '2*sin(t) - 1.5*v'"
+        )
+    };
+    for method in Method::ALL {
+        let ends = |text: &str, t_end: f64, want: &[f64], within: f64| {
+            let found = end_of(text, t_end, method).unwrap();
+            found.iter().zip(want).for_each(|(v, want)| near(*v, *want, within));
+        };
+        ends(clamp, 0.6, &[0.08, 0.08], 1e-9);
+        ends(valve, 2.5, &[1.125, 0.0], 1e-9);
+        ends(windup, 10.0, &[7.8777, 4.97072, 1.0], 3e-5);
+        for limit in ["if(x > 0, u, max(u, 0))", "max(u, if(x > 0, u, 0))"] {
+            ends(&limited(limit), 12.0, &[0.0, 0.348753083], 1e-8);
+        }
+    }
+}
+
+/// An ideal diode that charges a capacitor, with its voltage under a name: what is measured by the
+/// size of terms does not see whether they have one.
+#[test]
+fn names_of_terms_change_nothing() {
+    let detector = |rate: &str| {
+        format!(
+            "states = ['i', 'v']\nstart = [0, 0.5]\nf = ['{rate}', 'i - v/4']\n\
+             [let]\nw = 'sin(t)'\nu = 'w - v'"
+        )
+    };
+    for method in Method::ALL {
+        for rate in ["max(u, if(i > 0, u, 0))", "max(w - v, if(i > 0, w - v, 0))"] {
+            let found = end_of(&detector(rate), 20.0, method).unwrap();
+            near(found[0], 0.2158309611302507, 1e-9);
+            near(found[1], 0.40129034270926073, 1e-9);
+        }
+    }
+}

@@ -3,6 +3,7 @@
 use twofold_num::random::RandomStream;
 use twofold_num::tape::Program;
 
+use super::sliding::least_determinant;
 use super::*;
 use crate::equation::{Gate, same_sign};
 use crate::range::Range;
@@ -18,7 +19,7 @@ const DEEPEST: usize = 16;
 const LARGEST_DEFECT: f64 = 1e3;
 /// A weight of sliding that is zero because a field runs along the surface is so up to this
 /// rounding; one that grows beyond its root is none.
-const ALONG: f64 = 1e-10;
+pub(super) const ALONG: f64 = 1e-10;
 
 impl Follower<'_> {
     /// Collects the conditions that may be met in a step, each with the side that it is on.
@@ -385,8 +386,7 @@ impl Follower<'_> {
                     false => f64::INFINITY,
                     true => attraction(&a, &matrix),
                 };
-                determinant =
-                    if self.dependent { holds } else { determinant_of_negative(matrix, k) };
+                determinant = if self.dependent { holds } else { least_determinant(&matrix, k) };
                 if holds < determinant {
                     determinant = holds;
                 }

@@ -8,6 +8,7 @@ use twofold_num::random::RandomStream;
 use twofold_system::expression::{Function, General};
 
 use super::locate::TANGENT;
+use super::search::ALONG;
 use super::*;
 use crate::cells;
 use crate::equation::same_sign;
@@ -38,36 +39,49 @@ impl Follower<'_> {
     /// The size of the terms that an expression is a sum of, with states as large as they have been
     /// in this run: what rounding is measured by.
     pub(super) fn magnitude(&self, e: &Expression) -> f64 {
+        self.magnitude_with(e, &mut HashMap::new())
+    }
+
+    /// The same, with the sizes of the definitions of \[let\] that are known.
+    fn magnitude_with<'a>(&'a self, e: &'a Expression, known: &mut HashMap<&'a str, f64>) -> f64 {
+        let mut of = |e: &'a Expression| self.magnitude_with(e, known);
         match e {
-            Expression::Add(a, b) | Expression::Sub(a, b) => self.magnitude(a) + self.magnitude(b),
-            Expression::Neg(a) => self.magnitude(a),
-            Expression::Mul(a, b) => self.magnitude(a) * self.magnitude(b),
+            Expression::Add(a, b) | Expression::Sub(a, b) => of(a) + of(b),
+            Expression::Neg(a) => of(a),
+            Expression::Mul(a, b) => of(a) * of(b),
             Expression::Name(name) => {
-                match self.model.definition().states().iter().position(|s| s.name == *name) {
-                    Some(i) => self.size[i].max(self.x[i].abs()),
-                    None => self.equation.value(e, self.t, &self.x).abs(),
+                let states = self.model.definition().states();
+                if let Some(i) = states.iter().position(|s| s.name == *name) {
+                    return self.size[i].max(self.x[i].abs());
                 }
+                let Some(term) = self.equation.term(name) else {
+                    return self.equation.value(e, self.t, &self.x).abs();
+                };
+                if let Some(size) = known.get(name.as_str()) {
+                    return *size;
+                }
+                let size = self.magnitude_with(term, known);
+                known.insert(name, size);
+                size
             }
             Expression::Div(a, b) => {
                 let by = self.equation.value(b, self.t, &self.x).abs();
-                self.magnitude_by(e, self.magnitude(a) / by)
+                self.magnitude_by(e, of(a) / by)
             }
             Expression::Power(a, n) => {
                 let power = self.slope_at(a).power(*n);
-                self.magnitude_by(e, power.partials[0].abs() * self.magnitude(a))
+                self.magnitude_by(e, power.partials[0].abs() * of(a))
             }
             // One of several numbers, at a place where it may change to another.
-            Expression::Call(Function::Abs, a) => self.magnitude(a),
+            Expression::Call(Function::Abs, a) => of(a),
             Expression::Call(function, a) if !matches!(function, Function::Sqrt) => {
                 let slope = function.apply(self.slope_at(a)).partials[0].abs();
-                self.magnitude_by(e, slope * self.magnitude(a))
+                self.magnitude_by(e, slope * of(a))
             }
             Expression::Apply(General::Min | General::Max | General::Clip, list) => {
-                list.iter().map(|e| self.magnitude(e)).fold(0.0, f64::max)
+                list.iter().map(of).fold(0.0, f64::max)
             }
-            Expression::Apply(General::If, list) => {
-                list[1..].iter().map(|e| self.magnitude(e)).fold(0.0, f64::max)
-            }
+            Expression::Apply(General::If, list) => list[1..].iter().map(of).fold(0.0, f64::max),
             other => self.equation.value(other, self.t, &self.x).abs(),
         }
     }
@@ -91,13 +105,32 @@ impl Follower<'_> {
 
     /// The size of the terms that an expression is a sum of, as they are at a point.
     pub(super) fn terms_at(&self, e: &Expression, t: f64, x: &[f64]) -> f64 {
+        self.terms_with(e, (t, x), &mut HashMap::new())
+    }
+
+    fn terms_with<'a>(
+        &'a self,
+        e: &'a Expression,
+        at: (f64, &[f64]),
+        known: &mut HashMap<&'a str, f64>,
+    ) -> f64 {
+        let mut of = |e: &'a Expression| self.terms_with(e, at, known);
         match e {
-            Expression::Add(a, b) | Expression::Sub(a, b) => {
-                self.terms_at(a, t, x) + self.terms_at(b, t, x)
+            Expression::Add(a, b) | Expression::Sub(a, b) => of(a) + of(b),
+            Expression::Neg(a) => of(a),
+            Expression::Mul(a, b) => of(a) * of(b),
+            Expression::Name(name) => {
+                let Some(term) = self.equation.term(name) else {
+                    return self.equation.value(e, at.0, at.1).abs();
+                };
+                if let Some(size) = known.get(name.as_str()) {
+                    return *size;
+                }
+                let size = self.terms_with(term, at, known);
+                known.insert(name, size);
+                size
             }
-            Expression::Neg(a) => self.terms_at(a, t, x),
-            Expression::Mul(a, b) => self.terms_at(a, t, x) * self.terms_at(b, t, x),
-            other => self.equation.value(other, t, x).abs(),
+            other => self.equation.value(other, at.0, at.1).abs(),
         }
     }
 
@@ -408,14 +441,14 @@ impl Follower<'_> {
         let zero = if self.equation.guards[guard].whole { self.boundary(guard) } else { 0.0 };
         let size = self.magnitude(&self.equation.guards[guard].expression);
         let small = 1e-14 * size.max(zero.abs());
-        self.values_ahead(config, guard, [0.0, 0.01])
+        self.values_ahead(config, &[], guard, [0.0, 0.01])
             .is_some_and(|values| values.iter().all(|value| (value - zero).abs() <= small))
     }
 
     /// The side to which a function of third order or more leaves zero in a configuration: it grows
     /// by more than a square. 0 if it stays.
     fn side_ahead_in(&mut self, config: &Configuration, guard: usize) -> f64 {
-        match self.values_ahead(config, guard, [0.005, 0.01]) {
+        match self.values_ahead(config, &[], guard, [0.005, 0.01]) {
             Some([near, far]) if same_sign(near, far) && far.abs() > 5.0 * near.abs() => {
                 far.signum()
             }
@@ -423,23 +456,73 @@ impl Follower<'_> {
         }
     }
 
+    /// The side to which a function of second order or more leaves zero where the motion slides on
+    /// others: on the lower sides of those in `config`, on one other side in each of `flips`. 0 if
+    /// it stays.
+    fn side_ahead_sliding(
+        &mut self,
+        config: &Configuration,
+        flips: &[(usize, Configuration)],
+        guard: usize,
+    ) -> f64 {
+        match self.values_ahead(config, flips, guard, [0.005, 0.01]) {
+            Some([near, far]) if same_sign(near, far) && far.abs() > 3.0 * near.abs() => {
+                far.signum()
+            }
+            _ => 0.0,
+        }
+    }
+
     /// The values of a function after these parts of the time that a state takes to move by its
-    /// size in this configuration.
+    /// size in this configuration, sliding on the functions that `flips` have on their other sides.
     fn values_ahead(
         &mut self,
         config: &Configuration,
+        flips: &[(usize, Configuration)],
         guard: usize,
         parts: [f64; 2],
     ) -> Option<[f64; 2]> {
-        let compiled = self.equation.compiled_with(config, &[guard]);
+        let slid: Vec<usize> = flips.iter().map(|(slid, _)| *slid).collect();
+        let asked: Vec<usize> = slid.iter().copied().chain([guard]).collect();
+        let compiled = self.equation.compiled_with(config, &asked);
         let place = compiled.place(guard)?;
+        let places = slid.iter().map(|g| compiled.place(*g)).collect::<Option<Vec<_>>>()?;
         let mut variables = self.load(config);
+        let others: Vec<_> = flips
+            .iter()
+            .map(|(_, flip)| (self.equation.compiled_with(flip, &asked), self.load(flip)))
+            .collect();
         let mut field = |t: f64, x: &[f64]| {
-            variables[..x.len()].copy_from_slice(x);
-            variables[x.len()] = t;
-            let mut out = vec![0.0; x.len()];
-            compiled.field.evaluate(&variables, &mut out);
-            out
+            let n = x.len();
+            let at = |compiled: &Compiled, variables: &mut [f64]| {
+                variables[..n].copy_from_slice(x);
+                variables[n] = t;
+                let mut out = vec![0.0; n];
+                compiled.field.evaluate(variables, &mut out);
+                out
+            };
+            let low = at(&compiled, &mut variables);
+            if others.is_empty() {
+                return low;
+            }
+            let rates = Self::along(&compiled, &variables, &low);
+            let (k, mut matrix, mut highs) = (places.len(), Vec::new(), Vec::new());
+            for (other, variables) in &others {
+                let mut variables = variables.clone();
+                let high = at(other, &mut variables);
+                let there = Self::along(other, &variables, &high);
+                let rate = |g: &usize| other.place(*g).map_or(f64::NAN, |p| there[p]);
+                matrix.push(slid.iter().map(rate).collect::<Vec<_>>());
+                highs.push(high);
+            }
+            let b: Vec<f64> = places.iter().map(|p| -rates[*p]).collect();
+            let entry = |i: usize| matrix[i % k][i / k] + b[i / k];
+            let a: Vec<f64> = (0..k * k).map(entry).collect();
+            let weights = solve_any(&a, &b, 0.0).unwrap_or_else(|| vec![f64::NAN; k]);
+            let added = |i: usize| {
+                weights.iter().zip(&highs).map(|(w, high)| w * (high[i] - low[i])).sum::<f64>()
+            };
+            (0..n).map(|i| low[i] + added(i)).collect()
         };
         let now = field(self.t, &self.x);
         let moves = now.iter().zip(&self.size).filter(|(f, size)| **f != 0.0 && **size != 0.0);
@@ -775,7 +858,7 @@ impl Follower<'_> {
                     continue;
                 }
             }
-            let mut open = None;
+            let (mut open, mut edges) = (None, Vec::new());
             let cells = self.cells_of(&set.iter().map(|i| zero[*i]).collect::<Vec<_>>());
             let found = possibilities(set.len(), |assignment| {
                 if cells.as_ref().is_some_and(|cells| !cells.has(assignment)) {
@@ -953,8 +1036,41 @@ impl Follower<'_> {
                     }
                 }
                 let Some(weights) = weights else { return false };
-                if m > 1 && weights.iter().any(|w| !(*w > 0.0 && *w < 1.0)) {
-                    return false;
+                // Where the motion slides on the functions at these places, and not on others.
+                let ahead = |follower: &mut Self, on: &[bool], slides: &[usize], i: usize| {
+                    let mut config = |on: &[bool]| {
+                        let all = |i: usize| match set.iter().position(|s| *s == i) {
+                            Some(p) => on[p],
+                            None => decided[i],
+                        };
+                        vertex(follower, &all).0
+                    };
+                    let flip = |s: &usize| {
+                        let mut on = on.to_vec();
+                        on[*s] = true;
+                        (zero[set[*s]], config(&on))
+                    };
+                    let flips: Vec<_> = slides.iter().map(flip).collect();
+                    let base = config(on);
+                    follower.side_ahead_sliding(&base, &flips, zero[set[i]])
+                };
+                edges.clear();
+                for (s, w) in slides.iter().zip(&weights).filter(|_| m > 1) {
+                    let edge = if *w > 0.5 { 1.0 } else { -1.0 };
+                    if !(*w > -ALONG && *w < 1.0 + ALONG) {
+                        return false;
+                    }
+                    // Along the surface on one side, to second order, and towards it on the other.
+                    if !(*w > ALONG && *w < 1.0 - ALONG) {
+                        let others: Vec<usize> =
+                            slides.iter().copied().filter(|other| other != s).collect();
+                        let mut on = plus.clone();
+                        on[*s] = edge > 0.0;
+                        if ahead(self, &on, &others, *s) * edge > 0.0 {
+                            return false;
+                        }
+                        edges.push((zero[set[*s]], edge));
+                    }
                 }
                 (0..set.len()).filter(|i| !slides.contains(i)).all(|i| {
                     let added =
@@ -966,8 +1082,13 @@ impl Follower<'_> {
                     // A rate that is zero to rounding counts as zero; where one field is followed
                     // alone its second derivative is known.
                     let alone = weights.iter().all(|w| *w == 0.0);
-                    let zero = if alone { direction[i] } else { 0.0 };
-                    goes(i, if rate.abs() <= 1e-13 * size { zero } else { rate })
+                    let is_zero = rate.abs() <= 1e-13 * size;
+                    let rate = match (is_zero, alone) {
+                        (false, _) => rate,
+                        (true, true) => direction[i],
+                        (true, false) => ahead(self, &plus, &slides, i),
+                    };
+                    goes(i, rate)
                 })
             });
             if let Some(ways) = open {
@@ -1012,6 +1133,12 @@ impl Follower<'_> {
             };
             for (i, way) in set.iter().zip(&chosen) {
                 ways[*i] = *way;
+                if *way == Way::Stay {
+                    self.along[zero[*i]] = 0.0;
+                }
+            }
+            if found.len() == 1 {
+                edges.iter().for_each(|(guard, edge)| self.along[*guard] = *edge);
             }
             if let ([i], [Way::Stay]) = (set.as_slice(), chosen.as_slice()) {
                 let (low, high) = (at(self, vec![false]).2[0], at(self, vec![true]).2[0]);

@@ -788,6 +788,16 @@ fn sum(terms: impl Iterator<Item = f64>) -> f64 {
     if sum.abs() <= 4.0 * count * count * f64::EPSILON * size { 0.0 } else { sum }
 }
 
+/// The least determinant of -a among groups of functions that depend on each other: of several that
+/// vanish at one moment the product would vanish before.
+pub(super) fn least_determinant(a: &[f64], k: usize) -> f64 {
+    let of_group = |group: &Vec<usize>| {
+        let row = |i: &usize| group.iter().map(|j| a[i * k + j]).collect::<Vec<_>>();
+        determinant_of_negative(group.iter().flat_map(row).collect(), group.len())
+    };
+    groups(k, |i, j| a[i * k + j] != 0.0).iter().map(of_group).fold(f64::INFINITY, f64::min)
+}
+
 /// The determinant of -a, of k rows, by elimination with pivots.
 pub(crate) fn determinant_of_negative(mut a: Vec<f64>, k: usize) -> f64 {
     let mut product = 1.0;
