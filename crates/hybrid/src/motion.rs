@@ -408,6 +408,17 @@ struct Contact {
     above: f64,
 }
 
+/// The equations on one side of a contact whose place or speed other functions see: with the sides
+/// that these have as soon as the motion leaves it to that side.
+struct Off {
+    /// Place of the contact, and the side.
+    place: usize,
+    way: f64,
+    config: Configuration,
+    compiled: Rc<Compiled>,
+    variables: Vec<f64>,
+}
+
 /// A step that stands, but for what is met in it.
 struct Accepted {
     length: f64,
@@ -456,6 +467,7 @@ struct Follower<'a> {
     contacts: Vec<Contact>,
     /// Whether each guard is held at zero by contacts.
     guard_held: Vec<bool>,
+    off: Vec<Off>,
     /// Whether the motion has come to a point that it does not leave.
     rests: bool,
     /// Whether the last step's error was the rounding of the time.
@@ -868,6 +880,7 @@ impl<'a> Follower<'a> {
             dependent: false,
             contacts: Vec::new(),
             guard_held: vec![false; guards],
+            off: Vec::new(),
             rests: false,
             noisy: false,
             watch_side: vec![0.0; watched],
@@ -1199,6 +1212,8 @@ impl<'a> Follower<'a> {
             // Sliding ends, and goes on behind a switch, on its surface.
             if !self.sliding.is_empty() {
                 self.project();
+            } else if !self.contacts.is_empty() {
+                self.place_contacts();
             }
             quiet = if progress { 0 } else { quiet + 1 };
             if quiet > 40 {

@@ -4304,3 +4304,79 @@ fn names_of_terms_change_nothing() {
         }
     }
 }
+
+/// A body on its stop, with a switch at the very place of the stop: it is let go when the field on
+/// the free side pulls, at t = 5 + 10/3, with friction at 5 + 14/3. A rocking block, whose impacts
+/// let it pass with 0.3 of its speed, rests between both sides until one of them pulls.
+#[test]
+fn switches_at_the_place_of_a_stop_let_go_as_the_free_side_does() {
+    const RAMP: &str = "if(t > 5, 0.3*(t - 5), 0)";
+    let stop = |force: &str, restitution: f64| {
+        format!(
+            "states = ['x', 'v']\nstart = [0.5, 0]\nf = ['v', '{force} + {RAMP}']\n\
+             [[event]]\nwhen = 'x'\ndirection = 'down'\nafter_zeno = 'stick'\n\
+             set = {{ v = '-{restitution}*v' }}"
+        )
+    };
+    let block = |force: &str| {
+        format!(
+            "states = ['x', 'v']\nstart = [0.15, 0]\nf = ['v', '-sign(x) {force}']\n\
+             [[event]]\nwhen = 'x'\nafter_zeno = 'stick'\nset = {{ v = '0.3*v' }}"
+        )
+    };
+    let free = |pull: f64, time: f64| [pull * time * time * time / 6.0, pull * time * time / 2.0];
+    for method in Method::ALL {
+        let ends = |text: &str, t_end: f64, want: [f64; 2]| {
+            let found = end_of(text, t_end, method).unwrap_or_else(|e| panic!("{e}\n{text}"));
+            found.iter().zip(want).for_each(|(v, want)| near(*v, want, 1e-8));
+        };
+        for restitution in [0.0, 0.5] {
+            for force in [
+                "-1",
+                "-sign(x)",
+                "if(x > 0, -1, 5)",
+                "-heaviside(x)",
+                "if(x >= 0, -1, 1)",
+                "-1 - if(x < 0, 3, 0)",
+                "-1 - max(-x, 0)",
+            ] {
+                ends(&stop(force, restitution), 10.0, free(0.3, 5.0 / 3.0));
+            }
+        }
+        ends(&stop("-1 - 0.4*sign(v)", 0.0), 12.0, [0.635_185_185_185, 0.816_666_666_667]);
+        // Their impacts accumulate in no step of Adams' and BDF formulas.
+        if method != Method::Lsoda {
+            ends(&block("+ if(t > 4, 0.3*(t - 4), 0)"), 8.0, free(0.3, 2.0 / 3.0));
+            ends(&block("- 0.1*t"), 15.0, free(-0.1, 5.0));
+            ends(&block("- 0.1*(t - 2)"), 15.0, free(-0.1, 3.0));
+            ends(&block("+ 0.3*sin(t)"), 9.0, [0.0, 0.0]);
+        }
+    }
+}
+
+/// A body on a vibrating table that is kicked or meets a kink of its field does not sink into it.
+/// Its speed is the table's until that falls faster than the body would.
+#[test]
+fn what_lies_on_a_vibrating_table_stays_above_it() {
+    let body = |force: &str, kick: &str| {
+        format!(
+            "states = ['x', 'v']\nstart = [0.3, 0]\nf = ['v', '{force}']\n\
+             [let]\np = '0.15*sin(1.5*t)'\nq = '0.225*cos(1.5*t)'\n\
+             [[event]]\nwhen = 'x - p'\ndirection = 'down'\nafter_zeno = 'stick'\n\
+             set = {{ v = 'q' }}\n{kick}"
+        )
+    };
+    let kick = "[[event]]\nname = 'kick'\nat = [2]\nset = { v = 'v - 0.4' }";
+    for method in Method::ALL {
+        for (text, t_end) in [
+            (body("-1", kick), 4.0),
+            (body("-1 - 0.2*sign(v)", ""), 10.3),
+            (body("-1 - 0.2*abs(v)", ""), 10.3),
+            (body("-1 - 0.2*max(v, 0)", ""), 10.3),
+        ] {
+            let found = end_of(&text, t_end, method).unwrap();
+            near(found[0], 0.15 * (1.5 * t_end).sin(), 1e-9);
+            near(found[1], 0.225 * (1.5 * t_end).cos(), 1e-9);
+        }
+    }
+}

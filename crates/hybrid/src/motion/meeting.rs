@@ -45,7 +45,12 @@ impl Follower<'_> {
                     }
                     ceases = true;
                 }
-                Sought::Release(place) => opened.push(self.contacts[place]),
+                Sought::Release(place) => {
+                    let (t, x) = (self.t, self.x.clone());
+                    self.watched_values();
+                    self.contacts[place].above = self.push(place, t, &x).1;
+                    opened.push(self.contacts[place]);
+                }
                 Sought::Beyond(at) => self.pass_beyond(at),
             }
         }
@@ -201,7 +206,14 @@ impl Follower<'_> {
         if contacts.is_empty() {
             return Ok(());
         }
+        let mut freed = Vec::new();
         for contact in contacts {
+            let place = self.contacts.iter().position(|c| *c == contact);
+            let off = |off: &&Off| Some(off.place) == place && off.way == contact.above;
+            if let Some(off) = self.off.iter().find(off) {
+                let held = (0..self.guard_held.len()).filter(|guard| self.guard_held[*guard]);
+                freed.extend(held.map(|guard| (guard, off.config.sides[guard])));
+            }
             self.contacts.retain(|c| c.watched != contact.watched);
             self.watch_side[contact.watched] = contact.above;
             self.fresh_watch[contact.watched] = true;
@@ -215,7 +227,7 @@ impl Follower<'_> {
                 + 64.0 * f64::EPSILON * self.magnitude(e);
             self.trains[contact.event] = Train::default();
         }
-        self.hold_guards()
+        self.hold_guards_but(&freed)
     }
 
     /// A function of the time alone is zero between two numbers, of which the later one counts: the
@@ -412,6 +424,8 @@ impl Follower<'_> {
                 .filter(|i| self.fresh_watch[*i] && stays_zero(&self.equation.watched[*i]))
                 .collect();
             if mode.is_some() || !self.equation.guards.is_empty() {
+                // A body that is laid on its stop lies there, and functions of its place rest.
+                self.rest_on_stops()?;
                 self.settle_afresh(&zero)?;
             }
             let struck = self.keep_contacts(definition, &old);
@@ -649,21 +663,37 @@ impl Follower<'_> {
         if !of_mode || !is_on || self.contacts.iter().any(|c| c.watched == i) {
             return None;
         }
-        let (compiled, rates) = self.rates_of_second_order(&self.config.clone());
+        // Functions that are zero with it are so on neither side, or beside it.
+        let state = definition.events()[event].set.first().map(|(state, _)| *state)?;
+        let active = self.compiled.active.iter().copied();
+        let zero = active.filter(|g| !self.equation.guards[*g].whole && !self.slides[*g]);
+        let zero: Vec<usize> = zero.filter(|g| self.side_of(*g).is_none()).collect();
+        let mut off = self.sides_off(i, state, -into, &zero);
+        self.ask_new(&mut off);
+        let here = self.config.clone();
+        (self.is_pressed(here.clone(), i, into) || off != here && self.is_pressed(off, i, into))
+            .then_some(event)
+    }
+
+    /// Whether in this configuration the motion has no speed at a watched expression's zero and is
+    /// pressed into it.
+    fn is_pressed(&mut self, config: Configuration, i: usize, into: f64) -> bool {
+        let (compiled, rates) = self.rates_of_second_order(&config);
         let place = compiled.active.len() + i;
-        let speeds = self.speeds(&rates.field, place);
+        let own = self.compiled.active.len() + i;
+        let speeds = self.speeds(&rates.field, own);
         let rests = rates.first[place].abs() <= 1e-14 * speeds.max(rates.terms[place]);
         let mut push = rates.second[place];
         if !self.contacts.is_empty() {
             let forces = self.contact_forces(&rates.field);
             for (contact, force) in self.contacts.iter().zip(forces) {
-                push += force * self.second_along(&rates.field, Some(contact.state))[place];
+                push += force * self.second_along(&rates.field, Some(contact.state))[own];
             }
         }
-        if rests && push == 0.0 && self.contacts.is_empty() {
-            push = self.side_ahead(place);
+        if rests && push == 0.0 && self.contacts.is_empty() && config == self.config {
+            push = self.side_ahead(own);
         }
-        (rests && push * into > 0.0).then_some(event)
+        rests && push * into > 0.0
     }
 
     /// The size of a watched value's speed where states are as large as they have been.
@@ -746,10 +776,32 @@ impl Follower<'_> {
         true
     }
 
+    /// Puts the positions of contacts back onto their surfaces: else a moving one would be above
+    /// what rests on it, by the step's error, and would not be met again.
+    pub(super) fn place_contacts(&mut self) {
+        const ROUNDING: f64 = 4.0 * f64::EPSILON;
+        let (values, active) = (self.watched_values(), self.compiled.active.len());
+        let off: Vec<f64> = self.contacts.iter().map(|c| values[active + c.watched]).collect();
+        let e = |c: &Contact| &self.equation.watched[c.watched];
+        let is_on = |(c, off): (&Contact, &f64)| off.abs() <= ROUNDING * self.magnitude(e(c));
+        if self.contacts.iter().zip(&off).all(is_on) {
+            return;
+        }
+        let places: Vec<(usize, usize)> =
+            self.contacts.iter().map(|c| (active + c.watched, 0)).collect();
+        let rows = self.gradients_of(&places);
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let gram: Vec<f64> = rows.iter().flat_map(|a| rows.iter().map(|b| dot(a, b))).collect();
+        for (row, weight) in rows.iter().zip(solve_any(&gram, &off, 0.0).unwrap_or_default()) {
+            self.x.iter_mut().zip(row).for_each(|(x, slope)| *x -= weight * slope);
+        }
+    }
+
     /// Puts the state back onto the surfaces that are slid upon, and a contact's derivative to
     /// zero.
     pub(super) fn project(&mut self) {
         if !self.contacts.is_empty() {
+            self.place_contacts();
             self.variables[..self.n].copy_from_slice(&self.x);
             self.variables[self.n] = self.t;
             let mut field = vec![0.0; self.n];

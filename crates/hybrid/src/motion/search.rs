@@ -415,13 +415,7 @@ impl Follower<'_> {
                 Sought::Repelling => determinant,
                 Sought::Beyond(at) => self.value_beyond(self.beyond[at], t, x),
                 // A surface pushes and does not pull.
-                Sought::Release(place) => {
-                    let mut field = vec![0.0; n];
-                    compiled.field.evaluate(&self.variables, &mut field);
-                    let k = self.contacts.len();
-                    let own = self.grips(&field)[place * k + place];
-                    self.contacts[place].above * own.signum() * self.contact_forces(&field)[place]
-                }
+                Sought::Release(place) => self.push(place, t, x).0,
             });
         }
         self.scratch = values;

@@ -366,6 +366,8 @@ impl Follower<'_> {
             // Whether fields turn away is no function with a series.
             Sought::Repelling if self.may_turn_away() => return None,
             Sought::Repelling => return own(Followed::Attraction),
+            // Those of two equations are no function with a series.
+            Sought::Release(_) if !self.off.is_empty() => return None,
             Sought::Release(place) => return own(Followed::Push(place)),
         };
         let Some(sum) = self.compiled.affine[place].as_ref() else {

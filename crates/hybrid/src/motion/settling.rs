@@ -1618,6 +1618,11 @@ impl Follower<'_> {
     /// of the contacts' expressions and of these' speeds. They rest there, neither above nor below,
     /// until the contact opens.
     pub(super) fn hold_guards(&mut self) -> Result<(), HybridError> {
+        self.hold_guards_but(&[])
+    }
+
+    /// The same; those that nothing holds any more and whose sides are known get these.
+    pub(super) fn hold_guards_but(&mut self, known: &[(usize, f64)]) -> Result<(), HybridError> {
         let before = self.guard_held.clone();
         self.guard_held.fill(false);
         if !self.contacts.is_empty() {
@@ -1660,15 +1665,24 @@ impl Follower<'_> {
             }
         }
         if self.guard_held == before {
+            self.find_off();
             return Ok(());
         }
         let mut config = self.config.clone();
         let held = (0..before.len()).filter(|guard| self.guard_held[*guard]);
         held.for_each(|guard| config.sides[guard] = 0.0);
+        let mut free: Vec<usize> =
+            (0..before.len()).filter(|g| before[*g] && !self.guard_held[*g]).collect();
+        for (guard, side) in known.iter().filter(|(_, side)| *side != 0.0) {
+            if let Some(place) = free.iter().position(|free| free == guard) {
+                free.swap_remove(place);
+                config.sides[*guard] = *side;
+                (self.fresh_guard[*guard], self.tangent_guard[*guard]) = (true, true);
+            }
+        }
+        free.sort_unstable();
         self.ask_new(&mut config);
         self.adopt(config, self.sliding.clone());
-        let free: Vec<usize> =
-            (0..before.len()).filter(|g| before[*g] && !self.guard_held[*g]).collect();
         if free.is_empty() { Ok(()) } else { self.settle(&[&self.sliding[..], &free].concat()) }
     }
 

@@ -87,6 +87,7 @@ impl Follower<'_> {
             }
         }
         self.find_beyond();
+        self.find_off();
         self.hold_watched();
         self.signs = self
             .equation
@@ -668,6 +669,123 @@ impl Follower<'_> {
         let pulls: Vec<f64> =
             self.contacts.iter().map(|c| -rates[self.compiled.active.len() + c.watched]).collect();
         solve_any(&self.grips(field), &pulls, 0.0).unwrap_or_else(|| vec![f64::NAN; pulls.len()])
+    }
+
+    /// Finds the equations on the sides of the contacts that hold other functions at zero.
+    pub(super) fn find_off(&mut self) {
+        self.off.clear();
+        if self.contacts.is_empty() || !self.guard_held.contains(&true) {
+            return;
+        }
+        for place in 0..self.contacts.len() {
+            let above = self.contacts[place].above;
+            for way in [above, -above] {
+                if way != above && !self.lets_through(place) {
+                    continue;
+                }
+                let held: Vec<usize> =
+                    (0..self.guard_held.len()).filter(|guard| self.guard_held[*guard]).collect();
+                let Contact { watched, state, .. } = self.contacts[place];
+                let config = self.sides_off(watched, state, way, &held);
+                let (compiled, variables) = (self.equation.compiled(&config), self.load(&config));
+                self.off.push(Off { place, way, config, compiled, variables });
+            }
+        }
+    }
+
+    /// Whether the event of a contact lets what moves pass to the other side, slower.
+    fn lets_through(&self, place: usize) -> bool {
+        let Contact { event, state, .. } = self.contacts[place];
+        let event = &self.model.definition().events()[event];
+        let mut x = self.x.clone();
+        let change = if self.size[state] > 0.0 { self.size[state] } else { 1.0 };
+        x[state] += change;
+        let set = event.set.iter().find(|(set, _)| *set == state);
+        let after = set.map(|(_, e)| self.equation.value(e, self.t, &x) - self.x[state]);
+        matches!(event.when, When::Zero(_, Direction::Both)) && after.is_some_and(|a| a > 0.0)
+    }
+
+    /// The configuration in which these functions have the sides that they get as soon as the
+    /// motion, moved by a state, leaves the zero of a watched expression to a side: first by its
+    /// speed, then by its place. The others keep theirs.
+    pub(super) fn sides_off(
+        &self,
+        watched: usize,
+        state: usize,
+        way: f64,
+        guards: &[usize],
+    ) -> Configuration {
+        /// Changes of the speed and the place, relative to the states' sizes, and what is none.
+        const SPEED: f64 = 1e-6;
+        const PLACE: f64 = 1e-3;
+        const NONE: f64 = 1e-12;
+        let mut variables = self.variables.clone();
+        variables[..self.n].copy_from_slice(&self.x);
+        variables[self.n] = self.t;
+        let mut velocity = |x: &[f64]| {
+            variables[..self.n].copy_from_slice(x);
+            let mut field = vec![0.0; self.n];
+            self.compiled.field.evaluate(&variables, &mut field);
+            field
+        };
+        let rest = velocity(&self.x);
+        let by = self.second_along(&rest, Some(state))[self.compiled.active.len() + watched];
+        let size = |i: usize| if self.size[i] > 0.0 { self.size[i] } else { 1.0 };
+        let mut faster = self.x.clone();
+        faster[state] += way * by.signum() * SPEED * size(state);
+        let change: Vec<f64> =
+            velocity(&faster).iter().zip(&rest).map(|(fast, rest)| fast - rest).collect();
+        let time = (0..self.n)
+            .filter(|i| *i != state && change[*i] != 0.0)
+            .map(|i| PLACE * size(i) / change[i].abs())
+            .fold(f64::INFINITY, f64::min);
+        let mut moved = self.x.clone();
+        if time.is_finite() {
+            moved.iter_mut().zip(&change).for_each(|(x, change)| *x += time * change);
+            moved[state] = self.x[state];
+        }
+        let mut config = self.config.clone();
+        for guard in guards {
+            let e = &self.equation.guards[*guard].expression;
+            let small = NONE * self.magnitude(e);
+            let value = |x: &[f64]| self.equation.value(e, self.t, x);
+            let values = [value(&faster), value(&moved)];
+            let found = values.into_iter().find(|value| value.abs() > small);
+            if let Some(value) = found {
+                config.sides[*guard] = value.signum();
+            }
+        }
+        config
+    }
+
+    /// What contacts push with in the direction of `way`, as they are and, where they hold other
+    /// functions, as far as these let them go: the greater one, and the least of the ways.
+    pub(super) fn push(&mut self, place: usize, t: f64, x: &[f64]) -> (f64, f64) {
+        let of = |follower: &Self| {
+            let mut field = vec![0.0; follower.n];
+            follower.compiled.field.evaluate(&follower.variables, &mut field);
+            let k = follower.contacts.len();
+            let own = follower.grips(&field)[place * k + place];
+            own.signum() * follower.contact_forces(&field)[place]
+        };
+        let above = self.contacts[place].above;
+        let held = of(self);
+        let mut all = std::mem::take(&mut self.off);
+        let mut least: Option<(f64, f64)> = None;
+        for off in all.iter_mut().filter(|off| off.place == place) {
+            off.variables[..self.n].copy_from_slice(x);
+            off.variables[self.n] = t;
+            std::mem::swap(&mut self.compiled, &mut off.compiled);
+            std::mem::swap(&mut self.variables, &mut off.variables);
+            let push = f64::max(off.way * held, off.way * of(self));
+            std::mem::swap(&mut self.compiled, &mut off.compiled);
+            std::mem::swap(&mut self.variables, &mut off.variables);
+            if least.is_none_or(|(least, _)| push < least) {
+                least = Some((push, off.way));
+            }
+        }
+        self.off = all;
+        least.unwrap_or((above * held, above))
     }
 
     /// Second derivatives of the watched values along the field; or the derivatives of their first
