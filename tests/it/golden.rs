@@ -123,7 +123,7 @@ fn short(figure: &Figure) -> Figure {
 }
 
 /// Every answer that the shortened figures ask for, and of one figure all that is made of them:
-/// whoever draws does so on one thread.
+/// drawing is done on one thread.
 fn all_hashes(threads: usize) -> Vec<String> {
     in_pool(threads, || {
         let figures: Vec<Figure> = figures::all().iter().map(short).collect();

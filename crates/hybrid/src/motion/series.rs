@@ -105,6 +105,14 @@ impl Follower<'_> {
             self.compiled.field.evaluate(&self.variables, &mut low);
             low
         };
+        if self.contacts_act_on_sliding(&low) {
+            return Err(stuck(
+                "the motion slides on a surface whose speed a contact changes, too, and both are \
+                solved for together, which is not written as a Taylor series: follow it by \
+                --method dopri5 or radau5"
+                    .into(),
+            ));
+        }
         let mut orders = Vec::new();
         if self.separate.is_none() && !self.sliding.is_empty() {
             let (_, matrix) = self.sliding_equations(step.t, &step.x, &low);

@@ -231,7 +231,7 @@ impl Follower<'_> {
         let n = self.n;
         self.variables[..n].copy_from_slice(x);
         self.variables[n] = t;
-        let low = Self::along(&self.compiled, &self.variables, field0);
+        let low = self.along_held(&self.compiled, &self.variables, field0);
         let sides = |follower: &mut Self, add: f64| {
             for guard in &follower.sliding {
                 // On the positive side of a sign 1, of a whole part one more.
@@ -242,7 +242,7 @@ impl Follower<'_> {
         sides(self, 2.0);
         let mut field1 = vec![0.0; n];
         self.compiled.field.evaluate(&self.variables, &mut field1);
-        let high = Self::along(&self.compiled, &self.variables, &field1);
+        let high = self.along_held(&self.compiled, &self.variables, &field1);
         sides(self, -2.0);
         let mut jumps = Vec::with_capacity(self.sliding.len());
         let weight = |guard: &usize| {
@@ -271,6 +271,18 @@ impl Follower<'_> {
     }
 
     pub(super) fn rhs(&mut self, t: f64, x: &[f64], out: &mut [f64]) {
+        self.mixed(t, x, out);
+        if !self.contacts.is_empty() {
+            let forces = self.contact_forces(out);
+            self.contacts
+                .iter()
+                .zip(forces)
+                .for_each(|(contact, force)| out[contact.state] += force);
+        }
+    }
+
+    /// The velocity without what contacts add to it.
+    fn mixed(&mut self, t: f64, x: &[f64], out: &mut [f64]) {
         let n = self.n;
         self.variables[..n].copy_from_slice(x);
         self.variables[n] = t;
@@ -299,13 +311,6 @@ impl Follower<'_> {
                     weights.iter().zip(&others).map(|(weight, other)| weight * (other[i] - low));
                 out[i] = sum(std::iter::once(low).chain(added));
             }
-        }
-        if !self.contacts.is_empty() {
-            let forces = self.contact_forces(out);
-            self.contacts
-                .iter()
-                .zip(forces)
-                .for_each(|(contact, force)| out[contact.state] += force);
         }
     }
 
@@ -442,12 +447,14 @@ impl Follower<'_> {
     fn mixture_at(&mut self, t: f64, x: &[f64]) -> (Mixture, Vec<Vec<f64>>, Vec<Vec<f64>>) {
         let n = self.n;
         let (mut fields, mut rates) = (Vec::new(), Vec::new());
-        for (compiled, variables) in &mut self.corners {
+        for (_, variables) in &mut self.corners {
             variables[..n].copy_from_slice(x);
             variables[n] = t;
+        }
+        for (compiled, variables) in &self.corners {
             let mut field = vec![0.0; n];
             compiled.field.evaluate(variables, &mut field);
-            let all = Self::along(compiled, variables, &field);
+            let all = self.along_held(compiled, variables, &field);
             let of = |guard: &usize| compiled.place(*guard).map_or(f64::NAN, |i| all[i]);
             rates.push(self.sliding.iter().map(of).collect::<Vec<f64>>());
             fields.push(field);
@@ -525,6 +532,34 @@ impl Follower<'_> {
         let mut out = vec![Dual::constant(0.0); compiled.outputs];
         compiled.watched.evaluate(&duals, &mut out);
         out.iter().map(|d| d.partials[0]).collect()
+    }
+
+    /// The same along a field to which contacts add what holds them.
+    fn along_held(&self, compiled: &Compiled, variables: &[f64], field: &[f64]) -> Vec<f64> {
+        if self.contacts.is_empty() {
+            return Self::along(compiled, variables, field);
+        }
+        let mut held = field.to_vec();
+        self.hold(compiled, variables, &mut held);
+        Self::along(compiled, variables, &held)
+    }
+
+    /// Whether what contacts add to a field changes the speed of a surface slid upon.
+    pub(super) fn contacts_act_on_sliding(&self, field: &[f64]) -> bool {
+        if self.contacts.is_empty() || self.sliding.is_empty() {
+            return false;
+        }
+        let free = Self::along(&self.compiled, &self.variables, field);
+        let held = self.along_held(&self.compiled, &self.variables, field);
+        let places = self.sliding.iter().filter_map(|guard| self.compiled.place(*guard));
+        places.into_iter().any(|p| free[p] != held[p])
+    }
+
+    /// Adds to a field of these equations what contacts add to it.
+    fn hold(&self, compiled: &Compiled, variables: &[f64], field: &mut [f64]) {
+        let forces = self.contact_forces_in(compiled, variables, field);
+        let all = self.contacts.iter().zip(forces);
+        all.for_each(|(contact, force)| field[contact.state] += force);
     }
 
     /// The derivatives of the field along itself.
@@ -633,7 +668,7 @@ impl Follower<'_> {
         let n = self.n;
         self.variables[..n].copy_from_slice(x);
         self.variables[n] = t;
-        let rates = Self::along(&self.compiled, &self.variables, field0);
+        let rates = self.along_held(&self.compiled, &self.variables, field0);
         let of = |rates: &[f64], compiled: &Compiled, guard: usize| {
             compiled.place(guard).map_or(f64::NAN, |i| rates[i])
         };
@@ -642,7 +677,7 @@ impl Follower<'_> {
         for column in 0..k {
             let field = self.positive_field(column, t, x);
             let (compiled, variables) = &self.base[column];
-            let rates = Self::along(compiled, variables, &field);
+            let rates = self.along_held(compiled, variables, &field);
             for row in 0..k {
                 matrix[row * k + column] = of(&rates, compiled, self.sliding[row]) - a[row];
             }
@@ -653,9 +688,16 @@ impl Follower<'_> {
     /// Matrix of the contacts, row by row: effect of each contact's state on the derivative of each
     /// contact's expression.
     pub(super) fn grips(&self, field: &[f64]) -> Vec<f64> {
-        let columns: Vec<Vec<f64>> =
-            self.contacts.iter().map(|c| self.second_along(field, Some(c.state))).collect();
-        let place = |c: &Contact| self.compiled.active.len() + c.watched;
+        self.grips_in(&self.compiled, &self.variables, field)
+    }
+
+    fn grips_in(&self, compiled: &Compiled, variables: &[f64], field: &[f64]) -> Vec<f64> {
+        let columns: Vec<Vec<f64>> = self
+            .contacts
+            .iter()
+            .map(|c| Self::second_along_in(compiled, variables, field, Some(c.state)))
+            .collect();
+        let place = |c: &Contact| compiled.active.len() + c.watched;
         self.contacts
             .iter()
             .flat_map(|c| columns.iter().map(|column| column[place(c)]).collect::<Vec<_>>())
@@ -665,16 +707,23 @@ impl Follower<'_> {
     /// Rates added to each contact's state under `field` so that its expression stays at zero;
     /// not-a-number if there are none.
     pub(super) fn contact_forces(&self, field: &[f64]) -> Vec<f64> {
-        let rates = self.second_along(field, None);
+        self.contact_forces_in(&self.compiled, &self.variables, field)
+    }
+
+    fn contact_forces_in(&self, compiled: &Compiled, variables: &[f64], field: &[f64]) -> Vec<f64> {
+        let rates = Self::second_along_in(compiled, variables, field, None);
         let pulls: Vec<f64> =
-            self.contacts.iter().map(|c| -rates[self.compiled.active.len() + c.watched]).collect();
-        solve_any(&self.grips(field), &pulls, 0.0).unwrap_or_else(|| vec![f64::NAN; pulls.len()])
+            self.contacts.iter().map(|c| -rates[compiled.active.len() + c.watched]).collect();
+        let grips = self.grips_in(compiled, variables, field);
+        solve_any(&grips, &pulls, 0.0).unwrap_or_else(|| vec![f64::NAN; pulls.len()])
     }
 
     /// Finds the equations on the sides of the contacts that hold other functions at zero.
     pub(super) fn find_off(&mut self) {
         self.off.clear();
-        if self.contacts.is_empty() || !self.guard_held.contains(&true) {
+        // Where the motion slides, too, they are not one equation.
+        let slides = !self.sliding.is_empty() && self.separate.is_none();
+        if self.contacts.is_empty() || slides || !self.guard_held.contains(&true) {
             return;
         }
         for place in 0..self.contacts.len() {
@@ -761,9 +810,9 @@ impl Follower<'_> {
     /// What contacts push with in the direction of `way`, as they are and, where they hold other
     /// functions, as far as these let them go: the greater one, and the least of the ways.
     pub(super) fn push(&mut self, place: usize, t: f64, x: &[f64]) -> (f64, f64) {
-        let of = |follower: &Self| {
+        let of = |follower: &mut Self| {
             let mut field = vec![0.0; follower.n];
-            follower.compiled.field.evaluate(&follower.variables, &mut field);
+            follower.mixed(t, x, &mut field);
             let k = follower.contacts.len();
             let own = follower.grips(&field)[place * k + place];
             own.signum() * follower.contact_forces(&field)[place]
@@ -791,8 +840,17 @@ impl Follower<'_> {
     /// Second derivatives of the watched values along the field; or the derivatives of their first
     /// ones by a state.
     pub(super) fn second_along(&self, field: &[f64], by: Option<usize>) -> Vec<f64> {
-        let n = self.n;
-        let mut direction = vec![0.0; self.variables.len()];
+        Self::second_along_in(&self.compiled, &self.variables, field, by)
+    }
+
+    fn second_along_in(
+        compiled: &Compiled,
+        variables: &[f64],
+        field: &[f64],
+        by: Option<usize>,
+    ) -> Vec<f64> {
+        let n = field.len();
+        let mut direction = vec![0.0; variables.len()];
         match by {
             Some(state) => direction[state] = 1.0,
             None => {
@@ -800,17 +858,16 @@ impl Follower<'_> {
                 direction[n] = 1.0;
             }
         }
-        let duals: Vec<Dual<f64, 1>> = self
-            .variables
+        let duals: Vec<Dual<f64, 1>> = variables
             .iter()
             .zip(&direction)
             .map(|(v, d)| Dual { value: *v, partials: [*d] })
             .collect();
         let mut slopes = vec![Dual::constant(0.0); n];
-        self.compiled.field.evaluate(&duals, &mut slopes);
-        let nested: Vec<Nested> = (0..self.variables.len())
+        compiled.field.evaluate(&duals, &mut slopes);
+        let nested: Vec<Nested> = (0..variables.len())
             .map(|i| {
-                let inner = Dual { value: self.variables[i], partials: [direction[i]] };
+                let inner = Dual { value: variables[i], partials: [direction[i]] };
                 let outer = match i {
                     i if i < n => Dual { value: field[i], partials: slopes[i].partials },
                     i if i == n => Dual::constant(1.0),
@@ -819,9 +876,8 @@ impl Follower<'_> {
                 Dual { value: inner, partials: [outer] }
             })
             .collect();
-        let outputs = self.compiled.active.len() + self.equation.watched.len();
-        let mut out = vec![Nested::constant(Dual::constant(0.0)); outputs];
-        self.compiled.watched.evaluate(&nested, &mut out);
+        let mut out = vec![Nested::constant(Dual::constant(0.0)); compiled.outputs];
+        compiled.watched.evaluate(&nested, &mut out);
         out.iter().map(|d| d.partials[0].partials[0]).collect()
     }
 
@@ -860,6 +916,9 @@ impl Follower<'_> {
         let n = self.n;
         let mut field = vec![0.0; n];
         compiled.field.evaluate(&variables, &mut field);
+        if !self.contacts.is_empty() {
+            self.hold(&compiled, &variables, &mut field);
+        }
         let outputs = compiled.outputs;
         let (mut slopes, mut terms) = (vec![0.0; outputs], vec![0.0; outputs]);
         for (o, gradient) in compiled.gradients(&variables).iter().enumerate() {

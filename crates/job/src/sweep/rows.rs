@@ -13,8 +13,8 @@ use crate::table::{Column, ColumnKind, Entry, Table};
 
 /// Name of the format in its files.
 const FORMAT: &str = "twofold-sweep";
-/// The version of that format. From version 2 on `data` is the digest of the heading, too; version 3
-/// has no errors of rates.
+/// The version of that format. From version 2 on `data` is the digest of the heading, too; from
+/// version 3 on there are no errors of rates.
 pub const VERSION: u64 = 3;
 /// Hexadecimal digits of a question's digest that a row carries: as many as fit a whole number of a
 /// table.
