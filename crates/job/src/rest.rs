@@ -13,6 +13,7 @@ use super::answer::{Answer, Stop};
 use super::question::{Ask, JobError};
 use super::run::Run;
 use super::spec::{Method, MethodSpec, Observation, RunSpec, SwitchSpec, switching};
+use twofold_integrate::delay::Inside;
 use twofold_integrate::{Schedule, StepCap, Tolerance};
 use twofold_num::Dual;
 use twofold_num::elementary::{exp, ln, sqrt};
@@ -186,22 +187,26 @@ pub fn near(system: &System, switch: SwitchSpec, from: &[f64]) -> Option<Rest> {
         return regular(&Field::smoothed(system, transition, eps))
             .filter(|r| switching(system, &r.state).abs() > SATURATED * eps);
     }
-    let beyond = match switch {
-        SwitchSpec::Filippov { .. } | SwitchSpec::Delayed { .. } => 0.0,
-        SwitchSpec::Relay { band, .. } => band,
-        SwitchSpec::Smoothed { .. } | SwitchSpec::Hysteretic { .. } => return None,
-    };
     let fields = [Field::plus(system), Field::minus(system)];
     let [plus, minus] = &fields;
-    // A side's rest counts where that side is.
-    let on = |field: &Field, sign: f64| {
-        regular(field).filter(|r| sign * switching(system, &r.state) > beyond)
+    // A side's rest counts where that side is; a relay's field holds to the band's other edge.
+    let (beyond, held) = match switch {
+        SwitchSpec::Filippov { .. } | SwitchSpec::Delayed { .. } => (0.0, [true; 2]),
+        SwitchSpec::Relay { band, inside } => {
+            let plus = inside.begins_with_plus(switching(system, from), band);
+            (-band, [plus, !plus])
+        }
+        SwitchSpec::Smoothed { .. } | SwitchSpec::Hysteretic { .. } => return None,
+    };
+    let on = |field: &Field, sign: f64, held: bool| {
+        let rest = held.then(|| regular(field)).flatten();
+        rest.filter(|r| sign * switching(system, &r.state) > beyond)
     };
     let slides = matches!(switch, SwitchSpec::Filippov { .. });
     let between = slides.then(|| pseudo(system, plus, minus, from)).flatten();
     let boundary = || of_both(system, &fields, [regular(plus)?, regular(minus)?], from);
     let both = slides.then(boundary).flatten();
-    let candidates = [both, between, on(plus, 1.0), on(minus, -1.0)];
+    let candidates = [both, between, on(plus, 1.0, held[0]), on(minus, -1.0, held[1])];
     let there = |r: &Rest| distance(&r.state, from);
     candidates.into_iter().flatten().min_by(|a, b| there(a).total_cmp(&there(b)))
 }
@@ -333,6 +338,35 @@ fn moves_on(executor: &dyn Ask, run: &RunSpec, end: &[f64]) -> Result<bool, JobE
     }))
 }
 
+/// How far the fields of a relay take a state from each other in the time in which it is looked
+/// which of them holds, as a share of the state's size.
+const APART: f64 = 1e-6;
+
+/// The field that the relay of `run` holds at its `end`: the one that its last stretch follows.
+///
+/// # Errors
+///
+/// If it was interrupted.
+fn held(executor: &dyn Ask, run: &RunSpec, end: &[f64]) -> Result<Inside, JobError> {
+    let [plus, minus] = [Field::plus(&run.system), Field::minus(&run.system)].map(|field| {
+        let mut out = vec![0.0; end.len()];
+        field.evaluate(end, &mut out);
+        out
+    });
+    let time = (APART * (size(end) + size(&run.start)) / distance(&plus, &minus)).min(run.t_end);
+    let shorter = RunSpec { t_end: run.t_end - time, ..run.clone() };
+    let before: Vec<f64> = match executor.ask(&Run(shorter)) {
+        Ok(answer) if answer.stop != Stop::Interrupted => answer.fact("state")?,
+        Ok(_) | Err(JobError::Interrupted) => return Err(JobError::Interrupted),
+        Err(_) => return Ok(Inside::Sign),
+    };
+    let off = |field: &[f64]| {
+        let back: Vec<f64> = end.iter().zip(field).map(|(x, f)| x - time * f).collect();
+        distance(&back, &before)
+    };
+    Ok(if off(&plus) < off(&minus) { Inside::Plus } else { Inside::Minus })
+}
+
 /// The rest at which `run` ends, if it ends at one; `answer` is what it came to, with its section.
 /// A run that is kicked ends nowhere.
 ///
@@ -354,7 +388,15 @@ pub fn at_end(
         let more = matches!(run.switch, SwitchSpec::Hysteretic { .. }).then(|| phi(x));
         x.iter().copied().chain(more).collect()
     };
-    let Some(rest) = near(&run.system, run.switch, &full(&end)) else { return Ok(None) };
+    let mut switch = run.switch;
+    match &mut switch {
+        SwitchSpec::Hysteretic { phi0, .. } => *phi0 = phi(&end),
+        SwitchSpec::Relay { band, inside } if switching(&run.system, &end).abs() <= *band => {
+            *inside = held(executor, run, &end)?;
+        }
+        _ => {}
+    }
+    let Some(rest) = near(&run.system, switch, &full(&end)) else { return Ok(None) };
     if rest.eigenvalues.is_empty() && moves_on(executor, run, &end)? {
         return Ok(None);
     }
@@ -394,10 +436,6 @@ pub fn at_end(
     }
     let implicit = [Method::Lsoda, Method::Radau5].contains(&run.method.name);
     let name = if implicit { run.method.name } else { Method::Dopri5 };
-    let mut switch = run.switch;
-    if let SwitchSpec::Hysteretic { phi0, .. } = &mut switch {
-        *phi0 = phi(&end);
-    }
     let further = RunSpec {
         switch,
         start: end.clone(),

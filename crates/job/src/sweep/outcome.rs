@@ -361,6 +361,17 @@ mod tests {
         for switch in [relay, delayed(None), delayed(Some(0.1)), SwitchSpec::tanh(0.1)] {
             assert_eq!(outcome(focus(), [1.0, 0.0], switch, 2000.0, section(1)), "rest");
         }
+        // Inside the band of a relay, which holds either field there.
+        let held = || {
+            let fields = "plus = ['-x - 1', '-2*y']\nminus = ['-x + 1', '-2*y']";
+            cases::of(&format!("states = ['x', 'y']\nh = 'x'\n{fields}"))
+        };
+        for (x, band, axis) in [(0.3, 1.1, 1), (-0.3, 1.1, 1), (0.3, 5.0, 0), (-4.0, 1.5, 0)] {
+            let word = outcome(held(), [x, 1.0], SwitchSpec::relay(band), 100.0, section(axis));
+            assert_eq!(word, "rest", "{x} {band}");
+        }
+        let swings = outcome(held(), [0.3, 1.0], SwitchSpec::relay(0.9), 300.0, section(0));
+        assert_eq!(swings, "period-1");
         let friction = || {
             let text =
                 "states = ['x', 'v']\nh = 'v'\nplus = ['v', '-x - 1']\nminus = ['v', '1 - x']";
