@@ -148,6 +148,10 @@ pub enum RestError {
 const STARTS: usize = 400;
 /// Sets of several surfaces share as many; each has so many at least.
 const LEAST_STARTS: usize = 20;
+/// Starts with each set of answers that no other start has.
+const FEW_STARTS: usize = 4;
+/// Functions of which all sets of answers are tried.
+const MOST_UNMET: usize = 6;
 const MOST_ITERATIONS: usize = 60;
 /// Surfaces on which a rest can lie at once.
 const MOST_TOGETHER: usize = 4;
@@ -225,6 +229,10 @@ pub fn rests(model: &Model, within: &[(f64, f64)]) -> Result<Vec<Rest>, RestErro
             for on in &sets {
                 for (number, config) in configs.iter().enumerate().take(starts) {
                     search.add(config, on, &places[number], number, &mut found);
+                }
+                let met = &configs[..starts.min(configs.len())];
+                for (number, config) in search.unmet(met, &surfaces, on) {
+                    search.add(&config, on, &places[number], number, &mut found);
                 }
                 search.add_between(mode, on, &mut found);
             }
@@ -387,6 +395,39 @@ impl Search<'_> {
             }
         };
         ends.into_iter().enumerate().flat_map(of).collect()
+    }
+
+    /// Answers of the functions that switch at zero, but for those in `on`, that no place has met:
+    /// the part of the box that they hold in may be small. Each with the places to start from.
+    fn unmet(
+        &self,
+        met: &[Configuration],
+        surfaces: &[Surface],
+        on: &[Surface],
+    ) -> Vec<(usize, Configuration)> {
+        let guards: Vec<usize> = surfaces
+            .iter()
+            .filter(|s| s.level.is_none() && !on.contains(s))
+            .map(|s| s.guard)
+            .collect();
+        if guards.len() > MOST_UNMET {
+            return Vec::new();
+        }
+        let answers = |bits: usize| {
+            let side = move |i: usize| if bits >> i & 1 == 1 { 1.0 } else { -1.0 };
+            guards.iter().enumerate().map(move |(i, guard)| (*guard, side(i)))
+        };
+        let is_met = |bits: &usize| {
+            met.iter().any(|config| answers(*bits).all(|(g, side)| config.sides[g] == side))
+        };
+        let unmet = (0..1_usize << guards.len()).filter(|bits| !is_met(bits));
+        let starts = unmet.flat_map(|bits| met.iter().take(FEW_STARTS).map(move |c| (bits, c)));
+        let of = |(number, (bits, place)): (usize, (usize, &Configuration))| {
+            let mut config = place.clone();
+            answers(bits).for_each(|(guard, side)| config.sides[guard] = side);
+            (number % FEW_STARTS, config)
+        };
+        starts.enumerate().map(of).collect()
     }
 
     /// The number of surfaces of the switching function that has most.

@@ -2718,6 +2718,28 @@ fn stability_is_said_where_it_is_decided() {
     assert_eq!(kinds("states = ['x']\nf = ['-0.001*x']", &[(-10.0, 10.0)]), ["stable node"]);
 }
 
+/// A rest in a strip that none of the places is in from which it is looked for, in a field and on
+/// the edges of strips of other states.
+#[test]
+fn rests_in_narrow_strips_are_found() {
+    let found = |text: &str| crate::rests::rests(&model(text), &[(-10.0, 10.0); 2]).unwrap();
+    for width in [0.03, 1e-3, 1e-5] {
+        let strip = format!("if(x > 0.1 and x < 0.1 + {width:e}, 0.1 + {width:e}/3 - x, 1)");
+        let strips =
+            found(&format!("states = ['x', 'y']\nf = ['{strip}', '{}']", strip.replace('x', "y")));
+        let at = |x: f64, y: f64| {
+            let near = |r: &&crate::rests::Rest| {
+                (r.x[0] - 0.1 - x * width).abs() + (r.x[1] - 0.1 - y * width).abs() < 1e-12
+            };
+            strips.iter().filter(near).count()
+        };
+        assert_eq!(strips.len(), 4, "{width}: {strips:?}");
+        for (x, y) in [(1.0 / 3.0, 1.0 / 3.0), (1.0, 1.0 / 3.0), (1.0 / 3.0, 1.0), (1.0, 1.0)] {
+            assert_eq!(at(x, y), 1, "{width} {x} {y}: {strips:?}");
+        }
+    }
+}
+
 /// One focus with eigenvalues 0.2 +- i, whatever the units of its states.
 #[test]
 fn a_rest_has_no_units() {
