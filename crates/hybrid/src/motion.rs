@@ -42,7 +42,7 @@ use crate::selection::{
     mixture, near_solution, nearest_of_hull, position_hold, possibilities, turn, turn_of_position,
     velocities_differ,
 };
-use crate::step::{LEAST_STATE, Step};
+use crate::step::{LEAST_FALLING, LEAST_STATE, Step, UNDERFLOW};
 
 /// Data recorded during a run.
 #[derive(Clone, Debug, PartialEq)]
@@ -711,7 +711,7 @@ fn scale_now(follower: &Follower, step: &Step, out: &mut Vec<f64>) {
                 let size = size.max(0.01 * follower.scale_of(i)).max(least);
                 options.rtol * size
                     + if noise.is_finite() { 4.0 * step.h * noise } else { 0.0 }
-                    + LEAST_STATE
+                    + follower.least_of(i)
             }
         }
     };
@@ -1186,6 +1186,7 @@ impl<'a> Follower<'a> {
             let progress = end > self.t;
             self.t = end;
             self.x.copy_from_slice(&step.y);
+            self.underflow(&mut step);
             self.note_growth(end);
             if !earliest.is_finite() && self.along.iter().any(|along| *along != 0.0) {
                 self.tell_along(&list, &last_values);
@@ -1245,6 +1246,27 @@ impl<'a> Follower<'a> {
             };
             if let Some(ending) = ending {
                 return Ok(ending);
+            }
+        }
+    }
+
+    /// By no less the errors of a state are measured.
+    fn least_of(&self, i: usize) -> f64 {
+        if self.size[i] > LEAST_STATE { LEAST_FALLING } else { LEAST_STATE }
+    }
+
+    /// Makes the states zero that fall below [`UNDERFLOW`] together.
+    fn underflow(&mut self, step: &mut Step) {
+        let both = || step.x.iter().zip(&step.y).map(|(x, y)| (x.abs(), y.abs()));
+        let tiny = |(x, y): &(f64, f64)| x.max(*y) < UNDERFLOW;
+        let most =
+            both().filter(tiny).fold((0.0_f64, 0.0_f64), |m, s| (m.0.max(s.0), m.1.max(s.1)));
+        if most.1 < most.0 {
+            let falling = both().map(|s| tiny(&s));
+            self.x.iter_mut().zip(falling).filter(|(_, f)| *f).for_each(|(x, _)| *x = 0.0);
+            // The multistep method's history has another state.
+            if let Some(own) = &mut step.multistep {
+                own.made = None;
             }
         }
     }

@@ -51,8 +51,12 @@ pub(crate) type RightHandSide<'a> = dyn FnMut(f64, &[f64], &mut [f64]) + 'a;
 /// times the step.
 const LARGEST_DEFECT: f64 = 20.0;
 
-/// Errors of states are measured by no less: squares of smaller ones lose their digits.
+/// Errors of states are measured by no less: on the way from zero smaller ones count for nothing.
 pub(crate) const LEAST_STATE: f64 = 1e-150;
+/// Those of states that fall, by no less: the errors of smaller ones lose their digits.
+pub(crate) const LEAST_FALLING: f64 = 1e-290;
+/// A state that falls below this is zero: its error is no small part of it any more.
+pub(crate) const UNDERFLOW: f64 = 1e-280;
 
 /// The series of the motion where a step begins.
 #[derive(Clone, Debug, Default)]

@@ -4443,3 +4443,31 @@ fn contacts_and_sliding_are_solved_together() {
         }
     }
 }
+
+/// A focus, e^(-5 t) (cos 2 t, sin 2 t), crosses y = 0 every pi/2 down to states whose squares are
+/// no numbers, and ends at zero where they underflow themselves.
+#[test]
+fn a_focus_is_followed_until_its_states_underflow() {
+    let focus = model("states = ['x', 'y']\nstart = [1, 0]\nf = ['-5*x - 2*y', '2*x - 5*y']");
+    let section = twofold_system::Expression::parse("y", &["x", "y"]).unwrap();
+    for method in [Method::Dopri5, Method::Radau5, Method::Lsoda, Method::Taylor] {
+        let options = Options {
+            t_end: 1000.0,
+            method,
+            record: Record::Section(section.clone()),
+            ..Options::default()
+        };
+        let mut times = Vec::new();
+        let outcome = follow(&focus, &options, &mut |point| {
+            times.push(point.t);
+            true
+        });
+        assert_eq!(outcome.unwrap().x, [0.0, 0.0], "{method:?}");
+        let quarter = 0.5 * std::f64::consts::PI;
+        times.retain(|t| *t > 0.0 && *t < 120.5);
+        assert_eq!(times.len(), 76, "{method:?}");
+        for (k, t) in times.iter().enumerate() {
+            near(*t, quarter * (k + 1) as f64, 1e-7);
+        }
+    }
+}

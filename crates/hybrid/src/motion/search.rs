@@ -773,8 +773,9 @@ impl Follower<'_> {
         let span = self.options.t_end - self.t;
         let sizes: Vec<f64> =
             self.x.iter().zip(&self.lately).map(|(x, s)| x.abs().max(0.01 * s)).collect();
+        let least: Vec<f64> = (0..self.n).map(|i| self.least_of(i)).collect();
         let scale = |i: usize, speed: f64| {
-            atol + rtol * sizes[i].max(1e-3 * speed * span.min(1.0)) + LEAST_STATE
+            atol + rtol * sizes[i].max(1e-3 * speed * span.min(1.0)) + least[i]
         };
         let norm = |v: &[f64], scale: &[f64]| {
             (v.iter().zip(scale).map(|(v, s)| (v / s) * (v / s)).sum::<f64>() / v.len() as f64)

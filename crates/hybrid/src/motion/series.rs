@@ -239,7 +239,8 @@ impl Follower<'_> {
                 }
                 // States below the least one count for nothing, as in the scale of a step.
                 let by = |size: f64, power: usize| {
-                    rough_pow((size + LEAST_STATE) / c[k].abs(), 1.0 / power as f64)
+                    let least = if is_state { self.least_of(i) } else { LEAST_STATE };
+                    rough_pow((size + least) / c[k].abs(), 1.0 / power as f64)
                 };
                 let mut h = if is_state {
                     let size = c[0].abs().max(0.01 * self.scale_of(i));
