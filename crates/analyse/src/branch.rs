@@ -145,6 +145,12 @@ impl Orbit {
         (largest > self.largest_error()).then(|| -ln(largest) / self.period)
     }
 
+    /// How far its point may be off, as a share of its extent: what counts as closed where Newton's
+    /// method gets no further, over the distance of the nearest multiplier from 1.
+    pub fn off(&self, newton: Newton) -> f64 {
+        STALLED * newton.closed / from_one(&self.multipliers)
+    }
+
     /// The error of the largest multiplier.
     fn largest_error(&self) -> f64 {
         self.errors.first().copied().unwrap_or(0.0)
@@ -248,6 +254,11 @@ fn misses(map: &dyn ReturnMap, u: &[f64], p: f64, r: &Returned, residual: f64) -
 fn sized(difference: &[f64], r: &Returned) -> f64 {
     let weighed = difference.iter().zip(&r.sizes).map(|(d, size)| d * (r.extent / size));
     sqrt(weighed.map(|d| d * d).sum())
+}
+
+/// The distance from 1 of the multiplier that is nearest to it; at most 1.
+fn from_one(multipliers: &[[f64; 2]]) -> f64 {
+    multipliers.iter().map(|m| distance(*m, [1.0, 0.0])).fold(1.0, f64::min)
 }
 
 fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
@@ -762,8 +773,7 @@ fn is_loop(map: &dyn ReturnMap, orbit: &Orbit) -> bool {
     };
     let apart: Vec<f64> = fine.point.iter().zip(&rough.point).map(|(a, b)| a - b).collect();
     let error = sized(&apart, &fine);
-    let from_one = orbit.multipliers.iter().map(|m| distance(*m, [1.0, 0.0])).fold(1.0, f64::min);
-    orbit.residual + error < TOLD * from_one * orbit.extent
+    orbit.residual + error < TOLD * from_one(&orbit.multipliers) * orbit.extent
 }
 
 /// Steps over a grazing are at most so many shortest steps.

@@ -185,7 +185,17 @@ impl Question for ClosedOrbit {
                 };
             }
         };
-        let mut answer = self.facts(&first, returns);
+        // A motion that alternates as it settles shows multiples of the returns.
+        let fewer = || (1..map.returns).filter(|fewer| map.returns % fewer == 0);
+        let least = self.returns.is_none().then(fewer).into_iter().flatten().find_map(|fewer| {
+            let map = Map { returns: fewer, failure: RefCell::new(None), ..map };
+            let orbit = branch::closed_orbit(&map, &first.point, value, newton).ok()?;
+            let apart = apart(&orbit.point, &first.point);
+            let off = first.off(newton).min(SAME_PASSAGE);
+            (apart <= off * first.extent).then_some((map, orbit))
+        });
+        let (map, first) = least.unwrap_or((map, first));
+        let mut answer = self.facts(&first, map.returns);
         let Some(along) = &self.along else { return Ok(answer) };
         let options = BranchOptions {
             from: along.from,
@@ -206,6 +216,10 @@ impl Question for ClosedOrbit {
         answer.tables.extend(branch_tables(&along.parameter, &self.names(), &found));
         Ok(answer.with_fact("end", &found.end))
     }
+}
+
+fn apart(a: &[f64], b: &[f64]) -> f64 {
+    sqrt(a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum())
 }
 
 /// The answer where there is a rest and no closed orbit.
@@ -237,8 +251,6 @@ impl ClosedOrbit {
     ) -> Result<Option<Rest>, JobError> {
         let Obstacle::Point(point) = &trouble.obstacle else { return Ok(None) };
         let (system, switch) = self.at(value)?;
-        let apart =
-            |a: &[f64], b: &[f64]| sqrt(a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum());
         let there = |r: &Rest| {
             apart(&r.state, point) <= AT_REST * apart(&r.state, guess).max(apart(point, guess))
         };
@@ -982,6 +994,29 @@ mod tests {
         }
         let long = ClosedOrbit { settle: 4000.0, ..question };
         assert_eq!(long.compute(&Executor::new(None, &Never), &()), Err(JobError::Interrupted));
+    }
+
+    /// Roessler's (1976) equations with a = b = 0.1, c = 5.2, whose orbit has the multiplier -0.952:
+    /// the settled motion alternates. SciPy's DOP853 at 1e-13.
+    #[test]
+    fn an_orbit_approached_in_turns_is_closed_after_one_return() {
+        let field = ["-y - z", "x + 0.1*y", "0.1 + z*(x - 5.2)"];
+        let system = cases::smooth(&["x", "y", "z"], "x - 500", &field);
+        let filippov = switches()[2];
+        for (switch, settle) in [(SwitchSpec::tanh(1e-2), 200.0), (filippov, 150.0)] {
+            let tolerance = Tolerance { rtol: 1e-11, atol: 1e-11 };
+            let start = vec![5.0, 0.1, 0.0];
+            let system = system.clone();
+            let question = ClosedOrbit { settle, start, tolerance, ..question(system, switch, 1) };
+            let guess = question.guess(&Executor::quiet()).unwrap();
+            assert!(matches!(guess, Guess::Loop { returns: 2, .. }), "{guess:?}");
+            let answer = question.compute(&Executor::quiet(), &()).unwrap();
+            assert_eq!(answer.fact("returns"), Ok(1));
+            assert_eq!(answer.table("orbit").unwrap().len(), 2);
+            let multipliers: Vec<[f64; 2]> = answer.fact("multipliers").unwrap();
+            assert!((answer.fact::<f64>("period").unwrap() - 6.019_733_84).abs() < 1e-7);
+            assert!((multipliers[0][0] + 0.952_014_01).abs() < 1e-7, "{multipliers:?}");
+        }
     }
 
     /// Two turns beside each other, of (x, y) at unit speed and of (u, v) at a third of it and a
