@@ -53,6 +53,15 @@ pub enum Error {
             it meets in flight"
     )]
     SlidesThere,
+    /// The section meets the orbit on the surface.
+    #[error(
+        "the orbit meets the plane within {distance:e} of the switching surface, on whose other \
+            side orbits have other events: choose another plane"
+    )]
+    OnSurface {
+        /// Distance of the neighbouring orbits that were compared.
+        distance: f64,
+    },
     /// The orbit touches the surface.
     #[error(
         "the orbit grazes the switching surface: orbits within {distance:e} of it have other \
@@ -176,7 +185,22 @@ where
         });
         rows = match columns {
             Some(found) if !grazes => found?,
-            _ => return Err(Error::Grazing { distance: 0.01 * size }),
+            _ => {
+                let least = SHARES[SHARES.len() - 1];
+                let distance = least * size;
+                // Neighbours have other events if they begin on the other side.
+                let is_above = |j: usize, by: f64| {
+                    let mut moved = *u;
+                    moved[j] += by * least * DIFFERENCE * base.sizes[j];
+                    system.switching(&moved) > 0.0
+                };
+                let meets = |j: usize| is_above(j, 1.0) != is_above(j, -1.0);
+                return Err(if !grazes && (0..N).any(|j| j != plane.axis && meets(j)) {
+                    Error::OnSurface { distance }
+                } else {
+                    Error::Grazing { distance }
+                });
+            }
         };
     }
     Ok(Returned {
@@ -434,6 +458,38 @@ mod tests {
         // The nearest two do not.
         let r = of(2e-5, true).unwrap();
         assert!((r.derivative[0] - 6.0).abs() < 1e-4, "{r:?}");
+    }
+
+    /// Where neighbours begin on both sides of the surface, on which they land at once.
+    #[test]
+    fn a_landing_at_the_plane_is_no_grazing() {
+        struct Block;
+        impl Block {
+            fn side<S: Elementary>(x: &SVector<S, 2>, friction: f64) -> SVector<S, 2> {
+                SVector::from([x[1], x[1].scale(0.17) - x[0] + S::from_f64(friction)])
+            }
+        }
+        impl PiecewiseSmooth<2> for Block {
+            fn switching<S: Elementary>(&self, x: &SVector<S, 2>) -> S {
+                x[1] - S::one()
+            }
+            fn plus<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+                Self::side(x, -0.5)
+            }
+            fn minus<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+                Self::side(x, 0.5)
+            }
+        }
+        let plane = ReturnPlane { axis: 0, value: 0.0, upward: true };
+        let options = FloquetOptions { longest_return: 30.0, ..settings(1e-11) };
+        let of = |above: f64| {
+            let start = SVector::from([0.0, 1.0 + above]);
+            return_map(&Block, plane, 1, &start, &options, true)
+        };
+        for above in [1e-9, 1e-8, -1e-9] {
+            assert!(matches!(of(above), Err(Error::OnSurface { .. })), "{above}: {:?}", of(above));
+        }
+        assert!(of(1e-6).is_ok_and(|r| r.derivative[3].abs() < 1e-8), "{:?}", of(1e-6));
     }
 
     /// A block on a belt in units `x` of length and `t` of time, its fields over `clock`, and `h`
