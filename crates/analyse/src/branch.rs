@@ -209,6 +209,8 @@ const ITERATIONS: usize = 60;
 const ROUNDING: f64 = 1e-13;
 /// Distance of a multiplier from 1 below which Newton's method goes on as long as it helps.
 const NEAR_ONE: f64 = 1e-3;
+/// Errors of multipliers are looked at behind a last step of at most this share of the orbit.
+const SHORT: f64 = 1e-5;
 /// A loop of at most so many times the integration's error is not told from a point.
 const POINT: f64 = 1e3;
 /// Whether Newton's method is done with this residual, having had that one before, `closed` being
@@ -275,7 +277,7 @@ pub fn closed_orbit(
     p: f64,
     newton: Newton,
 ) -> Result<Orbit, Trouble> {
-    let (n, axis) = (map.states(), map.axis());
+    let axis = map.axis();
     let mut u = guess.to_vec();
     let (mut best, mut before) = (f64::INFINITY, f64::INFINITY);
     for iterations in 0..=newton.iterations {
@@ -290,10 +292,7 @@ pub fn closed_orbit(
         }
         before = residual;
         best = best.min(residual);
-        let mut matrix = less_identity(&r.derivative, n);
-        matrix[axis * n + axis] = 1.0;
-        let right: Vec<f64> = difference.iter().map(|d| -d).collect();
-        let step = match solve_any(&matrix, &right, SINGULAR * largest(&matrix)) {
+        let step = match correction(map, &u, &r) {
             Some(step) => step,
             None if closed => return orbit(map, u, p, r, residual, iterations),
             None => {
@@ -317,6 +316,15 @@ pub fn closed_orbit(
     .into())
 }
 
+/// Newton's step from `u`, whose return is `r`.
+fn correction(map: &dyn ReturnMap, u: &[f64], r: &Returned) -> Option<Vec<f64>> {
+    let (n, axis) = (map.states(), map.axis());
+    let mut matrix = less_identity(&r.derivative, n);
+    matrix[axis * n + axis] = 1.0;
+    let right: Vec<f64> = u.iter().zip(&r.point).map(|(u, there)| u - there).collect();
+    solve_any(&matrix, &right, SINGULAR * largest(&matrix))
+}
+
 fn orbit(
     map: &dyn ReturnMap,
     u: Vec<f64>,
@@ -331,11 +339,16 @@ fn orbit(
         return Err(Trouble { obstacle: Obstacle::Reversed, said: said.into() });
     }
     let multipliers = multipliers_of(&r.derivative, map.states(), map.axis());
+    let step = correction(map, &u, &r).filter(|step| sized(step, &r) <= SHORT * r.extent);
+    let beside: Vec<f64> = match step {
+        Some(step) => u.iter().zip(step).map(|(u, step)| u + step).collect(),
+        None => u.clone(),
+    };
     // The start is the orbit's first passage; the last return is the start again.
     let returns = r.same.len().saturating_sub(1);
     let same = std::iter::once(u.clone()).chain(r.same.into_iter().take(returns)).collect();
     let (errors, fills) =
-        multiplier_errors(map, &u, p, &multipliers, residual / r.extent, r.derivative_error);
+        multiplier_errors(map, &beside, p, &multipliers, residual / r.extent, r.derivative_error);
     Ok(Orbit {
         parameter: p,
         point: u,
@@ -353,10 +366,11 @@ fn orbit(
     })
 }
 
-/// The errors of multipliers: by how much those of a less accurate map differ, and by how much they
-/// change over the distance by which the orbit's point is off (the residual over the distance of
-/// the nearest multiplier from 1), ten times as fast as they change over the orbit. Where a
-/// multiplier is 1 within the first part, the points beside are as good: this is said, too.
+/// The errors of multipliers: by how much those of a less accurate map differ, at the point to
+/// which Newton's method would go from the orbit's, and by how much they change over the distance
+/// by which the orbit's point is off (the residual over the distance of the nearest multiplier from
+/// 1), ten times as fast as they change over the orbit. Where a multiplier is 1 within the first
+/// part, the points beside are as good: this is said, too.
 fn multiplier_errors(
     map: &dyn ReturnMap,
     u: &[f64],

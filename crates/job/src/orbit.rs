@@ -1019,6 +1019,26 @@ mod tests {
         }
     }
 
+    /// The same with c = 7, where Newton's method ends with a multiplier that is off by 9e-9.
+    #[test]
+    fn a_multiplier_is_off_by_no_more_than_its_error() {
+        let field = ["-y - z", "x + 0.1*y", "0.1 + z*(x - 7)"];
+        for switch in [SwitchSpec::tanh(1e-2), switches()[2]] {
+            let question = ClosedOrbit {
+                settle: 200.0,
+                start: vec![5.0, 0.1, 0.0],
+                tolerance: Tolerance { rtol: 1e-11, atol: 1e-11 },
+                returns: Some(1),
+                ..question(cases::smooth(&["x", "y", "z"], "x - 500", &field), switch, 1)
+            };
+            let answer = question.compute(&Executor::quiet(), &()).unwrap();
+            let multipliers: Vec<[f64; 2]> = answer.fact("multipliers").unwrap();
+            let error: f64 = answer.fact("multiplier_error").unwrap();
+            let off = (multipliers[0][0] + 1.396_965_653_30).abs();
+            assert!(off <= error && error < 1e-7, "{off:e} {error:e}");
+        }
+    }
+
     /// Two turns beside each other, of (x, y) at unit speed and of (u, v) at a third of it and a
     /// little more: at x = 4, where y = 0 is passed upwards, u and v are again what they were after
     /// three crossings, but for `apart`. That counts as the same within a thousandth of 1 + 4.
