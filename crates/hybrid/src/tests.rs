@@ -1,7 +1,7 @@
 //! Known results, each by formula or by an independent program.
 
 use crate::motion::Outcome;
-use crate::motion::{Exit, Method, Record, follow_to_rest, tangent};
+use crate::motion::{Exit, Method, Record, follow_to_rest, sensitivity, tangent};
 use crate::{Definition, Ending, HybridError, Model, Options, follow};
 
 fn model(text: &str) -> Model {
@@ -4470,4 +4470,33 @@ fn a_focus_is_followed_until_its_states_underflow() {
             near(*t, quarter * (k + 1) as f64, 1e-7);
         }
     }
+}
+
+/// A diode that begins to conduct while the motion slides on its closed side, where there is no
+/// mixture of fields any more: derivatives by the start against differences of runs. From i = 0
+/// neighbours on the one side stay beside it: no derivative.
+#[test]
+fn derivatives_go_through_a_diode_that_begins_to_conduct() {
+    let text = "states = ['i', 'v']\nstart = [0, 0]\n\
+        f = ['if(i > 0, u, max(u, 0))/0.2', '(i - v/5)/0.8']\n[let]\nu = '3*sin(t) - v'";
+    let model = model(text);
+    let from = |x: f64, y: f64| {
+        let options = Options { t_end: 20.0, start: Some(vec![x, y]), ..Options::default() };
+        (follow(&model, &options, &mut |_| true).unwrap().x, options)
+    };
+    for [x, y] in [[0.3, 1.1], [0.1, 2.0], [0.3, 2.0], [0.4, 1.1], [0.5, 1.1], [0.1, 0.2]] {
+        let options = from(x, y).1;
+        let found = sensitivity::sensitivities(&model, &options, &[]).unwrap().by_start;
+        let step = 1e-4;
+        let differences = [[step, 0.0], [0.0, step]].map(|[a, b]| {
+            let (more, less) = (from(x + a, y + b).0, from(x - a, y - b).0);
+            [0, 1].map(|i| (more[i] - less[i]) / (2.0 * step))
+        });
+        for (i, row) in found.iter().enumerate() {
+            row.iter().zip(differences).for_each(|(v, want)| near(*v, want[i], 2e-6));
+        }
+    }
+    let options = Options { t_end: 2.5, start: Some(vec![0.0, 0.5]), ..Options::default() };
+    let found = sensitivity::sensitivities(&model, &options, &[]).unwrap().by_start;
+    assert!(found[0][0].is_nan() && found[1][0].is_nan() && found[1][1].is_finite(), "{found:?}");
 }

@@ -83,7 +83,8 @@ pub fn sensitivities(
 
 impl Follower<'_> {
     /// Of each component of the start, whether it moves the start off a surface on which it lies
-    /// and does not slide, with other fields on its other side: neighbours there begin with those.
+    /// and does not slide, with other fields on its other side: neighbours there begin with those;
+    /// or off one that a field runs along on one side: there they stay beside it.
     fn begins_between_sides(&mut self) -> Vec<bool> {
         let n = self.n;
         let mut between = vec![false; n];
@@ -95,8 +96,15 @@ impl Follower<'_> {
         let gradients = compiled.gradients(&variables);
         let (mut own, mut other) = (vec![0.0; n], vec![0.0; n]);
         compiled.field.evaluate(&variables, &mut own);
-        for guard in (0..self.slides.len()).filter(|guard| !self.slides[*guard]) {
+        for guard in 0..self.slides.len() {
             let Some(place) = compiled.place(guard) else { continue };
+            let moved = gradients[place].iter().zip(&compiled.touches[place]);
+            let moved = moved.filter(|(slope, variable)| **variable < n && **slope != 0.0);
+            if self.slides[guard] {
+                let beside = moved.filter(|_| self.along[guard] != 0.0);
+                beside.for_each(|(_, variable)| between[*variable] = true);
+                continue;
+            }
             let (value, side) = (watched[place], self.config.sides[guard]);
             let across = match self.equation.guards[guard].whole {
                 true if value.fract() == 0.0 && side == value => value - 1.0,
@@ -112,10 +120,7 @@ impl Follower<'_> {
             if same(&own, &other) {
                 continue;
             }
-            let moved = gradients[place].iter().zip(&compiled.touches[place]);
-            moved
-                .filter(|(slope, variable)| **variable < n && **slope != 0.0)
-                .for_each(|(_, variable)| between[*variable] = true);
+            moved.for_each(|(_, variable)| between[*variable] = true);
         }
         between
     }

@@ -346,6 +346,15 @@ impl Follower<'_> {
         let (t, x) = (self.t, self.x.clone());
         let mut field = vec![0.0; n];
         self.rhs(t, &x, &mut field);
+        // Where the speeds of both sides vanish together there is no mixture, but the field along
+        // which the motion has slid.
+        if let ([guard], false) = (&self.sliding[..], field.iter().all(|f| f.is_finite())) {
+            if self.along[*guard] > 0.0 {
+                field = self.positive_field(0, t, &x);
+            } else {
+                self.compiled.field.evaluate(&self.variables, &mut field);
+            }
+        }
         let mut found: Option<(Vec<f64>, f64)> = None;
         for sought in met {
             let place = match *sought {
