@@ -4366,13 +4366,10 @@ fn switches_at_the_place_of_a_stop_let_go_as_the_free_side_does() {
             }
         }
         ends(&stop("-1 - 0.4*sign(v)", 0.0), 12.0, [0.635_185_185_185, 0.816_666_666_667]);
-        // Their impacts accumulate in no step of Adams' and BDF formulas.
-        if method != Method::Lsoda {
-            ends(&block("+ if(t > 4, 0.3*(t - 4), 0)"), 8.0, free(0.3, 2.0 / 3.0));
-            ends(&block("- 0.1*t"), 15.0, free(-0.1, 5.0));
-            ends(&block("- 0.1*(t - 2)"), 15.0, free(-0.1, 3.0));
-            ends(&block("+ 0.3*sin(t)"), 9.0, [0.0, 0.0]);
-        }
+        ends(&block("+ if(t > 4, 0.3*(t - 4), 0)"), 8.0, free(0.3, 2.0 / 3.0));
+        ends(&block("- 0.1*t"), 15.0, free(-0.1, 5.0));
+        ends(&block("- 0.1*(t - 2)"), 15.0, free(-0.1, 3.0));
+        ends(&block("+ 0.3*sin(t)"), 9.0, [0.0, 0.0]);
     }
 }
 
