@@ -4497,3 +4497,18 @@ fn derivatives_go_through_a_diode_that_begins_to_conduct() {
     let found = sensitivity::sensitivities(&model, &options, &[]).unwrap().by_start;
     assert!(found[0][0].is_nan() && found[1][0].is_nan() && found[1][1].is_finite(), "{found:?}");
 }
+
+/// Friction against the room holds a body in the air when the table on which it lay begins to sink
+/// below it, at its highest point.
+#[test]
+fn friction_may_hold_what_a_table_leaves() {
+    let text = "states = ['x', 'v']\nstart = [0.1, 0.3]\nf = ['v', '-0.25 - 0.27*sign(v)']\n\
+        [let]\np = '0.252*sin(0.95*t)'\nq = '0.252*0.95*cos(0.95*t)'\n\
+        [[event]]\nwhen = 'x - p'\ndirection = 'down'\nafter_zeno = 'stick'\n\
+        set = { v = 'q - 0.2*(v - q)' }";
+    for method in Method::ALL {
+        let found = end_of(text, 5.0, method).unwrap();
+        near(found[0], 0.252, 1e-9);
+        assert_eq!(found[1], 0.0, "{method:?}");
+    }
+}

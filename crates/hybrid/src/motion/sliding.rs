@@ -540,7 +540,9 @@ impl Follower<'_> {
             return Self::along(compiled, variables, field);
         }
         let mut held = field.to_vec();
-        self.hold(compiled, variables, &mut held);
+        let forces = Self::contact_forces_in(&self.contacts, compiled, variables, field);
+        let all = self.contacts.iter().zip(forces);
+        all.for_each(|(contact, force)| held[contact.state] += force);
         Self::along(compiled, variables, &held)
     }
 
@@ -555,11 +557,24 @@ impl Follower<'_> {
         places.into_iter().any(|p| free[p] != held[p])
     }
 
-    /// Adds to a field of these equations what contacts add to it.
+    /// Adds to a field of these equations what contacts add to it that push there. The others let
+    /// go.
     fn hold(&self, compiled: &Compiled, variables: &[f64], field: &mut [f64]) {
-        let forces = self.contact_forces_in(compiled, variables, field);
-        let all = self.contacts.iter().zip(forces);
-        all.for_each(|(contact, force)| field[contact.state] += force);
+        let mut contacts = self.contacts.clone();
+        while !contacts.is_empty() {
+            let forces = Self::contact_forces_in(&contacts, compiled, variables, field);
+            let grips = Self::grips_in(&contacts, compiled, variables, field);
+            let k = contacts.len();
+            let pushes =
+                |i: &usize| contacts[*i].above * grips[i * k + i].signum() * forces[*i] >= 0.0;
+            let pushing: Vec<Contact> = (0..k).filter(pushes).map(|i| contacts[i]).collect();
+            if pushing.len() == k {
+                let all = contacts.iter().zip(forces);
+                all.for_each(|(contact, force)| field[contact.state] += force);
+                return;
+            }
+            contacts = pushing;
+        }
     }
 
     /// The derivatives of the field along itself.
@@ -688,17 +703,21 @@ impl Follower<'_> {
     /// Matrix of the contacts, row by row: effect of each contact's state on the derivative of each
     /// contact's expression.
     pub(super) fn grips(&self, field: &[f64]) -> Vec<f64> {
-        self.grips_in(&self.compiled, &self.variables, field)
+        Self::grips_in(&self.contacts, &self.compiled, &self.variables, field)
     }
 
-    fn grips_in(&self, compiled: &Compiled, variables: &[f64], field: &[f64]) -> Vec<f64> {
-        let columns: Vec<Vec<f64>> = self
-            .contacts
+    fn grips_in(
+        contacts: &[Contact],
+        compiled: &Compiled,
+        variables: &[f64],
+        field: &[f64],
+    ) -> Vec<f64> {
+        let columns: Vec<Vec<f64>> = contacts
             .iter()
             .map(|c| Self::second_along_in(compiled, variables, field, Some(c.state)))
             .collect();
         let place = |c: &Contact| compiled.active.len() + c.watched;
-        self.contacts
+        contacts
             .iter()
             .flat_map(|c| columns.iter().map(|column| column[place(c)]).collect::<Vec<_>>())
             .collect()
@@ -707,14 +726,19 @@ impl Follower<'_> {
     /// Rates added to each contact's state under `field` so that its expression stays at zero;
     /// not-a-number if there are none.
     pub(super) fn contact_forces(&self, field: &[f64]) -> Vec<f64> {
-        self.contact_forces_in(&self.compiled, &self.variables, field)
+        Self::contact_forces_in(&self.contacts, &self.compiled, &self.variables, field)
     }
 
-    fn contact_forces_in(&self, compiled: &Compiled, variables: &[f64], field: &[f64]) -> Vec<f64> {
+    fn contact_forces_in(
+        contacts: &[Contact],
+        compiled: &Compiled,
+        variables: &[f64],
+        field: &[f64],
+    ) -> Vec<f64> {
         let rates = Self::second_along_in(compiled, variables, field, None);
         let pulls: Vec<f64> =
-            self.contacts.iter().map(|c| -rates[compiled.active.len() + c.watched]).collect();
-        let grips = self.grips_in(compiled, variables, field);
+            contacts.iter().map(|c| -rates[compiled.active.len() + c.watched]).collect();
+        let grips = Self::grips_in(contacts, compiled, variables, field);
         solve_any(&grips, &pulls, 0.0).unwrap_or_else(|| vec![f64::NAN; pulls.len()])
     }
 
