@@ -1005,6 +1005,33 @@ fn exponents_are_those_of_the_attractor() {
     }
 }
 
+/// Growth in any one of many states is followed, and what the first state's own direction hides.
+#[test]
+fn exponents_see_every_state() {
+    use crate::motion::tangent::exponents;
+    for (n, growing) in [(14, 13), (14, 0), (13, 12), (20, 5)] {
+        let names: Vec<String> = (0..n).map(|i| format!("'x{i}'")).collect();
+        let rate = |i: usize| if i == growing { 0.5 } else { -1.0 - 0.1 * i as f64 };
+        let field: Vec<String> = (0..n).map(|i| format!("'{:?}*x{i}'", rate(i))).collect();
+        let text = format!(
+            "states = [{}]\nstart = {:?}\nf = [{}]",
+            names.join(", "),
+            vec![1.0; n],
+            field.join(", ")
+        );
+        let options = Options { t_end: 40.0, ..Options::default() };
+        let found = exponents(&model(&text), &options, 10.0, 12).unwrap();
+        near(found.values[0], 0.5, 1e-6);
+    }
+    // From (1, 0) the direction of the first state is exactly that of the approach.
+    let hopf = "states = ['x', 'y']\nstart = [1, 0]\n\
+        f = ['0.1*x - 2*y - x*(x^2 + y^2)', '2*x + 0.1*y - y*(x^2 + y^2)']";
+    let options = Options { t_end: 200.0, ..Options::default() };
+    let found = exponents(&model(hopf), &options, 100.0, 2).unwrap();
+    near(found.values[0], 0.0, 1e-4);
+    near(found.values[1], -0.2, 1e-4);
+}
+
 /// Exponents whatever the units of the states; minus infinity where sliding or a reset takes a
 /// direction away, and nowhere else.
 #[test]

@@ -16,6 +16,7 @@ use crate::step::{A, C, E, Step};
 use twofold_num::elementary::{ln, rough_pow, sqrt};
 use twofold_num::fit::line;
 use twofold_num::linear::{eigenvalues, solve_any};
+use twofold_num::random::RandomStream;
 use twofold_num::{Dual, Short};
 use twofold_system::Expression;
 
@@ -660,7 +661,8 @@ pub fn exponents(
         v[i] = 1.0;
         v
     };
-    follower.begin_tangents((0..count.min(n)).map(unit).collect())?;
+    // The first step carries all states' vectors, and has the units in which they are mixed.
+    follower.begin_tangents((0..n).map(unit).collect())?;
     follower.growth = Some(Growth {
         begin,
         end: options.t_end,
@@ -777,6 +779,24 @@ fn orthonormal(vectors: &mut [Vec<f64>], units: &[f64]) -> Vec<Left> {
     left
 }
 
+/// Images of `count` vectors that are orthonormal in these units and have a part of every state,
+/// given those of the states' unit vectors. A fixed random set: directions that a symmetry or a
+/// zero of the equations keeps apart are in none.
+fn mixed(images: &[Vec<f64>], units: &[f64], count: usize) -> Vec<Vec<f64>> {
+    let n = units.len();
+    let mut random = RandomStream::new(0x1980, 0);
+    let mut set: Vec<Vec<f64>> =
+        (0..count).map(|_| (0..n).map(|_| random.normal()).collect()).collect();
+    orthonormal(&mut set, &vec![1.0; n]);
+    let sum = |parts: &Vec<f64>| {
+        let part = |i: usize| -> f64 {
+            parts.iter().zip(images).zip(units).map(|((q, y), unit)| q / unit * y[i]).sum()
+        };
+        (0..n).map(part).collect()
+    };
+    set.iter().map(sum).collect()
+}
+
 /// Most samples of the growth that are kept.
 const MOST_SAMPLES: usize = 4096;
 
@@ -834,10 +854,7 @@ impl Follower<'_> {
             .clamp(0.0, PARTS as f64 - 1.0) as usize;
         if growth.units.is_empty() {
             growth.units = units(&tangents.bounds);
-            // They began as unit vectors of the states.
-            for (sums, unit) in growth.sums.iter_mut().zip(&growth.units) {
-                sums[0] -= if growth.from.is_some() { ln(*unit) } else { 0.0 };
-            }
+            tangents.vectors = mixed(&tangents.vectors, &growth.units, growth.sums.len());
         }
         let flattened = std::mem::take(&mut tangents.flattened);
         let left = orthonormal(&mut tangents.vectors, &growth.units);
