@@ -646,6 +646,20 @@ pub fn exponents(
     transient: f64,
     count: usize,
 ) -> Result<Exponents, HybridError> {
+    exponents_watched(model, options, transient, count, &|_| true)
+}
+
+/// [`exponents`], of a run that goes on as long as `reached` says so of the time.
+///
+/// # Errors
+/// As [`exponents`]; also where it was ended.
+pub fn exponents_watched(
+    model: &Model,
+    options: &Options,
+    transient: f64,
+    count: usize,
+    reached: &dyn Fn(f64) -> bool,
+) -> Result<Exponents, HybridError> {
     explicit(options)?;
     let begin = options.t_start + transient;
     if !(transient >= 0.0 && begin < options.t_end) {
@@ -656,6 +670,7 @@ pub fn exponents(
     let n = model.coordinates().len();
     let settings = Options { record: Record::Times { every: f64::INFINITY }, ..options.clone() };
     let mut follower = Follower::new(model, &settings)?;
+    follower.reached = Some(reached);
     let unit = |i: usize| {
         let mut v = vec![0.0; n];
         v[i] = 1.0;

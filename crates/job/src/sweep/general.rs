@@ -5,6 +5,8 @@ use std::cell::RefCell;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use twofold_analyse::attractor::{self, Evidence, SectionPoint, Thresholds, Verdict};
+use twofold_analyse::lyapunov::Exponent;
+use twofold_hybrid::motion::tangent::exponents_watched;
 use twofold_hybrid::motion::{Method, Record, follow_to_rest};
 use twofold_hybrid::{Ending, Options};
 use twofold_integrate::Monitor;
@@ -29,6 +31,11 @@ const LONGEST_PERIOD: usize = 64;
 /// within so many times the tolerance of the size of their states.
 const SAME_OF_SWING: f64 = 1e-5;
 const SAME_OF_TOLERANCE: f64 = 100.0;
+/// What shrinks from the third quarter of a run to the last shrinks to less than this share.
+const LESS: f64 = 0.7;
+/// A motion without a clock falls to a rest if neighbours have come closer by this power of e in
+/// the later half of the run, evenly: a factor of twenty.
+const FALLS: f64 = 3.0;
 
 /// Outcome of a run of a general system. Fact: `ending` ([`GeneralEnding`]).
 #[derive(Clone, Debug, PartialEq)]
@@ -152,10 +159,37 @@ impl GeneralOutcome {
                     shown_from,
                     ..attractor::Question::default()
                 };
-                let (evidence, middle) = judged(&section, &question, least);
-                place = place_of(&evidence);
-                place.iter_mut().flatten().enumerate().for_each(|(i, u)| *u += middle[i % 2]);
-                Outcome { crossings, ..Outcome::judged(&evidence, found.t, found.steps) }
+                let driven = model.is_driven();
+                let (mut evidence, mut middle) = judged(&section, &question, least);
+                let asks = match evidence.verdict {
+                    Verdict::Chaotic { .. }
+                    | Verdict::QuasiPeriodic(_)
+                    | Verdict::Undecided { .. } => true,
+                    Verdict::Periodic(_) | Verdict::Spiralling(_) => {
+                        !driven && narrows(&section, shown_from, least)
+                    }
+                    _ => false,
+                };
+                let growth = if asks { self.growth(monitor)? } else { Vec::new() };
+                let has_sign = |of: usize| growth.get(of).is_some_and(Growth::is_clear);
+                if !driven && has_sign(0) && growth[0].total() < -FALLS {
+                    // Along any other motion the field's own direction neither grows nor shrinks.
+                    place.push(found.x.clone());
+                    bare("rest")
+                } else {
+                    if asks {
+                        let lyapunov = growth.first().and_then(Growth::exponent);
+                        let question = attractor::Question { lyapunov, ..question };
+                        (evidence, middle) = judged(&section, &question, least);
+                        let regular = !has_sign(0) && (driven || !has_sign(1));
+                        if !is_borne_out(&evidence, regular) {
+                            evidence.verdict = Verdict::Undecided { lyapunov };
+                        }
+                    }
+                    place = place_of(&evidence);
+                    place.iter_mut().flatten().enumerate().for_each(|(i, u)| *u += middle[i % 2]);
+                    Outcome { crossings, ..Outcome::judged(&evidence, found.t, found.steps) }
+                }
             }
             Ending::Finished => bare("moving"),
         };
@@ -169,6 +203,91 @@ impl GeneralOutcome {
             switches: found.switches,
         })
     }
+}
+
+impl GeneralOutcome {
+    /// The two largest exponents of the later half of the run; none where tangent vectors end.
+    fn growth(&self, monitor: &dyn Monitor) -> Result<Vec<Growth>, JobError> {
+        let GeneralRun { model, options } = &self.0;
+        let half = 0.5 * (options.t_end - options.t_start);
+        let options = Options { method: Method::Dopri5, ..options.clone() };
+        let goes_on = |_| monitor.reached(options.t_end).is_continue();
+        let found = exponents_watched(model, &options, half, 2, &goes_on);
+        if !goes_on(options.t_end) {
+            return Err(JobError::Interrupted);
+        }
+        Ok(found.map_or_else(
+            |_| Vec::new(),
+            |found| {
+                let pairs = found.values.iter().zip(&found.errors);
+                pairs
+                    .map(|(value, error)| Growth { value: *value, error: *error, duration: half })
+                    .collect()
+            },
+        ))
+    }
+}
+
+/// An exponent of a row, with half of its 95 % interval.
+struct Growth {
+    value: f64,
+    error: f64,
+    duration: f64,
+}
+
+impl Growth {
+    /// Whether zero is twice as far away as an end of the interval: in one regular row of twenty
+    /// it is not in the interval.
+    fn is_clear(&self) -> bool {
+        self.value.abs() > 2.0 * self.error
+    }
+
+    /// The logarithm of the factor by which vectors grew.
+    fn total(&self) -> f64 {
+        self.value * self.duration
+    }
+
+    fn exponent(&self) -> Option<Exponent> {
+        let Self { value, error, duration } = *self;
+        value.is_finite().then_some(Exponent { value, standard_error: 0.5 * error, duration })
+    }
+}
+
+/// Whether the evidence is enough for its verdict: of chaos, that neighbours part and that the
+/// motion does not reach further and further out; of a torus, that the exponents are those of
+/// `regular` motion and that none of its fits shows an approach.
+fn is_borne_out(evidence: &Evidence, regular: bool) -> bool {
+    /// An approach of so many standard errors is one, though points of a torus are correlated.
+    const SURE: f64 = 10.0;
+    let th = &evidence.thresholds;
+    match &evidence.verdict {
+        Verdict::Chaotic { lyapunov, .. } => {
+            lyapunov.is_some_and(|l| l.value > th.exponent_significance * l.standard_error)
+        }
+        Verdict::QuasiPeriodic(cycle) => {
+            let approaches = cycle.approach.is_some_and(|r| {
+                r.per_time.abs() > SURE * r.standard_error
+                    && r.per_time.abs() * (r.to - r.from) > th.visible_change
+            });
+            regular && !approaches
+        }
+        Verdict::Periodic(_) | Verdict::Spiralling(_) => false,
+        _ => true,
+    }
+}
+
+/// Whether the two sides of the turns come together, as they do on the way to a rest: points at
+/// which the section is met upward, and the next ones downward. Widths below `least` of the states'
+/// size are rounding.
+fn narrows(section: &[SectionPoint], from: f64, least: f64) -> bool {
+    let widths: Vec<f64> = section
+        .windows(2)
+        .filter(|p| p[0].t >= from && p[0].upward && !p[1].upward)
+        .map(|p| sqrt([0, 1].map(|k| p[1].u[k] - p[0].u[k]).map(|d| d * d).iter().sum()))
+        .collect();
+    let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
+    let (earlier, last) = widths.split_at(widths.len() / 2);
+    mean(earlier) > least * Late::of(section, from).size && mean(last) < LESS * mean(earlier)
 }
 
 /// The points of the later half of a run.
@@ -241,8 +360,9 @@ fn judged(
     let nothing_turns = match &evidence.verdict {
         Verdict::QuasiPeriodic(cycle) => cycle.rotation.is_none(),
         Verdict::TooFew { points } => {
-            *points >= Thresholds::default().fewest_points && reaches_out(&seen)
+            *points >= Thresholds::default().fewest_points && reaches_out(&seen, 1.1)
         }
+        Verdict::Chaotic { .. } => reaches_out(&seen, 2.0),
         _ => false,
     };
     if nothing_turns {
@@ -251,19 +371,17 @@ fn judged(
     (evidence, middle)
 }
 
-/// Whether the points of the last quarter reach further out than all before.
-fn reaches_out(section: &[SectionPoint]) -> bool {
-    const FURTHER: f64 = 1.1;
+/// Whether the points of the last quarter reach further out than all before, by this factor.
+fn reaches_out(section: &[SectionPoint], factor: f64) -> bool {
     let far = |points: &[SectionPoint]| {
         points.iter().flat_map(|p| p.u).fold(0.0_f64, |most, u| most.max(u.abs()))
     };
     let (before, last) = section.split_at(section.len() / 4 * 3);
-    far(last) > FURTHER * far(before)
+    far(last) > factor * far(before)
 }
 
 /// Whether the points of one direction come closer to those a period before.
 fn shrinks(section: &[SectionPoint], period: usize) -> bool {
-    const LESS: f64 = 0.7;
     let up: Vec<[f64; 2]> = section.iter().filter(|p| p.upward).map(|p| p.u).collect();
     let moved: Vec<f64> = (period..up.len())
         .map(|i| {
@@ -389,4 +507,116 @@ fn plane(run: &GeneralRun) -> [Option<usize>; 2] {
     };
     let mut free = (0..names.len()).filter(|i| Some(*i) != fixed || names.len() == 1);
     [free.next(), free.next()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use twofold_hybrid::{Definition, Model};
+
+    /// The outcome of a run by a section `NAME = 0`, or every unit of time.
+    fn word(text: &str, section: Option<&str>, t_end: f64) -> String {
+        let model = Model::new(Definition::from_toml(text, "f").unwrap());
+        let record = match section {
+            Some(name) => {
+                Record::Section(Expression::parse_general(&format!("{name} - 0"), &[name]).unwrap())
+            }
+            None => Record::Times { every: 1.0 },
+        };
+        let options = Options { record, t_end, ..Options::default() };
+        GeneralOutcome(GeneralRun { model, options }).ending(&()).unwrap().outcome.word
+    }
+
+    fn map(states: &str, start: &str, sets: &[&str]) -> String {
+        let names: Vec<&str> = states.split_whitespace().collect();
+        let set = names.iter().zip(sets).map(|(name, set)| format!("{name} = '{set}'"));
+        format!(
+            "states = {names:?}\nstart = {start}\nf = {:?}\n[[event]]\nevery = 1\nset = {{ {} }}",
+            vec!["0"; names.len()],
+            set.collect::<Vec<_>>().join(", ")
+        )
+    }
+
+    /// Linear contractions, isometries and expansions, and maps of the circle, in runs so short
+    /// that the tests by points alone see chaos.
+    #[test]
+    fn regular_motion_is_not_irregular() {
+        let turn = |m: f64| {
+            let (c, s) = (1.1_f64.cos() * m, 1.1_f64.sin() * m);
+            map("x y", "[1, 0]", &[&format!("{c}*x - {s}*y"), &format!("{s}*x + {c}*y")])
+        };
+        for m in [0.95, 0.97, 0.99, 0.995, 0.999, 1.0, 1.001, 1.01, 1.05] {
+            for t_end in [100.0, 150.0, 200.0] {
+                let found = word(&turn(m), None, t_end);
+                let wrong = found == "irregular" || m != 1.0 && found == "quasi-periodic";
+                assert!(!wrong, "{m} {t_end}: {found}");
+            }
+        }
+        let rigid = map("th", "[0.3]", &["mod(th + 0.381966, 1)"]);
+        let delayed = |a: f64| map("x y", "[0.4, 0.41]", &[&format!("{a}*x*(1 - y)"), "x"]);
+        for t_end in [100.0, 150.0] {
+            assert_eq!(word(&rigid, None, t_end), "undecided");
+            for a in [1.9, 1.98, 2.02, 2.1] {
+                let found = word(&delayed(a), None, t_end);
+                assert_ne!(found, "irregular", "{a} {t_end}");
+                assert!(a > 2.0 || found != "quasi-periodic", "{a} {t_end}");
+            }
+        }
+        let relaxes = "states = ['x']\nstart = [0]\nf = ['-x + cos(1.0882796185405307*t)']";
+        let driven = "states = ['x', 'v']\nstart = [2, 0]\n\
+            f = ['4.83321946706122*v', '4.83321946706122*(-x - 0.02*v + cos(2*pi*t))']";
+        for t_end in [100.0, 124.0, 166.0, 250.0] {
+            for text in [relaxes, driven] {
+                let found = word(text, None, t_end);
+                assert!(["undecided", "period-1"].contains(&&*found), "{t_end}: {found}");
+            }
+        }
+    }
+
+    /// A focus is approached, and is no closed orbit on the way.
+    #[test]
+    fn a_focus_that_is_approached_is_a_rest() {
+        let focus = |m: f64| {
+            format!(
+                "states = ['x', 'y']\nstart = [1, 0]\n\
+                 f = ['-{m}*x - 2*y - x*(x^2 + y^2)', '2*x - {m}*y - y*(x^2 + y^2)']"
+            )
+        };
+        for (m, t_end) in [(0.02, 400.0), (0.02, 600.0), (0.03, 400.0), (0.05, 400.0)] {
+            assert_eq!(word(&focus(m), Some("y"), t_end), "rest", "{m} {t_end}");
+        }
+        let bistable = |x: f64| {
+            format!(
+                "states = ['x', 'y']\nstart = [{x}, 0]\nf = ['g*x - 2*y', '2*x + g*y']\n[let]\n\
+                 r2 = 'x^2 + y^2'\ng = '0.01*(r2 - 1)*(4 - r2)/(1 + r2)^2'"
+            )
+        };
+        for x in [0.95, 0.98] {
+            assert_eq!(word(&bistable(x), Some("y"), 500.0), "rest", "{x}");
+        }
+        assert_eq!(word(&bistable(1.3), Some("y"), 3000.0), "period-1");
+    }
+
+    #[test]
+    fn chaos_and_tori_keep_their_words() {
+        let henon = map("x y", "[0.1, 0.1]", &["1 - 1.4*x^2 + y", "0.3*x"]);
+        let logistic = map("x", "[0.3]", &["3.9*x*(1 - x)"]);
+        for text in [henon, logistic] {
+            for t_end in [300.0, 1000.0] {
+                assert_eq!(word(&text, None, t_end), "irregular", "{text} {t_end}");
+            }
+        }
+        let lorenz = "states = ['x', 'y', 'z']\nstart = [1, 1, -7]\n\
+            f = ['10*(y - x)', 'x*(1 - z) - y', 'x*y - 8/3*(z + 27)']";
+        assert_eq!(word(lorenz, Some("z"), 200.0), "irregular");
+        let torus = "states = ['x', 'y', 'u', 'v']\nstart = [1, 0, 1, 0]\n\
+            f = ['x*g - y + 0.2*u', 'y*g + x', 'u*k - 1.618*v', 'v*k + 1.618*u']\n[let]\n\
+            g = '1 - x^2 - y^2'\nk = '1 - u^2 - v^2'";
+        let standard = map("p q", "[0, 2]", &["p + 0.1*sin(q)", "q + p + 0.1*sin(q)"]);
+        let delayed = map("x y", "[0.4, 0.41]", &["2.1*x*(1 - y)", "x"]);
+        for text in [standard, delayed] {
+            assert_eq!(word(&text, None, 2000.0), "quasi-periodic", "{text}");
+        }
+        assert_eq!(word(torus, Some("y"), 2000.0), "quasi-periodic");
+    }
 }
