@@ -179,7 +179,7 @@ impl Classification {
             question.reference = reference.as_deref();
             return Ok(SoFar::Judged(classify(&section, &question, &self.thresholds)));
         }
-        let evidence = classify(&section, &question, &self.thresholds);
+        let evidence = self.judged(&section, &question);
         Ok(match evidence.verdict {
             Verdict::Chaotic { .. } | Verdict::Undecided { .. } => {
                 SoFar::Awaits(Box::new(self.exponent(end, &evidence)))
@@ -195,11 +195,19 @@ impl Classification {
         exponent: Option<Exponent>,
     ) -> Result<Evidence, JobError> {
         let (_, section) = section(&self.run, answer)?;
-        Ok(classify(
-            &section,
-            &attractor::Question { lyapunov: exponent, ..self.asked() },
-            &self.thresholds,
-        ))
+        Ok(self.judged(&section, &attractor::Question { lyapunov: exponent, ..self.asked() }))
+    }
+
+    /// The verdict without noise. Points of two states lie on a line and are no torus.
+    fn judged(&self, section: &[SectionPoint], question: &attractor::Question<'_>) -> Evidence {
+        let mut evidence = classify(section, question, &self.thresholds);
+        let on_a_line = matches!(plane(&self.run), Ok((_, None)));
+        if on_a_line && matches!(evidence.verdict, Verdict::QuasiPeriodic(_)) {
+            evidence.verdict = Verdict::Undecided { lyapunov: question.lyapunov };
+            evidence.name = evidence.verdict.name().to_owned();
+            evidence.summary = evidence.verdict.to_string();
+        }
+        evidence
     }
 
     /// The question about the section's points.
@@ -409,6 +417,11 @@ mod tests {
         let spiral = "['-5e-5*x - y', 'x - 5e-5*y']";
         let found = evidence("['x', 'y']", spiral, vec![1.0, 0.0]).unwrap();
         assert_eq!(found.name, "undecided", "{}", found.summary);
+        for growth in [0.01, 0.02] {
+            let focus = format!("['{growth}*x - 2*y', '2*x + {growth}*y']");
+            let found = evidence("['x', 'y']", &focus, vec![1e-9, 0.0]).unwrap();
+            assert_eq!(found.name, "undecided", "{growth}: {}", found.summary);
+        }
         let drift = "['x*(1 - x*x - y*y) - y', 'y*(1 - x*x - y*y) + x', '1e-3']";
         let found = evidence("['x', 'y', 'z']", drift, vec![1.0, 0.0, 0.0]).unwrap();
         assert_eq!(found.name, "undecided", "{}", found.summary);
