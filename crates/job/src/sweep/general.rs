@@ -96,12 +96,14 @@ impl GeneralOutcome {
     pub fn ending(&self, monitor: &dyn Monitor) -> Result<GeneralEnding, JobError> {
         let GeneralRun { model, options } = &self.0;
         let strobed = matches!(options.record, Record::Times { .. });
-        let plane = plane(&self.0);
+        let free = free(&self.0);
         let looks = is_looked_at(options);
         let section = RefCell::new(Vec::<SectionPoint>::new());
+        let states = RefCell::new(Vec::<Vec<f64>>::new());
         let mut observe = |point: &twofold_hybrid::Point<'_>| {
-            let u = plane.map(|i| i.map_or(0.0, |i| point.x[i]));
-            let mut section = section.borrow_mut();
+            let x: Vec<f64> = free.iter().map(|i| point.x[*i]).collect();
+            let u = [0, 1].map(|k| x.get(k).copied().unwrap_or(0.0));
+            let (mut section, mut states) = (section.borrow_mut(), states.borrow_mut());
             // Seen every period is the state after the events of that moment.
             if strobed
                 && point.event.is_some()
@@ -109,6 +111,8 @@ impl GeneralOutcome {
                 && last.t == point.t
             {
                 last.u = u;
+                states.pop();
+                states.push(x.clone());
             }
             if point.event.is_none() && (strobed || point.direction.is_some()) {
                 section.push(SectionPoint {
@@ -116,6 +120,7 @@ impl GeneralOutcome {
                     u,
                     upward: strobed || point.direction > Some(0.0),
                 });
+                states.push(x);
             }
             true
         };
@@ -135,7 +140,7 @@ impl GeneralOutcome {
             longer,
             &within,
         )?;
-        let section = section.into_inner();
+        let mut section = section.into_inner();
         let crossings = if looks { section.len() as u64 } else { 0 };
         let bare = |word: &str| Outcome::bare(word, crossings, found.t, found.steps);
         let (mut place, mut event) = (Vec::new(), String::new());
@@ -161,6 +166,12 @@ impl GeneralOutcome {
                 };
                 let driven = model.is_driven();
                 let (mut evidence, mut middle) = judged(&section, &question, least);
+                if !matches!(evidence.verdict, Verdict::Periodic(_))
+                    && let Some(other) =
+                        told_apart(&section, &states.into_inner(), &question, least)
+                {
+                    (section, (evidence, middle)) = other;
+                }
                 let asks = match evidence.verdict {
                     Verdict::Chaotic { .. }
                     | Verdict::QuasiPeriodic(_)
@@ -371,6 +382,49 @@ fn judged(
     (evidence, middle)
 }
 
+/// A section as seen in two of its states, and the verdict.
+type Seen = (Vec<SectionPoint>, (Evidence, [f64; 2]));
+
+/// The section in the first two states in which an orbit's points lie apart, if they return in all
+/// states: in the first two of all they may fall together.
+fn told_apart(
+    section: &[SectionPoint],
+    states: &[Vec<f64>],
+    question: &attractor::Question<'_>,
+    least: f64,
+) -> Option<Seen> {
+    let up: Vec<&Vec<f64>> =
+        section.iter().zip(states).filter(|(p, _)| p.upward).map(|(_, x)| x).collect();
+    let late = up.get(up.len() / 2..)?;
+    let count = late.first()?.len();
+    let near: Vec<f64> = (0..count)
+        .map(|i| {
+            let all = || late.iter().map(|x| x[i]);
+            let (low, high) =
+                (all().fold(f64::INFINITY, f64::min), all().fold(-f64::INFINITY, f64::max));
+            (SAME_OF_SWING * (high - low)).max(least * low.abs().max(high.abs()))
+        })
+        .collect();
+    let returns = |period: usize| {
+        late.iter()
+            .zip(&late[period..])
+            .all(|(a, b)| (0..count).all(|i| (a[i] - b[i]).abs() <= near[i]))
+    };
+    let period = (1..=LONGEST_PERIOD.min(late.len() / 5)).find(|period| returns(*period))?;
+    let pairs = (1..count).flat_map(|b| (0..b).map(move |a| [a, b])).skip(1);
+    pairs
+        .map(|pair| {
+            let points = section.iter().zip(states);
+            let seen: Vec<SectionPoint> =
+                points.map(|(p, x)| SectionPoint { u: pair.map(|i| x[i]), ..*p }).collect();
+            let found = judged(&seen, question, least);
+            (seen, found)
+        })
+        .find(|(_, (evidence, _))| {
+            matches!(&evidence.verdict, Verdict::Periodic(cycle) if cycle.period == period)
+        })
+}
+
 /// Whether the points of the last quarter reach further out than all before, by this factor.
 fn reaches_out(section: &[SectionPoint], factor: f64) -> bool {
     let far = |points: &[SectionPoint]| {
@@ -493,9 +547,9 @@ impl Coordinate {
     }
 }
 
-/// The two states in which crossings are compared: the first that the section does not fix, or the
-/// only one.
-fn plane(run: &GeneralRun) -> [Option<usize>; 2] {
+/// The states in which crossings are compared, the first two before others: those that the section
+/// does not fix, or the only one.
+fn free(run: &GeneralRun) -> Vec<usize> {
     let names = run.model.coordinates();
     let fixed = match &run.options.record {
         Record::Section(Expression::Sub(a, b)) => names.iter().position(|n| {
@@ -505,8 +559,7 @@ fn plane(run: &GeneralRun) -> [Option<usize>; 2] {
         }),
         _ => None,
     };
-    let mut free = (0..names.len()).filter(|i| Some(*i) != fixed || names.len() == 1);
-    [free.next(), free.next()]
+    (0..names.len()).filter(|i| Some(*i) != fixed || names.len() == 1).collect()
 }
 
 #[cfg(test)]
@@ -571,6 +624,16 @@ mod tests {
                 assert!(["undecided", "period-1"].contains(&&*found), "{t_end}: {found}");
             }
         }
+    }
+
+    /// Two oscillators of frequencies 2 and 1/2, from a start on the section: two of the four points
+    /// of their orbit have one x and one u.
+    #[test]
+    fn points_that_fall_together_in_two_states_are_told_apart_in_others() {
+        let text = "states = ['x', 'y', 'u', 'v']\nstart = [1, 0, 1, 0]\n\
+            f = ['x*g - 2*y', 'y*g + 2*x', 'u*k - v/2', 'v*k + u/2']\n[let]\n\
+            g = '1 - x^2 - y^2'\nk = '1 - u^2 - v^2'";
+        assert_eq!(word(text, Some("y"), 1000.0), "period-4");
     }
 
     /// A focus is approached, and is no closed orbit on the way.
