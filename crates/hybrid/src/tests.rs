@@ -4539,3 +4539,16 @@ fn friction_may_hold_what_a_table_leaves() {
         assert_eq!(found[1], 0.0, "{method:?}");
     }
 }
+
+/// Two surfaces met at one moment, of which one is asked only beyond the other.
+#[test]
+fn surfaces_asked_beyond_one_another_have_no_derivative() {
+    let text = "states = ['x', 'y', 'z']\nstart = [-1, -1, 0]\n\
+        f = ['1', '1', 'if(x > 0 and y < 0, 10, 0)']";
+    let options = Options { t_end: 2.0, ..Options::default() };
+    let error = sensitivity::sensitivities(&model(text), &options, &[]).unwrap_err().to_string();
+    assert!(error.contains("two surfaces are met at one moment"), "{error}");
+    let apart = Options { start: Some(vec![-1.0, -1.25, 0.0]), ..options };
+    let found = sensitivity::sensitivities(&model(text), &apart, &[]).unwrap().by_start;
+    assert_eq!(found[2], [10.0, -10.0, 1.0]);
+}

@@ -301,7 +301,7 @@ impl Follower<'_> {
 
     /// Adds to the functions that are met at zero those that rest there, and those that the
     /// equations ask only beyond one of them and that are zero, too.
-    fn add_what_is_zero(&mut self, zero: &mut Vec<usize>) {
+    pub(super) fn add_what_is_zero(&mut self, zero: &mut Vec<usize>) {
         if zero.is_empty() {
             return;
         }

@@ -404,12 +404,69 @@ impl Follower<'_> {
             }
             found = Some((gradient, speed));
         }
+        if let Some((gradient, speed)) = &found
+            && self.meets_another(met, &field, gradient, *speed)
+        {
+            return Err(self.no_tangents(
+                "two surfaces are met at one moment, where neighbours have no common linear motion",
+            ));
+        }
         Ok(Some(match found {
             Some((gradient, speed)) => Before { field, gradient, speed },
             // The field is continuous, or the time is fixed: nothing is met earlier or later by a
             // neighbour.
             None => Before { field, gradient: vec![0.0; n], speed: 1.0 },
         }))
+    }
+
+    /// Whether a function that the equations ask only beyond a surface that is met is zero there,
+    /// too, and neighbours may meet it first.
+    fn meets_another(
+        &mut self,
+        met: &[Sought],
+        field: &[f64],
+        gradient: &[f64],
+        speed: f64,
+    ) -> bool {
+        let guard = |sought: &Sought| match *sought {
+            Sought::Guard { guard, .. } => Some(guard),
+            _ => None,
+        };
+        let mut zero: Vec<usize> = met.iter().filter_map(guard).collect();
+        let known = zero.len();
+        self.add_what_is_zero(&mut zero);
+        let (t, x) = (self.t, self.x.clone());
+        let differs = |other: usize| {
+            let e = &self.equation.guards[other].expression;
+            let slope = |j: usize| {
+                let mut at: Vec<D> = x.iter().chain([&t]).map(|v| D::constant(*v)).collect();
+                at[j].partials = [1.0];
+                self.equation.value(e, at[self.n], &at[..self.n]).partials[0]
+            };
+            let slopes: Vec<f64> = (0..=self.n).map(slope).collect();
+            let own: f64 =
+                slopes.iter().zip(field).map(|(g, f)| g * f).sum::<f64>() + slopes[self.n];
+            let apart = |(a, b): (&f64, &f64)| {
+                (a / own - b / speed).abs() > 1e-6 * ((a / own).abs() + (b / speed).abs())
+            };
+            slopes.iter().zip(gradient).any(apart)
+        };
+        let new: Vec<usize> = zero[known..].iter().copied().filter(|g| differs(*g)).collect();
+        new.into_iter().any(|other| {
+            let field = |follower: &mut Self, side: f64, own: f64| {
+                let mut config = follower.config.clone();
+                zero[..known].iter().for_each(|guard| config.sides[*guard] *= side);
+                config.sides[other] = own;
+                let mut out = vec![0.0; follower.n];
+                let variables = follower.load(&config);
+                follower.equation.compiled(&config).field.evaluate(&variables, &mut out);
+                out
+            };
+            let (low, high) = (self.low(other), self.high(other));
+            [1.0, -1.0]
+                .iter()
+                .any(|side| !super::same(&field(self, *side, low), &field(self, *side, high)))
+        })
     }
 
     /// Whether motion that meets a surface at this speed turns back behind it by no more than
