@@ -466,7 +466,7 @@ mod tests {
         struct Block;
         impl Block {
             fn side<S: Elementary>(x: &SVector<S, 2>, friction: f64) -> SVector<S, 2> {
-                SVector::from([x[1], x[1].scale(0.17) - x[0] + S::from_f64(friction)])
+                SVector::from([x[1], x[1].scale(0.1724) - x[0] + S::from_f64(friction)])
             }
         }
         impl PiecewiseSmooth<2> for Block {

@@ -186,7 +186,7 @@ impl Question for ClosedOrbit {
             }
         };
         // A motion that alternates as it settles shows multiples of the returns.
-        let fewer = || (1..map.returns).filter(|fewer| map.returns % fewer == 0);
+        let fewer = || (1..map.returns).filter(|fewer| map.returns.is_multiple_of(*fewer));
         let least = self.returns.is_none().then(fewer).into_iter().flatten().find_map(|fewer| {
             let map = Map { returns: fewer, failure: RefCell::new(None), ..map };
             let orbit = branch::closed_orbit(&map, &first.point, value, newton).ok()?;
