@@ -145,8 +145,8 @@ impl Orbit {
         (largest > self.largest_error()).then(|| -ln(largest) / self.period)
     }
 
-    /// How far its point may be off, as a share of its extent: what counts as closed where Newton's
-    /// method gets no further, over the distance of the nearest multiplier from 1.
+    /// The distance by which its point may be off, as a share of its extent: what counts as closed
+    /// where Newton's method gets no further, over the distance of the nearest multiplier from 1.
     pub fn off(&self, newton: Newton) -> f64 {
         STALLED * newton.closed / from_one(&self.multipliers)
     }

@@ -353,6 +353,9 @@ struct Train {
 
 /// Times in which sixty of them are as good as none, relative to the time.
 const SO_SHORT: f64 = 1e-11;
+/// A weight of sliding that is zero because a field runs along the surface is so up to this
+/// rounding; one that grows beyond its root is none.
+const ALONG: f64 = 1e-10;
 
 impl Train {
     /// Whether what happened before, and at `t` again, comes in ever shorter times.

@@ -996,8 +996,8 @@ mod tests {
         assert_eq!(long.compute(&Executor::new(None, &Never), &()), Err(JobError::Interrupted));
     }
 
-    /// Roessler's (1976) equations with a = b = 0.1, c = 5.2, whose orbit has the multiplier -0.952:
-    /// the settled motion alternates. SciPy's DOP853 at 1e-13.
+    /// Roessler's (1976) equations with a = b = 0.1, c = 5.2, whose orbit has the multiplier
+    /// -0.952: the settled motion alternates. SciPy's DOP853 at 1e-13.
     #[test]
     fn an_orbit_approached_in_turns_is_closed_after_one_return() {
         let field = ["-y - z", "x + 0.1*y", "0.1 + z*(x - 5.2)"];

@@ -338,8 +338,8 @@ fn moves_on(executor: &dyn Ask, run: &RunSpec, end: &[f64]) -> Result<bool, JobE
     }))
 }
 
-/// How far the fields of a relay take a state from each other in the time in which it is looked
-/// which of them holds, as a share of the state's size.
+/// Distance to which the fields of a relay take a state from each other in the time in which it is
+/// looked which of them holds, as a share of the state's size.
 const APART: f64 = 1e-6;
 
 /// The field that the relay of `run` holds at its `end`: the one that its last stretch follows.

@@ -17,9 +17,6 @@ const DEEPEST: usize = 16;
 /// By so much of what its error is measured by the derivative of the continuous extension, which is
 /// of lower order than the step, may miss the field.
 const LARGEST_DEFECT: f64 = 1e3;
-/// A weight of sliding that is zero because a field runs along the surface is so up to this
-/// rounding; one that grows beyond its root is none.
-pub(super) const ALONG: f64 = 1e-10;
 
 impl Follower<'_> {
     /// Collects the conditions that may be met in a step, each with the side that it is on.

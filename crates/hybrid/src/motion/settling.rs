@@ -8,7 +8,6 @@ use twofold_num::random::RandomStream;
 use twofold_system::expression::{Function, General};
 
 use super::locate::TANGENT;
-use super::search::ALONG;
 use super::*;
 use crate::cells;
 use crate::equation::same_sign;

@@ -31,7 +31,7 @@ const LONGEST_PERIOD: usize = 64;
 /// within so many times the tolerance of the size of their states.
 const SAME_OF_SWING: f64 = 1e-5;
 const SAME_OF_TOLERANCE: f64 = 100.0;
-/// What shrinks from the third quarter of a run to the last shrinks to less than this share.
+/// Share below which a width shrinks from the third quarter of a run to the last, if it does.
 const LESS: f64 = 0.7;
 /// A motion without a clock falls to a rest if neighbours have come closer by this power of e in
 /// the later half of the run, evenly: a factor of twenty.
@@ -626,8 +626,8 @@ mod tests {
         }
     }
 
-    /// Two oscillators of frequencies 2 and 1/2, from a start on the section: two of the four points
-    /// of their orbit have one x and one u.
+    /// Two oscillators of frequencies 2 and 1/2, from a start on the section: two of the four
+    /// points of their orbit have one x and one u.
     #[test]
     fn points_that_fall_together_in_two_states_are_told_apart_in_others() {
         let text = "states = ['x', 'y', 'u', 'v']\nstart = [1, 0, 1, 0]\n\
