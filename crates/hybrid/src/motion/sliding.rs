@@ -831,8 +831,9 @@ impl Follower<'_> {
         config
     }
 
-    /// The push of a contact to the side to which it lets go most easily, and that side: the greater
-    /// one of its pushes with the functions that it holds, and with these as they are when it opens.
+    /// The push of a contact to the side to which it lets go most easily, and that side: the
+    /// greater one of its pushes with the functions that it holds, and with these as they are when
+    /// it opens.
     pub(super) fn push(&mut self, place: usize, t: f64, x: &[f64]) -> (f64, f64) {
         let of = |follower: &mut Self| {
             let mut field = vec![0.0; follower.n];
