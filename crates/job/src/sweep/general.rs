@@ -36,6 +36,8 @@ const LESS: f64 = 0.7;
 /// A motion without a clock falls to a rest if neighbours have come closer by this power of e in
 /// the later half of the run, evenly: a factor of twenty.
 const FALLS: f64 = 3.0;
+/// Standard errors of an exponent in half of its 95 % interval.
+const SIGNIFICANCE: f64 = 2.0;
 
 /// Outcome of a run of a general system. Fact: `ending` ([`GeneralEnding`]).
 #[derive(Clone, Debug, PartialEq)]
@@ -260,7 +262,8 @@ impl Growth {
 
     fn exponent(&self) -> Option<Exponent> {
         let Self { value, error, duration } = *self;
-        value.is_finite().then_some(Exponent { value, standard_error: 0.5 * error, duration })
+        let standard_error = error / SIGNIFICANCE;
+        value.is_finite().then_some(Exponent { value, standard_error, duration })
     }
 }
 
@@ -354,8 +357,12 @@ fn judged(
     }
     let by = |same: f64| {
         let dot = same / extent;
-        let thresholds =
-            Thresholds { dot, longest_period: LONGEST_PERIOD, ..Thresholds::default() };
+        let thresholds = Thresholds {
+            dot,
+            longest_period: LONGEST_PERIOD,
+            exponent_significance: SIGNIFICANCE,
+            ..Thresholds::default()
+        };
         attractor::classify(&seen, question, &thresholds)
     };
     let mut evidence = by(same);
