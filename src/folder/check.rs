@@ -745,44 +745,91 @@ impl Read {
     }
 }
 
+/// A number with half of its 95 % interval, if it has one.
+struct Measured {
+    value: f64,
+    half: f64,
+}
+
+impl std::fmt::Display for Measured {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&short(self.value))?;
+        if self.half > 0.0 { write!(f, " ± {}", short(self.half)) } else { Ok(()) }
+    }
+}
+
+impl Read {
+    /// The number with the interval that stands beside it.
+    fn measured(&self, answer: &Answer) -> Result<Measured, String> {
+        let beside = match self {
+            Read::Fact { path, modulus: false } => match path.strip_suffix("/value") {
+                Some("exponent") => Some("half_width".to_owned()),
+                Some(of) => Some(format!("{of}/half_width")),
+                None => None,
+            },
+            _ => None,
+        };
+        let half = beside.map(|path| Read::Fact { path, modulus: false }.of(answer));
+        Ok(Measured { value: self.of(answer)?, half: half.and_then(Result::ok).unwrap_or(0.0) })
+    }
+}
+
+/// Whether a number is off by at most `within`, if its interval does not leave that open.
+fn is_within(off: f64, half: f64, within: f64, said: &str) -> Result<bool, String> {
+    if off <= within && off + half > within || off > within && off - half <= within {
+        return Err(undecided(said));
+    }
+    Ok(off <= within)
+}
+
+fn undecided(said: &str) -> String {
+    format!("{said}: the interval does not decide it; compute it more exactly")
+}
+
 impl Check {
     /// Whether it holds of these answers, and what was found.
     fn of(&self, answers: &[Arc<Answer>]) -> Result<(bool, String), String> {
         let first = &answers[0];
         match self {
             Check::Value { read, equals, within } => {
-                let found = read.of(first)?;
-                let off = (found - equals).abs();
-                Ok((
-                    off <= *within,
-                    format!("{} ({equals} in the paper, {} off)", short(found), short(off)),
-                ))
+                let found = read.measured(first)?;
+                let off = (found.value - equals).abs();
+                let said = format!("{found} ({equals} in the paper, {} off)", short(off));
+                Ok((is_within(off, found.half, *within, &said)?, said))
             }
             Check::Ratio { read, other, equals, within } => {
-                let (over, under) = (read.of(first)?, other.of(answers.last().unwrap_or(first))?);
-                let off = (over / under - equals).abs();
+                let over = read.measured(first)?;
+                let under = other.measured(answers.last().unwrap_or(first))?;
+                let ratio = over.value / under.value;
+                let off = (ratio - equals).abs();
                 let said = format!(
-                    "{} / {} = {} ({equals} in the paper, {} off)",
-                    short(over),
-                    short(under),
-                    short(over / under),
+                    "{over} / {under} = {} ({equals} in the paper, {} off)",
+                    short(ratio),
                     short(off)
                 );
-                Ok((off <= *within, said))
+                let both = over.half + ratio.abs() * under.half;
+                // Without end if 0 may divide.
+                let least = (under.value.abs() - under.half).max(0.0);
+                let half = if both > 0.0 { both / least } else { 0.0 };
+                Ok((is_within(off, half, *within, &said)?, said))
             }
             Check::Order { read, less, than, other } => {
-                let value = read.of(first)?;
+                let value = read.measured(first)?;
                 let than = match (than, other) {
-                    (Some(than), _) => *than,
-                    (None, Some(other)) => other.of(answers.last().unwrap_or(first))?,
+                    (Some(than), _) => Measured { value: *than, half: 0.0 },
+                    (None, Some(other)) => other.measured(answers.last().unwrap_or(first))?,
                     (None, None) => return Err("nothing to compare with".into()),
                 };
-                let (holds, word) = match value {
-                    v if v < than => (*less, "less than"),
-                    v if v > than => (!*less, "greater than"),
+                let more = value.value - than.value;
+                let (holds, word) = match more {
+                    _ if value.half + than.half > 0.0 && more.abs() <= value.half + than.half => {
+                        return Err(undecided(&format!("{value} beside {than}")));
+                    }
+                    m if m < 0.0 => (*less, "less than"),
+                    m if m > 0.0 => (!*less, "greater than"),
                     _ => (false, "not different from"),
                 };
-                Ok((holds, format!("{}, {word} {}", short(value), short(than))))
+                Ok((holds, format!("{value}, {word} {than}")))
             }
             Check::Period { is, within } => {
                 let points = section(first, None)?.0;
@@ -822,22 +869,24 @@ impl Check {
                     .ok_or("the measure follows no branch; give along")?;
                 let parameter = &table.columns[1].name;
                 let values = table.numbers(parameter);
-                let mut near: Option<f64> = None;
-                for (word, value) in table.words("change").zip(values) {
-                    if word == kind && near.is_none_or(|old| (value - at).abs() < (old - at).abs())
-                    {
-                        near = Some(*value);
+                let mut near: Option<(f64, f64)> = None;
+                let rows = table.words("change").zip(values).zip(table.numbers("uncertainty"));
+                for ((word, value), half) in rows {
+                    let off = (value - at).abs();
+                    if word == kind && near.is_none_or(|(old, _)| off < (old - at).abs()) {
+                        near = Some((*value, half.max(0.0)));
                     }
                 }
                 Ok(match near {
-                    Some(value) => {
+                    Some((value, half)) => {
                         let off = (value - at).abs();
                         let said = format!(
                             "{kind} at {parameter} = {} ({at} in the paper, {} off)",
                             short(value),
                             short(off)
                         );
-                        (off <= *within, said)
+                        let open = format!("{said}, ± {}", short(half));
+                        (is_within(off, half, *within, &open)?, said)
                     }
                     None => (false, format!("no {kind} on the branch")),
                 })
@@ -1108,6 +1157,34 @@ mod tests {
         assert_eq!(period(&points(&|i| 1e-16 * (i % 2.0)), 1e-3), Some(1));
         assert_eq!(period(&points(&|i| 1e-7 * (i % 2.0)), 1e-3), Some(2));
         assert_eq!(period(&points(&|i| 1e-5 * (i * i).sin()), 1e-3), None);
+    }
+
+    /// 0.902 beside 0.909, each +- 0.05, and an exponent that is 0 within its interval.
+    #[test]
+    fn intervals_that_overlap_decide_nothing() {
+        let of = |value: f64| {
+            let rate = |value, half_width| MeanRate { value: Some(value), half_width };
+            let rates = [rate(value, 0.052), rate(5e-6, 0.01)];
+            Arc::new(Answer::of_tables(Vec::new()).with_fact("exponents", &rates))
+        };
+        let read = |i: usize| Read::Fact { path: format!("exponents/{i}/value"), modulus: false };
+        let judged = |check: Check, other: f64| check.of(&[of(0.902), of(other)]);
+        let order = |i, less, than, other| Check::Order { read: read(i), less, than, other };
+        for less in [true, false] {
+            let found = judged(order(0, less, None, Some(read(0))), 0.909).unwrap_err();
+            assert!(found.starts_with("0.902 ± 0.052 beside 0.909 ± 0.052: the int"), "{found}");
+            assert!(judged(order(1, less, Some(0.0), None), 0.909).is_err());
+            let found = judged(order(0, less, Some(0.5), None), 0.909);
+            assert_eq!(found, Ok((!less, "0.902 ± 0.052, greater than 0.5".into())));
+            assert_eq!(judged(order(0, less, None, Some(read(0))), 1.1).unwrap().0, less);
+        }
+        let value = |equals, within| Check::Value { read: read(0), equals, within };
+        assert!(judged(value(0.9056, 0.001), 0.9).is_err());
+        assert!(judged(value(0.9056, 0.1), 0.9).unwrap().0);
+        assert!(!judged(value(0.7, 0.1), 0.9).unwrap().0);
+        let ratio = |i, equals| Check::Ratio { read: read(0), other: read(i), equals, within: 0.2 };
+        assert!(judged(ratio(1, 1.0), 0.9).is_err() && judged(ratio(0, 1.2), 0.9).is_err());
+        assert!(judged(ratio(0, 1.0), 0.9).unwrap().0 && !judged(ratio(0, 2.0), 0.9).unwrap().0);
     }
 
     #[test]
