@@ -4424,6 +4424,15 @@ fn what_lies_on_a_vibrating_table_stays_above_it() {
             near(found[0], 0.15 * (1.5 * t_end).sin(), 1e-9);
             near(found[1], 0.225 * (1.5 * t_end).cos(), 1e-9);
         }
+        // Friction against the table itself; the values are those of an event-driven integration
+        // by DOP853 in SciPy.
+        let rubbed = body("-1 + 0.3*sin(3*t) - 0.2*sign(v - q)", "")
+            .replace("0.15*sin(1.5*t)", "0.9*sin(1.3*t)")
+            .replace("0.225*cos(1.5*t)", "1.17*cos(1.3*t)")
+            .replace("[0.3, 0]", "[0.5, 0]");
+        let found = end_of(&rubbed, 11.0, method).unwrap();
+        near(found[0], 0.9424543, 1e-6);
+        near(found[1], 0.0562574, 1e-6);
     }
 }
 

@@ -1643,13 +1643,14 @@ impl Follower<'_> {
                 scaled(row)
             };
             let active = self.compiled.active.len();
-            let by: Vec<Vec<f64>> = (0..n).map(|i| self.second_along(&field, Some(i))).collect();
+            // By the states and by the time.
+            let by: Vec<Vec<f64>> = (0..=n).map(|i| self.second_along(&field, Some(i))).collect();
             let surfaces: Vec<Vec<f64>> = self
                 .contacts
                 .iter()
                 .map(|contact| active + contact.watched)
                 .flat_map(|place| {
-                    let speed = by.iter().map(|by| by[place]).chain([0.0]).collect();
+                    let speed = by.iter().map(|by| by[place]).collect();
                     [gradient(place), scaled(speed)]
                 })
                 .collect();
