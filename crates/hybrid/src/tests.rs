@@ -4561,3 +4561,24 @@ fn surfaces_asked_beyond_one_another_have_no_derivative() {
     let found = sensitivity::sensitivities(&model(text), &apart, &[]).unwrap().by_start;
     assert_eq!(found[2], [10.0, -10.0, 1.0]);
 }
+
+/// A plate that passes a body on its stop, ever faster, takes it along by friction: the stop holds
+/// the body only on the side on which it pushes.
+#[test]
+fn friction_lifts_a_body_off_its_stop() {
+    let text = |rate: f64, start: f64| {
+        format!(
+            "states = ['x', 'v', 'w']\nstart = [0, 0, {start}]\n\
+             f = ['v', '-0.1 - 0.4*sign(v - w)', '{rate}']\n[[event]]\nwhen = 'x'\n\
+             direction = 'down'\nafter_zeno = 'stick'\nset = {{ v = '-0.5*v' }}"
+        )
+    };
+    for method in Method::ALL {
+        // Slower than friction makes it the body sticks to the plate, else it follows it.
+        for (rate, start, speed) in [(0.2, -0.4, 0.2), (0.5, -1.0, 0.3)] {
+            let found = end_of(&text(rate, start), 4.0, method).unwrap();
+            near(found[0], 2.0 * speed, 1e-8);
+            near(found[1], 2.0 * speed, 1e-8);
+        }
+    }
+}

@@ -206,6 +206,8 @@ impl Follower<'_> {
         if contacts.is_empty() {
             return Ok(());
         }
+        /// Speeds that are rounding, relative to those that the motion gets in the run.
+        const SPEED: f64 = 1e-13;
         let mut freed = Vec::new();
         for contact in contacts {
             let place = self.contacts.iter().position(|c| *c == contact);
@@ -218,8 +220,18 @@ impl Follower<'_> {
             self.watch_side[contact.watched] = contact.above;
             self.fresh_watch[contact.watched] = true;
             self.tangent[contact.watched] = false;
-            let (compiled, rates) = self.rates(&self.config.clone());
-            let speeds = rates.terms[compiled.active.len() + contact.watched];
+            let (compiled, rates) = self.rates_of_second_order(&self.config.clone());
+            let i = compiled.active.len() + contact.watched;
+            let (speed, speeds) = (rates.first[i], rates.terms[i]);
+            // Rounding of a speed leads into no surface.
+            let span = self.options.t_end - self.options.t_start;
+            if speed * contact.above < 0.0 && speed.abs() <= SPEED * rates.second[i].abs() * span {
+                let place = self.compiled.active.len() + contact.watched;
+                let by = self.second_along(&rates.field, Some(contact.state))[place];
+                if by != 0.0 {
+                    self.x[contact.state] -= speed / by;
+                }
+            }
             let e = &self.equation.watched[contact.watched];
             let beyond = -self.equation.value(e, self.t, &self.x) * contact.above;
             self.released[contact.watched] = beyond.max(0.0)
@@ -288,11 +300,23 @@ impl Follower<'_> {
         let (t, x, mut pushes, mut field) = (self.t, self.x.clone(), Vec::new(), vec![0.0; self.n]);
         self.measure(&list, t, &x, &mut pushes);
         self.compiled.field.evaluate(&self.variables, &mut field);
+        let alone = self.contacts.len() == 1 && self.contacts_act_on_sliding(&field);
+        if alone || !pushes.iter().all(|push| push.is_finite()) {
+            pushes = self.pushes_on_free_sliding(t, &x);
+        }
         let largest = field.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
         let pulled =
             self.contacts.iter().zip(&pushes).filter(|(_, push)| **push < -PULLS * largest);
         let pulled: Vec<Contact> = pulled.map(|(contact, _)| *contact).collect();
-        self.open(pulled)
+        self.open(pulled.clone())?;
+        // A force that jumps leads away to second order.
+        for Contact { watched, above, .. } in pulled {
+            let e = &self.equation.watched[watched];
+            if self.equation.value(e, self.t, &self.x) * above >= 0.0 {
+                (self.released[watched], self.tangent[watched]) = (0.0, true);
+            }
+        }
+        Ok(())
     }
 
     /// Whether a mixture by order ends although no surface is left: a fast surface ceases to

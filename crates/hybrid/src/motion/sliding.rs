@@ -862,6 +862,19 @@ impl Follower<'_> {
         least.unwrap_or((above * held, above))
     }
 
+    /// What contacts would push with against sliding without them: where all fields that they hold
+    /// have one speed on a surface slid upon, at least one of them lets go.
+    pub(super) fn pushes_on_free_sliding(&mut self, t: f64, x: &[f64]) -> Vec<f64> {
+        let contacts = std::mem::take(&mut self.contacts);
+        let mut free = vec![0.0; self.n];
+        self.mixed(t, x, &mut free);
+        self.contacts = contacts;
+        let (forces, grips) = (self.contact_forces(&free), self.grips(&free));
+        let k = forces.len();
+        let push = |i: usize| self.contacts[i].above * grips[i * k + i].signum() * forces[i];
+        (0..k).map(push).collect()
+    }
+
     /// Second derivatives of the watched values along the field; or the derivatives of their first
     /// ones by a state.
     pub(super) fn second_along(&self, field: &[f64], by: Option<usize>) -> Vec<f64> {
