@@ -862,8 +862,8 @@ impl Follower<'_> {
         least.unwrap_or((above * held, above))
     }
 
-    /// What contacts would push with against sliding without them: where all fields that they hold
-    /// have one speed on a surface slid upon, at least one of them lets go.
+    /// The pushes of contacts against sliding without them: where all fields that they hold have
+    /// one speed on a surface slid upon, at least one of them lets go.
     pub(super) fn pushes_on_free_sliding(&mut self, t: f64, x: &[f64]) -> Vec<f64> {
         let contacts = std::mem::take(&mut self.contacts);
         let mut free = vec![0.0; self.n];
