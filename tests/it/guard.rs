@@ -52,6 +52,45 @@ fn a_pulse_between_two_steps_is_found() {
     }
 }
 
+/// Functions of tanh and erf that are zero on both sides of u = (s - 5)/width: each passes from one
+/// flat part to the other, and the right-hand side is the same at both ends of a step.
+struct Steps {
+    width: f64,
+    of: usize,
+}
+
+impl Steps {
+    /// Integrals over all u; of 1 - erf^2 by parts.
+    fn area(&self) -> f64 {
+        self.width * [2.0, 2.0, 2.0 * (2.0 / std::f64::consts::PI).sqrt()][self.of]
+    }
+}
+
+impl VectorField<2> for Steps {
+    fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
+        let (u, one) = ((x[0] - S::from_f64(5.0)).scale(1.0 / self.width), S::from_f64(1.0));
+        let pulse = match self.of {
+            0 => one - u.tanh() * u.tanh(),
+            1 => (one + u.tanh()) * (one - u.tanh()),
+            _ => one - u.erf() * u.erf(),
+        };
+        vector![one, pulse.scale(1.0 / self.width)]
+    }
+}
+
+#[test]
+fn a_pulse_made_of_steps_is_found() {
+    for (of, width) in (0..3).flat_map(|of| [1e-2, 1e-4, 1e-6].map(|width| (of, width))) {
+        for method in METHODS {
+            let field = Steps { width, of };
+            let (x, _) =
+                method.with_stepper(TOLERANCE, To(&field, vector![0.0, 0.0], 10.0)).unwrap();
+            let area = field.area() / width;
+            assert!((x[1] - area).abs() < 1e-5, "{method:?} {of} {width:e}: {} for {area}", x[1]);
+        }
+    }
+}
+
 /// A wave that no error estimate shows hides nothing: a step with too many of its periods to be
 /// searched is made in shorter ones.
 #[test]

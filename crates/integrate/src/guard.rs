@@ -150,6 +150,8 @@ impl Along {
 enum Gate {
     /// tanh, erf: flat beyond this argument.
     Step(f64),
+    /// The same, of which the equation is no linear function: 1 - tanh^2 is a pulse.
+    Pulse(f64),
     Sign,
     Exp,
     /// A quotient's divisor, the argument of a root, a logarithm or an arc tangent: smooth in its
@@ -201,7 +203,7 @@ impl Gate {
             Self::Sign => w.bend <= SMALL_BEND * w.change(),
             Self::Scale => w.bend <= SMALL_BEND * least,
             Self::Power(n) => n * w.bend <= SMALL_BEND * least,
-            Self::Wave => false,
+            Self::Wave | Self::Pulse(_) => false,
         }
     }
 
@@ -209,7 +211,7 @@ impl Gate {
     fn is_quiet(self, w: Range) -> bool {
         let (most, least) = w.sizes();
         match self {
-            Self::Step(flat) => w.width() <= SMALL_MOVE || least >= flat,
+            Self::Step(flat) | Self::Pulse(flat) => w.width() <= SMALL_MOVE || least >= flat,
             Self::Sign => w.low >= 0.0 || w.high < 0.0,
             Self::Exp => w.width() <= SMALL_MOVE || w.high <= EXP_FLAT,
             Self::Scale => most <= SMALL_FACTOR * least || w.width() <= 0.0,
@@ -217,6 +219,24 @@ impl Gate {
             Self::Power(n) => n * (most - least) <= SMALL_MOVE * least || n * ln(most) <= EXP_FLAT,
         }
     }
+}
+
+/// Whether all outputs are linear functions of tanh and erf of this argument.
+fn is_linear_in_steps(tape: &Tape, argument: Node) -> bool {
+    let mut degree: Vec<u32> = Vec::with_capacity(tape.operations().len());
+    for operation in tape.operations() {
+        let of = |a: Node| degree[a];
+        let own = match *operation {
+            Operation::Tanh(a) | Operation::Erf(a) if a == argument => 1,
+            Operation::Add(a, b) | Operation::Sub(a, b) => of(a).max(of(b)),
+            Operation::Mul(a, b) => of(a).saturating_add(of(b)),
+            Operation::Neg(a) => of(a),
+            Operation::Div(a, b) if of(b) == 0 => of(a),
+            other => 2 * other.arguments().map(of).max().unwrap_or(0),
+        };
+        degree.push(own.min(2));
+    }
+    tape.outputs().iter().all(|node| degree[*node] <= 1)
 }
 
 /// The only gate of an equation, where its argument is a linear function of the state: offset +
@@ -323,9 +343,12 @@ impl Gates {
             {
                 signs.push([node, argument]);
             }
-            if let Some(gate) = Gate::of(operations[node], powers[node]).filter(|(_, a)| moves[*a])
-                && !gates.contains(&gate)
-            {
+            let gate = Gate::of(operations[node], powers[node]).filter(|(_, a)| moves[*a]);
+            let gate = gate.map(|gate| match gate {
+                (Gate::Step(flat), a) if !is_linear_in_steps(&tape, a) => (Gate::Pulse(flat), a),
+                other => other,
+            });
+            if let Some(gate) = gate.filter(|gate| !gates.contains(gate)) {
                 gates.push(gate);
             }
         }
@@ -1025,7 +1048,9 @@ impl<M: Redoable<N>, const N: usize> Stepper<N> for Guarded<M, N> {
 
     fn step<F: VectorField<N>>(&mut self, field: &F) -> Result<Step<'_, N>, Failure> {
         if self.gates.is_none() {
-            return self.method.step(field);
+            let step = self.method.step(field)?;
+            self.reached = (step.t1, step.x1);
+            return Ok(step);
         }
         loop {
             if self.stages.end_at(self.reached.0) {

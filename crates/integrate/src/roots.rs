@@ -377,6 +377,15 @@ pub fn first_zero(f: impl Fn(f64) -> f64, start: Start) -> Option<Zero> {
     first_in(&reduced, 0.0, 1.0, 0)
 }
 
+/// The first zero of `f` on (from, 1].
+pub fn first_zero_after(from: f64, f: &dyn Fn(f64) -> f64) -> Option<Zero> {
+    let place = |s: f64| from + s * (1.0 - from);
+    first_zero(|s| f(place(s)), Start::Away).map(|zero| match zero {
+        Zero::Crossing(s) => Zero::Crossing(place(s)),
+        Zero::Touch(s) => Zero::Touch(place(s)),
+    })
+}
+
 /// A number on a piece of a step with its derivative by the fraction of the step, both enclosed.
 pub type Enclosed = Dual<Interval, 1>;
 

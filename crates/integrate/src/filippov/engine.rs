@@ -17,7 +17,7 @@ use super::{
 };
 use crate::driver::Monitor;
 use crate::guard::Gates;
-use crate::roots::{Enclosed, Start, Zero, brent, first_zero, first_zero_along};
+use crate::roots::{Enclosed, Start, Zero, brent, first_zero, first_zero_after, first_zero_along};
 use crate::step::{Failure, Flow, Interpolant, Statistics, Step, StopReason, Tolerance, finite};
 use twofold_num::{Arithmetic, Dual, Interval, Tape};
 use twofold_system::filippov::{TwoFold, gradient, lie_derivatives, two_fold};
@@ -220,16 +220,48 @@ pub(super) enum FlightStart {
     Transversal(f64),
     /// On it at a visible fold, with this second derivative of |h|.
     Tangent(f64),
+    /// On it at a tangency of higher order, off it after this time.
+    Flat(f64),
 }
 
 impl FlightStart {
     /// The same over a step of this length, as a function of the fraction of the step.
     pub(super) fn over(self, length: f64) -> Start {
         match self {
-            FlightStart::Away => Start::Away,
+            FlightStart::Away | FlightStart::Flat(_) => Start::Away,
             FlightStart::Transversal(rate) => Start::Simple(rate * length),
             FlightStart::Tangent(second) => Start::Double(0.5 * second * length * length),
         }
+    }
+}
+
+/// A point of the surface to which a field is tangent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Tangency {
+    /// The second derivative of |h| along it.
+    Fold(f64),
+    /// That is zero, too, or as little as rounding may make it. Whether |h| grows ahead, and after
+    /// which time that is seen.
+    Flat { grows: bool, after: f64 },
+}
+
+impl Tangency {
+    /// How a motion leaves with the field, if it does.
+    fn left(self) -> Option<FlightStart> {
+        match self {
+            Self::Fold(second) => (second > 0.0).then_some(FlightStart::Tangent(second)),
+            Self::Flat { grows, after } => grows.then_some(FlightStart::Flat(after)),
+        }
+    }
+
+    /// Whether the field comes to the surface, touches it and goes on towards it.
+    fn presses(self) -> bool {
+        matches!(self, Self::Flat { grows: false, .. })
+    }
+
+    /// Whether nothing says to which side the field leads.
+    fn is_unknown(self) -> bool {
+        matches!(self, Self::Fold(second) if second == 0.0 || second.is_nan())
     }
 }
 
@@ -490,6 +522,9 @@ struct Limits {
     /// A field runs along the surface if it does so at these distances before and behind, as shares
     /// of the states.
     along: [f64; 3],
+    /// Distances ahead, as shares of the states, at which it is seen to which side a field leads that
+    /// is tangent to the surface.
+    ahead: [f64; 6],
     /// A field has no limit at the surface if from the first of these distances to the second, and
     /// on to the third, it grows by as much again.
     approach: [f64; 3],
@@ -528,6 +563,7 @@ const LIMITS: Limits = Limits {
     falls: 0.9,
     small: 1e-6,
     along: [1e-4, 1e-2, 0.1],
+    ahead: [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1],
     approach: [1e-4, 1e-8, 1e-12],
     drift: 1e-10,
     drift_in_tolerances: 10.0,
@@ -535,6 +571,10 @@ const LIMITS: Limits = Limits {
     shortest_departure: 1e-6,
 };
 
+/// Part of the rest of a step behind which a margin that has touched zero is looked at.
+const BEHIND_TOUCH: f64 = 1e-2;
+/// So many touches of a margin in one step are passed.
+const MOST_TOUCHES: usize = 16;
 const DEGENERATE_END: &str = "sliding comes to a point where both fields are tangent to the \
     surface, and which is neither a regular two-fold nor two folds in one place with a sliding \
     motion through them";
@@ -761,14 +801,31 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             return Ok(self.meet(folds, None));
         }
         // Growth of |h| along each field on its own side; a fold counts by its second derivative.
-        let growth = |first: f64, zero: f64, second: f64| {
+        let growth = |first: f64, zero: f64, side: Side| {
             if first.abs() > zero {
                 (first > 0.0).then_some(FlightStart::Transversal(first))
             } else {
-                (second > 0.0).then_some(FlightStart::Tangent(second))
+                self.tangency(&l, side).left()
             }
         };
-        let state = match (growth(l.p, l.zero_p, l.pp), growth(-l.q, l.zero_q, -l.mm)) {
+        let [plus, minus] =
+            [growth(l.p, l.zero_p, Side::Plus), growth(-l.q, l.zero_q, Side::Minus)];
+        // Beside a field that leads away, motion with another one that rests here or runs along.
+        let stays = |first: f64, zero: f64, side: Side| {
+            first.abs() <= zero && self.tangency(&l, side).is_unknown()
+        };
+        let open = plus.is_some() && stays(l.q, l.zero_q, Side::Minus)
+            || minus.is_some() && stays(l.p, l.zero_p, Side::Plus);
+        if open && self.chooser.rule == ExitRule::Undecided {
+            let away = if plus.is_some() { Side::Plus } else { Side::Minus };
+            let ways = ["motion on the surface with the other field".to_owned(), flight(away)];
+            return Err(self.undecided(
+                "one field leads away from the switching surface, and the other one is tangent to \
+                    it or zero there",
+                ways,
+            ));
+        }
+        let state = match (plus, minus) {
             (Some(start), None) => State::Free { side: Side::Plus, start },
             (None, Some(start)) => State::Free { side: Side::Minus, start },
             (None, None) => State::Sliding(Sliding::ATTRACTING),
@@ -916,14 +973,15 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
     /// A flight from a point of the surface where the field of `side` points to it.
     fn launch(&mut self, side: Side) -> State<N> {
         let l = self.lie_on_surface();
-        let (first, zero, second) = match side {
-            Side::Plus => (l.p, l.zero_p, l.pp),
-            Side::Minus => (-l.q, l.zero_q, -l.mm),
+        let (first, zero) = match side {
+            Side::Plus => (l.p, l.zero_p),
+            Side::Minus => (-l.q, l.zero_q),
         };
         let start = if first.abs() > zero {
             FlightStart::Transversal(first)
         } else {
-            FlightStart::Tangent(second)
+            let own = if side == Side::Plus { l.pp } else { -l.mm };
+            self.tangency(&l, side).left().unwrap_or(FlightStart::Tangent(own))
         };
         State::Free { side, start }
     }
@@ -1012,6 +1070,50 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         }
     }
 
+    /// What the field of `side`, which is tangent to the surface here, does ahead.
+    fn tangency(&self, l: &Lie, side: Side) -> Tangency {
+        let sided = self.sided();
+        let (own, velocity) = match side {
+            Side::Plus => (l.pp, sided.plus(&self.x)),
+            Side::Minus => (-l.mm, sided.minus(&self.x)),
+        };
+        let per_speed = self.reach() / velocity.norm();
+        // The rounding of h for states of the run's size: what changes it by more is seen.
+        let least = LIMITS.blurred * gradient(self.system, &self.x).abs().dot(&self.size);
+        let ahead = LIMITS.ahead.into_iter().find_map(|share| {
+            let time = share * per_speed;
+            let x = project(self.system, &(self.x + velocity * time));
+            let l = self.lie(&x);
+            let rate = if side == Side::Plus { l.p } else { -l.q };
+            (finite(&x) && rate.abs() * time > least).then_some((rate, time))
+        });
+        match ahead {
+            Some((rate, time)) if (rate / time - own).abs() > 0.5 * own.abs() => {
+                Tangency::Flat { grows: rate > 0.0, after: time }
+            }
+            _ => Tangency::Fold(own),
+        }
+    }
+
+    /// A hop to the side of a field that brings the motion back at once, if it is lower than the
+    /// rounding of h: its parabola is followed. `first`, `second`: derivatives of |h|.
+    fn hops(&mut self, side: Side, first: f64, second: f64) -> bool {
+        let (height, duration) = (0.5 * first * first / -second, 2.0 * first / -second);
+        let is_low = second < 0.0 && height <= self.blur(&self.x);
+        if !is_low || self.t + duration >= self.t_end {
+            return false;
+        }
+        let sided = self.sided();
+        let velocity = match side {
+            Side::Plus => sided.plus(&self.x),
+            Side::Minus => sided.minus(&self.x),
+        };
+        let (system, from) = (self.system, self.x);
+        let straight = Straight { system, from, to: from + velocity * duration };
+        self.take(side.into(), self.t + duration, straight.at(1.0), &straight);
+        true
+    }
+
     /// Whether the field of `side` is tangent to the surface here and all along its way there.
     fn runs_along(&self, side: Side) -> bool {
         let sided = self.sided();
@@ -1082,6 +1184,10 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             FlightStart::Tangent(second) => Some(second),
             _ => None,
         };
+        let free_until = match start {
+            FlightStart::Flat(after) => t_start + after,
+            _ => t_start,
+        };
         if let Err(failure) =
             method.restart(&flow, self.t, self.x, self.t_end, self.settings.max_step)
         {
@@ -1116,8 +1222,11 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             start =
                 leaving.map_or(FlightStart::Away, |second| FlightStart::Transversal(second * gone));
             let enclosed = |x: &SVector<Enclosed, N>| self.system.switching(x).scale(side.sign());
+            let free = (free_until - step.t0) / length;
             let zero = match leaving {
                 Some(_) => None,
+                None if free >= 1.0 => None,
+                None if free > 0.0 => first_zero_after(free, &height),
                 None => first_zero_along(&step, &height, &enclosed, at_start),
             };
             // A field whose domain ends on the surface ends the flight there.
@@ -1166,7 +1275,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                     let [before, there] = [0.5 * theta, theta].map(&height);
                     let jumps = theta > LIMITS.same_moment
                         && before > 0.0
-                        && there.abs() > LIMITS.falls * before;
+                        && there.abs() > (LIMITS.falls * before).max(self.blur(&place));
                     let on_surface = moved <= LIMITS.jump * travel;
                     if jumps || !on_surface || !self.has_slope(&step.at(0.5 * theta), &x1) {
                         self.take(
@@ -1233,17 +1342,21 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         if slides {
             return Ok(self.land_for_good(side));
         }
-        if own >= -own_zero || (touch && own_second > 0.0) {
-            if own_second.is_nan() || own_second <= 0.0 {
+        if own > own_zero && self.hops(side, own, own_second) {
+            return self.land(side, false);
+        }
+        let tangent = own.abs() <= own_zero;
+        let presses = tangent && self.tangency(&l, side).presses();
+        if own >= -own_zero && !presses || (touch && own_second > 0.0) {
+            let start = match tangent {
+                true => self.tangency(&l, side).left(),
+                false => (own_second > 0.0).then_some(FlightStart::Transversal(own)),
+            };
+            let Some(start) = start else {
                 return self
                     .degenerate(from, "a tangency from an invisible or degenerate side (a cusp)");
-            }
-            self.event(EventKind::Grazing { side }, from, from);
-            let start = if own > own_zero {
-                FlightStart::Transversal(own)
-            } else {
-                FlightStart::Tangent(own_second)
             };
+            self.event(EventKind::Grazing { side }, from, from);
             return Ok(State::Free { side, start });
         }
         let other = side.other();
@@ -1251,14 +1364,21 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             Some(FlightStart::Transversal(across))
         } else if across < -across_zero {
             None
-        } else if across_second == 0.0 || across_second.is_nan() {
-            return self
-                .degenerate(from, "landing on a fold with zero second Lie derivative (a cusp)");
         } else {
-            (across_second > 0.0).then_some(FlightStart::Tangent(across_second))
+            let tangency = self.tangency(&l, other);
+            if tangency.is_unknown() {
+                return self.degenerate(
+                    from,
+                    "landing on a fold with zero second Lie derivative (a cusp)",
+                );
+            }
+            tangency.left()
         };
         if let Some(start) = start {
             self.event(EventKind::Crossing { to: other }, from, Some(other.into()));
+            if across > across_zero && self.hops(other, across, across_second) {
+                return self.land(other, false);
+            }
             return Ok(State::Free { side: other, start });
         }
         Ok(self.land_for_good(side))
@@ -1314,7 +1434,10 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         let mut idle = 0;
         let mut ahead = TwoFoldAhead::new();
         let mut along = SIDES.into_iter().find(|side| {
-            !sliding.repelling && self.is_tangent(&self.x, *side) && self.runs_along(*side)
+            let touches = || self.tangency(&self.lie(&self.x), *side).presses();
+            !sliding.repelling
+                && self.is_tangent(&self.x, *side)
+                && (self.runs_along(*side) || touches())
         });
         if let Err(failure) =
             method.restart(&flow, 0.0, lift(&self.x), f64::INFINITY, f64::INFINITY)
@@ -1484,10 +1607,19 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             };
             // A set of states about the surface reaches to where such a field has no value: nothing
             // encloses it.
-            let zero = match self.depth {
+            let mut zero = match self.depth {
                 Some(_) => first_zero(margin, start),
                 None => first_zero_along(step, &margin, &enclosed, start),
             };
+            // Where a margin is zero and positive again behind, the motion goes on sliding.
+            for _ in 0..MOST_TOUCHES {
+                let Some(Zero::Touch(theta)) = zero else { break };
+                let from = theta + BEHIND_TOUCH * (1.0 - theta);
+                if !(margin(from) > 0.0) {
+                    break;
+                }
+                zero = first_zero_after(from, &margin);
+            }
             if let Some(zero) = zero {
                 propose(zero.theta(), SlidingEnd::Fold(side));
             }
@@ -1565,17 +1697,18 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             self.event(EventKind::ExitAtBoundary { to, time, arc, rule }, from, Some(to.into()));
             return Ok(State::Free { side: to, start: FlightStart::Transversal(first) });
         }
-        let second = match side {
-            Side::Plus => l.pp,
-            Side::Minus => -l.mm,
-        };
-        if second <= 0.0 {
-            return Err(self.non_transversal(
-                "sliding ends at a fold that is not visible (a cusp or a two-fold)",
-            ));
+        let tangency = self.tangency(&l, side);
+        if tangency.presses() {
+            return Ok(State::Sliding(*sliding));
         }
+        let Some(start) = tangency.left() else {
+            return self.rest_or(
+                from,
+                "sliding ends at a fold that is not visible (a cusp or a two-fold)",
+            );
+        };
         self.event(EventKind::LeftByTangency { to: side }, from, Some(side.into()));
-        Ok(State::Free { side, start: FlightStart::Tangent(second) })
+        Ok(State::Free { side, start })
     }
 
     /// Two folds in one place at the present state, if both Lie derivatives are almost zero there.

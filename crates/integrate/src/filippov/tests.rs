@@ -669,6 +669,106 @@ fn a_field_that_runs_along_the_surface_is_slid_along() {
     assert!(end.is_err(), "{end:?}");
 }
 
+/// Tangencies of higher order, with h = x and y' = 1: where the field ahead leads to the surface
+/// sliding goes on, where it leads away the motion leaves, or passes.
+#[test]
+fn tangencies_of_higher_order_are_told_by_what_comes_ahead() {
+    let power = |y: f64, n: i32| (0..n).fold(1.0, |product, _| product * y);
+    for n in [4, 6, 8] {
+        // Along the surface past the touch, landing in it, beginning in it.
+        let landing = 1.0 / f64::from(n + 1);
+        for start in [[0.0, -1.0], [0.0, -1.01], [0.0, -0.3], [landing, -1.0], [0.0, 0.0]] {
+            for shift in [0.0, 0.1, -0.3] {
+                let plus = format!("'-(y - {shift})^{n}', '1'");
+                let at = [start[0], start[1] + shift];
+                let end = plane(["x", &plus, "'1', '1'"], at, 3.0);
+                let x = end.unwrap_or_else(|e| panic!("{plus} {at:?}: {e}")).x;
+                assert!(
+                    x[0].abs() < 1e-9 && (x[1] - at[1] - 3.0).abs() < 1e-9,
+                    "{plus} {at:?} {x}"
+                );
+                let minus = format!("'(y - {shift})^{n}', '1'");
+                let x = plane(["x", "'-1', '1'", &minus], [-at[0], at[1]], 3.0).unwrap().x;
+                assert!(
+                    x[0].abs() < 1e-9 && (x[1] - at[1] - 3.0).abs() < 1e-9,
+                    "{minus} {at:?} {x}"
+                );
+            }
+        }
+    }
+    for n in 2..9 {
+        // Crossing to where the field behind is tangent and leads on.
+        let plus = format!("'y^{n}', '1'");
+        let x = plane(["x", &plus, "'1', '1'"], [-1.0, -1.0], 3.0).unwrap().x;
+        let want = power(2.0, n + 1) / f64::from(n + 1);
+        assert!((x[0] - want).abs() < 1e-6 * want, "{plus} {x}");
+    }
+    for n in [3, 5] {
+        // A visible fold of higher order: sliding ends in it.
+        let plus = format!("'y^{n}', '1'");
+        let x = plane(["x", &plus, "'1', '1'"], [0.0, -1.0], 3.0).unwrap().x;
+        let want = power(2.0, n + 1) / f64::from(n + 1);
+        assert!((x[0] - want).abs() < 1e-6 * want, "{plus} {x}");
+    }
+}
+
+/// A hop beside an invisible fold that is lower than the rounding of h, and one that is not.
+#[test]
+fn hops_that_rounding_hides_are_landings() {
+    for place in [0, 1, 100] {
+        let h = format!("x - {place}");
+        for power in 3..11 {
+            let beside = (0..power).fold(1.0, |ten, _| 0.1 * ten);
+            let start = [f64::from(place) - 1.0, beside];
+            let end = plane([&h, "'y', '-1'", "'1', '0'"], start, 2.0);
+            let end = end.unwrap_or_else(|e| panic!("{h} {beside:e}: {e}"));
+            // Filippov's y' = q/(q - p) with p = y, q = 1: y - y^2/2 falls by one a unit of time.
+            let left = 1.0 - 2.0 * beside;
+            let want = 1.0 - (1.0 + 2.0 * (beside + 0.5 * beside * beside + left)).sqrt();
+            assert!((end.x[1] - want).abs() < 1e-6, "{h} {beside:e}: {} for {want}", end.x);
+        }
+    }
+}
+
+/// Starts on the surface: at rest where one field is zero and the other one leads there; not
+/// decided where it leads away.
+#[test]
+fn rests_on_the_surface_are_seen_at_the_start() {
+    for (plus, minus) in [("'-1', '0'", "'-x', '0'"), ("'4*x', '0'", "'2', '0'")] {
+        let end =
+            plane(["x", plus, minus], [0.0, 0.0], 3.0).unwrap_or_else(|e| panic!("{plus} {e}"));
+        assert_eq!(end.x, SVector::from([0.0, 0.0]));
+    }
+    for (plus, minus) in [("'1', '0'", "'x', '0'"), ("'1', '0'", "'0*x', '-1'")] {
+        let end = plane(["x", plus, minus], [0.0, 0.0], 3.0);
+        assert!(matches!(end, Err(FilippovError::Undecided { .. })), "{plus} {minus} {end:?}");
+    }
+}
+
+/// Where a piece of the motion becomes stiff another method goes on from there, and not from the
+/// piece's beginning: in flight and in sliding.
+#[test]
+fn a_piece_that_becomes_stiff_goes_on() {
+    for [h, plus, minus] in [
+        ["y^2 - 1.1", "'-x', '-50*(y - 1.2)'", "'-x', '1'"],
+        ["x + y - 2", "'-1 - x', '-50*(y - 1.2)'", "'3 - x', '-50*(y - 1.2)'"],
+    ] {
+        let text = format!(
+            "states = ['x', 'y']\nstart = [0, 0]\nh = '{h}'\nplus = [{plus}]\nminus = [{minus}]"
+        );
+        let text = twofold_system::Definition::from_toml(&text, "").unwrap();
+        let bound: Bound<2> = System::new(text).bind().unwrap();
+        let mut seen = Trajectory::new(1);
+        let settings = FilippovOptions::default();
+        let start = SVector::from([1.0, 1.3]);
+        let end = run(&bound, start, 60.0, &settings, ExitRule::Undecided, &mut seen).unwrap();
+        assert!((end.x[1] - 1.2).abs() < 1e-6, "{}", end.x);
+        let points = seen.pieces.iter().flat_map(|piece| &piece.points);
+        let times: Vec<f64> = points.map(|point| point.0).collect();
+        assert!(times.windows(2).all(|t| t[0] <= t[1]), "{h}: {times:?}");
+    }
+}
+
 /// h that jumps, has a pole, or has no slope where it comes to zero.
 #[test]
 fn a_switching_function_without_a_simple_zero_is_named() {
