@@ -428,6 +428,18 @@ fn span_of(text: &str, place: &Place) -> Option<Range<usize>> {
 }
 
 impl Definition {
+    /// Changes each expression of fields, terms and events, but for times.
+    pub(crate) fn change_expressions(&mut self, change: impl Fn(&mut Expression)) {
+        let terms = self.terms.iter_mut().map(|(_, e)| e);
+        terms.chain(self.modes.iter_mut().flat_map(|mode| &mut mode.field)).for_each(&change);
+        for event in &mut self.events {
+            if let When::Zero(e, _) | When::Becomes(e) = &mut event.when {
+                change(e);
+            }
+            event.set.iter_mut().for_each(|(_, e)| change(e));
+        }
+    }
+
     /// Reads a definition in TOML; `origin` names the text in errors.
     ///
     /// # Errors

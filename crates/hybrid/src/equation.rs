@@ -44,6 +44,8 @@ pub struct Configuration {
     pub sides: Vec<f64>,
     /// For each table the piece.
     pub pieces: Vec<usize>,
+    /// The guards whose zero is slid upon, if the equations have roots.
+    pub(crate) slid: Vec<usize>,
 }
 
 /// The equations for one structure of answers, ready for evaluation. Variables: states, time,
@@ -205,7 +207,13 @@ impl Equation {
     /// # Errors
     /// If the model is not complete, or a condition is none.
     pub fn new(model: &Model, section: Option<&Expression>) -> Result<Self, EquationError> {
-        let definition = model.definition().clone();
+        let (mut definition, values) = (model.definition().clone(), model.values()?);
+        let value = |e: &Expression| {
+            let known = e.names().into_iter().all(|name| values.contains_key(name)) && !asks(e);
+            known.then(|| evaluate(e, &|name| values.get(name).copied()))
+        };
+        definition.change_expressions(|e| *e = e.with_whole_powers(&value));
+        let section = section.map(|e| e.with_whole_powers(&value));
         let tables = model.tables()?.into_iter().map(|(_, t)| t.clone()).collect();
         let mut watched: Vec<Expression> = Vec::new();
         let mut conditions: Vec<Expression> = Vec::new();
@@ -216,9 +224,9 @@ impl Equation {
                 _ => {}
             }
         }
-        watched.extend(section.cloned());
+        watched.extend(section);
         let mut equation = Self {
-            values: model.values()?,
+            values,
             guards: Vec::new(),
             of_fields: 0,
             has_domain_ends: false,
@@ -279,19 +287,29 @@ impl Equation {
         e.parts().into_iter().try_for_each(|part| self.has_meaning(part))
     }
 
-    /// Whether an expression is one of states, time and parameters, which no switching function
-    /// decides.
+    /// Whether an expression is one of states, time and parameters, by itself or through terms,
+    /// which no switching function decides.
     fn is_plain(&self, e: &Expression) -> bool {
-        let tables = &self.definition.tables;
-        !asks(e)
-            && e.names()
-                .iter()
-                .all(|n| self.term(n).is_none() && !tables.iter().any(|(table, _)| table == n))
+        let is_table = |name: &str| self.definition.tables.iter().any(|(table, _)| table == name);
+        let (mut open, mut seen) = (vec![e], HashSet::new());
+        while let Some(e) = open.pop() {
+            if asks(e) || e.names().into_iter().any(is_table) {
+                return false;
+            }
+            let new = e.names().into_iter().filter(|name| seen.insert(*name));
+            open.extend(new.filter_map(|name| self.term(name)));
+        }
+        true
     }
 
     /// Plain expressions as a tape.
     fn record(&self, plain: &[&Expression]) -> Tape {
-        let at = Configuration { mode: 0, sides: vec![1.0; self.guards.len()], pieces: Vec::new() };
+        let at = Configuration {
+            mode: 0,
+            sides: vec![1.0; self.guards.len()],
+            pieces: Vec::new(),
+            slid: Vec::new(),
+        };
         Tape::record(self.variables(), |v| {
             let mut writer = Writer {
                 equation: self,
@@ -300,6 +318,7 @@ impl Equation {
                 terms: HashMap::new(),
                 conditions: HashMap::new(),
                 guards: BTreeMap::new(),
+                positive: Vec::new(),
             };
             plain.iter().map(|e| writer.number(e)).collect()
         })
@@ -510,17 +529,26 @@ impl Equation {
         false
     }
 
+    /// Whether an expression is never negative, whatever states and time are.
+    fn is_never_negative(&self, e: &Expression) -> bool {
+        let is = |e: &Expression| self.is_never_negative(e);
+        match e {
+            _ if self.constant(e).is_some_and(|v| v >= 0.0) => true,
+            Expression::Name(name) => self.term(name).is_some_and(is),
+            Expression::Call(Function::Abs, _) => true,
+            Expression::Apply(General::Max, list) => list.iter().any(is),
+            Expression::Apply(General::Min, list) => list.iter().all(is),
+            Expression::Apply(General::Clip, list) => is(&list[1]),
+            Expression::Add(a, b) | Expression::Mul(a, b) | Expression::Div(a, b) => is(a) && is(b),
+            Expression::Power(a, n) => n % 2 == 0 || is(a),
+            _ => false,
+        }
+    }
+
     /// Whether a power, of what is never negative by an exponent of at least one, is taken of its
     /// size: rounding beyond the end of its domain makes it no other number.
     fn is_power_of_size(&self, base: &Expression, exponent: &Expression) -> bool {
-        let no_less = |e: &Expression, bound: f64| self.constant(e).is_some_and(|v| v >= bound);
-        let never_negative = match base {
-            Expression::Call(Function::Abs, _) => true,
-            Expression::Apply(General::Max, list) => list.iter().any(|e| no_less(e, 0.0)),
-            Expression::Apply(General::Clip, list) => no_less(&list[1], 0.0),
-            _ => false,
-        };
-        never_negative && no_less(exponent, 1.0)
+        self.is_never_negative(base) && self.constant(exponent).is_some_and(|v| v >= 1.0)
     }
 
     /// The value of an expression of numbers and parameters.
@@ -679,6 +707,8 @@ impl Equation {
                 (Some(factor), _) => scaled(b, factor),
                 _ => (Expression::Mul(a.clone(), b.clone()), false),
             },
+            Expression::Sub(a, b) if **a == mirrored(b) => self.bare(a),
+            Expression::Add(a, b) if a == b => self.bare(a),
             Expression::Power(a, n) if n % 2 != 0 => self.bare(a),
             Expression::Call(Function::Tanh | Function::Atan | Function::Erf, a) => self.bare(a),
             Expression::Apply(General::Sinh | General::Asin, list) if list.len() == 1 => {
@@ -868,13 +898,14 @@ impl Equation {
 
     /// The same, with these guards among the active ones even where the equations do not ask them.
     pub fn compiled_with(&self, at: &Configuration, also: &[usize]) -> Rc<Compiled> {
-        let mut key = vec![at.mode as i8];
-        key.extend(
-            self.guards.iter().zip(&at.sides).filter(|(g, _)| g.chooses).map(|(_, s)| *s as i8),
-        );
         let numbers = |guards: &[usize]| -> Vec<i8> {
             guards.iter().flat_map(|g| (*g as u32).to_le_bytes()).map(|b| b as i8).collect()
         };
+        let mut key = numbers(&[at.mode, at.slid.len()]);
+        key.extend(numbers(&at.slid));
+        key.extend(
+            self.guards.iter().zip(&at.sides).filter(|(g, _)| g.chooses).map(|(_, s)| *s as i8),
+        );
         let rest: Vec<usize> = (0..self.guards.len()).filter(|g| self.rests(*g, at)).collect();
         if !rest.is_empty() {
             key.push(i8::MAX);
@@ -908,6 +939,7 @@ impl Equation {
                 terms: HashMap::new(),
                 conditions: HashMap::new(),
                 guards: BTreeMap::new(),
+                positive: Vec::new(),
             };
             let mut outputs: Vec<Recorded> =
                 self.definition.modes[at.mode].field.iter().map(|e| writer.number(e)).collect();
@@ -1248,6 +1280,8 @@ struct Writer<'a> {
     conditions: HashMap<String, bool>,
     /// Guards that were asked, with their values once written.
     guards: BTreeMap<usize, Option<Recorded>>,
+    /// Differences that the conditions around what is written say to be positive.
+    positive: Vec<Expression>,
 }
 
 impl Writer<'_> {
@@ -1286,7 +1320,7 @@ impl Writer<'_> {
         self.v[self.equation.dimension() + 1 + i]
     }
 
-    fn positive(&mut self, e: &Expression) -> bool {
+    fn is_positive(&mut self, e: &Expression) -> bool {
         self.ask(e, false);
         self.equation.positive(e, self.at)
     }
@@ -1295,7 +1329,7 @@ impl Writer<'_> {
         match e {
             Expression::Greater(a, b) => match of_each(a, b) {
                 Some(each) => self.condition(&each),
-                None => self.positive(&difference(a, b)),
+                None => self.is_positive(&difference(a, b)),
             },
             Expression::And(a, b) => self.condition(a) && self.condition(b),
             Expression::Or(a, b) => self.condition(a) || self.condition(b),
@@ -1329,7 +1363,10 @@ impl Writer<'_> {
             return *known;
         }
         if let Some(term) = equation.term(name).cloned() {
+            // A term is the same in every branch.
+            let around = std::mem::take(&mut self.positive);
             let value = self.number(&term);
+            self.positive = around;
             self.terms.insert(name.to_owned(), value);
             return value;
         }
@@ -1338,6 +1375,18 @@ impl Writer<'_> {
         let s = self.v[n] - self.v[first];
         let [a, b, c, d] = [1, 2, 3, 4].map(|i| self.v[first + i]);
         a + s * (b + s * (c + s * d))
+    }
+
+    /// The argument of a root. While the motion slides on x = 0 rounding beyond zero is zero: of
+    /// what is never negative, as |x|, and of x where a condition says that it is positive.
+    fn of_root(&mut self, e: &Expression) -> Recorded {
+        let value = self.number(e);
+        let is_found = asks(e) && self.equation.is_never_negative(e);
+        if !self.at.slid.is_empty() && (is_found || self.positive.contains(e)) {
+            (value + value * value.sign()).scale(0.5)
+        } else {
+            value
+        }
     }
 
     fn number(&mut self, e: &Expression) -> Recorded {
@@ -1355,7 +1404,8 @@ impl Writer<'_> {
                 let (a, b) = (self.number(a), self.number(b));
                 power(a * a, b.scale(0.5))
             }
-            Expression::RealPower(a, b) => power(self.number(a), self.number(b)),
+            Expression::RealPower(a, b) => power(self.of_root(a), self.number(b)),
+            Expression::Call(Function::Sqrt, a) => self.of_root(a).sqrt(),
             Expression::Call(Function::Sign, a) => self.side(a).unwrap_or(Recorded::zero()),
             Expression::Call(Function::Abs, a) => match self.side(a) {
                 Some(side) => side * self.number(a),
@@ -1376,8 +1426,17 @@ impl Writer<'_> {
     fn apply(&mut self, f: General, list: &[Expression]) -> Recorded {
         match f {
             General::If => {
-                let chosen = if self.condition(&list[0]) { 1 } else { 2 };
-                self.number(&list[chosen])
+                let holds = self.condition(&list[0]);
+                let positive = match (&list[0], holds) {
+                    (Expression::Greater(a, b), true) => Some(difference(a, b)),
+                    (Expression::Greater(a, b), false) => Some(difference(b, a)),
+                    _ => None,
+                };
+                let kept = self.positive.len();
+                self.positive.extend(positive);
+                let value = self.number(&list[if holds { 1 } else { 2 }]);
+                self.positive.truncate(kept);
+                value
             }
             General::Min | General::Max => {
                 let last = list.len() - 1;
@@ -1385,7 +1444,7 @@ impl Writer<'_> {
                     return self.number(&list[0]);
                 }
                 let before = self.equation.folded(f, &list[..last]);
-                let greater = self.positive(&difference(&list[last], &before));
+                let greater = self.is_positive(&difference(&list[last], &before));
                 if greater == (f == General::Max) {
                     self.number(&list[last])
                 } else {
@@ -1393,9 +1452,9 @@ impl Writer<'_> {
                 }
             }
             General::Clip => {
-                if !self.positive(&difference(&list[0], &list[1])) {
+                if !self.is_positive(&difference(&list[0], &list[1])) {
                     self.number(&list[1])
-                } else if self.positive(&difference(&list[0], &list[2])) {
+                } else if self.is_positive(&difference(&list[0], &list[2])) {
                     self.number(&list[2])
                 } else {
                     self.number(&list[0])
@@ -1412,8 +1471,8 @@ impl Writer<'_> {
                 a - b * whole
             }
             General::Atan2 => {
-                let right = self.positive(&list[1]);
-                let up = if right { true } else { self.positive(&list[0]) };
+                let right = self.is_positive(&list[1]);
+                let up = if right { true } else { self.is_positive(&list[0]) };
                 let (y, x) = (self.number(&list[0]), self.number(&list[1]));
                 // To the right the half angle keeps away from its branch; to the left it is
                 // measured from the axis.

@@ -868,6 +868,7 @@ impl<'a> Follower<'a> {
             mode: options.mode,
             sides: vec![1.0; equation.guards.len()],
             pieces: equation.tables.iter().map(|t| t.piece(t0)).collect(),
+            slid: Vec::new(),
         };
         let order = order(&equation, &options.intersection)?;
         let guards = equation.guards.len();
@@ -1049,6 +1050,9 @@ impl<'a> Follower<'a> {
                 continue;
             }
             self.open_pulled()?;
+            if !self.x.iter().all(|v| v.is_finite()) {
+                return Err(self.left_domain(step.t, &step.x));
+            }
             step.t = self.t;
             step.x.copy_from_slice(&self.x);
             self.rhs(step.t, &step.x, &mut room);
@@ -1223,6 +1227,7 @@ impl<'a> Follower<'a> {
             // Sliding ends, and goes on behind a switch, on its surface.
             if !self.sliding.is_empty() {
                 self.project();
+                self.put_where_met(&met);
             } else if !self.contacts.is_empty() {
                 self.place_contacts();
             }

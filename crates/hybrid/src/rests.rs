@@ -600,6 +600,7 @@ impl Search<'_> {
             mode,
             sides: self.equation.guards.iter().enumerate().map(side).collect(),
             pieces: Vec::new(),
+            slid: Vec::new(),
         }
     }
 

@@ -4588,3 +4588,114 @@ fn friction_lifts_a_body_off_its_stop() {
         }
     }
 }
+
+/// A weir, 1 - sqrt(max(h - 1, 0)), that begins and ends to flow: the surface is met with a speed,
+/// and the slope behind it is infinite. Of an autonomous equation derivatives are quotients of the
+/// field; of a driven one with one state the multiplier is a difference of runs.
+#[test]
+fn roots_that_begin_at_a_surface_are_crossed_with_their_tangents() {
+    let options = Options { t_end: 3.0, ..Options::default() };
+    let slope = |inflow: f64, start: f64, root: &str| {
+        let text = format!("states = ['h']\nstart = [{start}]\nf = ['{inflow} - {root}']");
+        let found = crate::motion::sensitivity::sensitivities(&model(&text), &options, &[]);
+        let found = found.unwrap_or_else(|e| panic!("{text}: {e}"));
+        (found.x[0], found.by_start[0][0])
+    };
+    for root in ["sqrt(max(h - 1, 0))", "if(h > 1, sqrt(h - 1), 0)"] {
+        let (end, rising) = slope(1.0, 0.5, root);
+        near(rising, 1.0 - (end - 1.0).sqrt(), 1e-7);
+        let (_, falling) = slope(-1.0, 1.5, root);
+        near(falling, 1.0 / (1.0 + 0.5_f64.sqrt()), 1e-7);
+    }
+    let tank = "states = ['h']\nstart = [0.2]\n\
+        f = ['0.3*(1 + cos(2*pi*t/10)) - 0.2*sqrt(max(h - 0.6, 0)) - 0.3*h']";
+    near(end_of(tank, 1000.0, Method::Dopri5).unwrap()[0], 0.9946294707, 2e-9);
+    use crate::motion::tangent::{Return, closed_orbit};
+    let orbit = closed_orbit(&model(tank), &Options::default(), &Return::Period(10.0)).unwrap();
+    let after = |by: f64| {
+        let start = Some(vec![orbit.x[0] + by]);
+        let options = Options { t_end: 10.0, start, rtol: 1e-12, ..Options::default() };
+        follow(&model(tank), &options, &mut |_| true).unwrap().x[0]
+    };
+    near(orbit.multipliers[0][0], (after(1e-5) - after(-1e-5)) / 2e-5, 1e-6);
+}
+
+/// Power-rate reaching laws: roots of |s|, whose zero is slid upon. Sliding on v = -2 x, x falls as
+/// exp(-2 t). Gains with kinks that all meet where the motion comes to rest.
+#[test]
+fn roots_of_what_is_slid_upon_are_zero() {
+    for law in [
+        "-abs(s)^0.5*sign(s) - 3*sign(s)",
+        "-2*v - sqrt(abs(s))*sign(s) - 3*sign(s)",
+        "-2*v - sqrt(abs(s)) - 3*sign(s)",
+        "-2*v - sqrt(max(s, 0)) - 3*sign(s)",
+        "-2*v - (abs(s)/3)^0.9 - 3*sign(s)",
+        "-2*v - 0.5*exp(-abs(s)^0.5)*sign(s) - 3*sign(s)",
+    ] {
+        let text = format!(
+            "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '{law}']\n[let]\ns = 'v + 2*x'"
+        );
+        for method in [Method::Dopri5, Method::Radau5, Method::Lsoda] {
+            let [early, late] = [4.0, 6.0].map(|t| end_of(&text, t, method));
+            let [early, late] = [early, late].map(|x| x.unwrap_or_else(|e| panic!("{law}: {e}")));
+            near(late[0], early[0] * (-4.0_f64).exp(), 1e-9);
+            near(late[1], -2.0 * late[0], 1e-12);
+        }
+    }
+    let text = "states = ['x', 'v']\nstart = [1, 0.5]\n\
+        f = ['v', '-2*v - sign(v + 2*x)*(1 + abs(x))']";
+    for method in Method::ALL {
+        let x = end_of(text, 40.0, method).unwrap_or_else(|e| panic!("{method:?}: {e}"));
+        assert!(x.iter().all(|v| v.abs() < 1e-11), "{method:?}: {x:?}");
+    }
+}
+
+/// Exponents that are whole numbers by a parameter: z' = -z^n of negative numbers.
+#[test]
+fn whole_exponents_may_be_parameters() {
+    let end = |field: &str, n: f64, z: f64| {
+        let text = format!("states = ['z']\nstart = [{z}]\nf = ['{field}']\n[parameters]\nn = {n}");
+        last(&text, 1.0)
+    };
+    near(end("-z^n", 2.0, -0.5), -1.0, 1e-8);
+    near(end("-z^n", 3.0, -0.5), -(6.0_f64.sqrt().recip()), 1e-9);
+    near(end("-z^(n - 1)", 2.0, -0.5), -0.5 * (-1.0_f64).exp(), 1e-9);
+    near(end("-abs(z)^(n - 1)*z", 1.0, -0.5), -0.5 * (-1.0_f64).exp(), 1e-9);
+    near(end("-abs(z)^n*z", 0.0, 0.5), 0.5 * (-1.0_f64).exp(), 1e-9);
+}
+
+/// |v - 0.2| as max(r, -r), r named or written out, is one surface with sign(r).
+#[test]
+fn a_size_by_a_maximum_is_no_new_surface() {
+    use crate::motion::tangent::{Return, closed_orbit};
+    let period = |r: &str, size: &str| {
+        let text = format!(
+            "states = ['v', 'x']\nstart = [0, 0]\n\
+             f = ['-x - sign({r})*(0.3 + 0.2*exp(-{size}))', 'v']\n[let]\nr = 'v - 0.2'"
+        );
+        let section = Record::Section(twofold_system::Expression::Name("v".into()));
+        let options = Options { record: section, t_end: 100.0, ..Options::default() };
+        closed_orbit(&model(&text), &options, &Return::Crossings(1)).unwrap().period
+    };
+    let want = period("r", "abs(r)");
+    near(want, 6.601640314931418, 1e-8);
+    near(period("r", "max(r, -r)"), want, 1e-9);
+    near(period("v - 0.2", "max(v - 0.2, -(v - 0.2))"), want, 1e-9);
+    near(period("v - 0.2", "max(0.2 - v, v - 0.2)"), want, 1e-9);
+}
+
+/// Derivatives by a start on a surface: of one that moves along it at first, also by what gives it a
+/// speed; of surfaces that depend on each other none, in words.
+#[test]
+fn starts_on_surfaces_have_derivatives_of_one_side_only() {
+    let options = Options { t_end: 2.0, ..Options::default() };
+    let at = |text: &str| crate::motion::sensitivity::sensitivities(&model(text), &options, &[]);
+    let found =
+        at("states = ['x', 'v']\nstart = [0, 0]\nf = ['v', '0.5 - x - 0.15*sign(x)']").unwrap();
+    assert!(found.by_start.iter().flatten().all(|v| v.is_nan()), "{:?}", found.by_start);
+    let agents = "states = ['x', 'y', 'z']\nstart = [0, 0, 0]\n\
+        f = ['-sign(x - y) - sign(x - z)', '-sign(y - x) - sign(y - z)', \
+        '-sign(z - x) - sign(z - y)']";
+    let error = at(agents).unwrap_err().to_string();
+    assert!(error.contains("surfaces that depend on each other"), "{error}");
+}

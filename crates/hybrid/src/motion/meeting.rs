@@ -965,15 +965,15 @@ impl Follower<'_> {
         if no_way && self.stops_at_equality(t, &x, &near, &fields, left) {
             return true;
         }
+        if !fields.iter().flatten().all(|f| f.is_finite()) {
+            return false;
+        }
         // States that hardly move on any side until the run ends rest.
         let fastest: Vec<f64> =
             (0..n).map(|i| fields.iter().fold(0.0_f64, |most, f| most.max(f[i].abs()))).collect();
         let moves: Vec<usize> = (0..n)
             .filter(|i| fastest[*i] * left > 1e-8 * self.size[*i].max(1e-3 * largest))
             .collect();
-        if !moves.iter().all(|i| fastest[*i].is_finite()) {
-            return false;
-        }
         let parts: Vec<Vec<f64>> =
             fields.iter().map(|f| moves.iter().map(|i| f[*i] / fastest[*i]).collect()).collect();
         // If mixtures differ, only one that all surfaces hold is known to stay.
@@ -1163,6 +1163,27 @@ impl Follower<'_> {
         let largest = self.size.iter().fold(0.0_f64, |most, s| most.max(*s));
         let moved = x.iter().zip(&self.x).all(|(a, b)| (a - b).abs() <= 1e-5 * largest);
         if moved { x } else { self.x.clone() }
+    }
+
+    /// Puts a state that slides where a switching function that is met is zero, too, if the way back
+    /// to the surface has led before that zero: it would be met again and again.
+    pub(super) fn put_where_met(&mut self, met: &[Sought]) {
+        let values = self.watched_values();
+        let mut places = Vec::new();
+        for sought in met {
+            let Sought::Guard { guard, .. } = *sought else { continue };
+            let Some(place) = self.compiled.place(guard) else { continue };
+            let before = values[place] * self.config.sides[guard] > 0.0;
+            if before && !self.slides[guard] && !self.equation.guards[guard].whole {
+                places.push((place, guard));
+            }
+        }
+        let sliding = self.sliding.iter().filter(|guard| !self.equation.guards[**guard].whole);
+        let sliding = sliding.filter_map(|guard| Some((self.compiled.place(*guard)?, *guard)));
+        if !places.is_empty() {
+            places.extend(sliding);
+            self.x = self.nearest_meeting(&places, &values);
+        }
     }
 
     /// Lets the state rest until a time; says whether more is wanted.

@@ -84,8 +84,11 @@ pub fn sensitivities(
 impl Follower<'_> {
     /// Of each component of the start, whether it moves the start off a surface on which it lies
     /// and does not slide, with other fields on its other side: neighbours there begin with those;
-    /// or off one that a field runs along on one side: there they stay beside it.
+    /// or off one that a field runs along on one side: there they stay beside it. Or whether it
+    /// changes the speed, which is zero, at which the motion leaves such a surface.
     fn begins_between_sides(&mut self) -> Vec<bool> {
+        /// Distance, in units of a component or of 1, at which a speed is looked at.
+        const BESIDE: f64 = 1e-6;
         let n = self.n;
         let mut between = vec![false; n];
         self.variables[..n].copy_from_slice(&self.x);
@@ -121,6 +124,20 @@ impl Follower<'_> {
                 continue;
             }
             moved.for_each(|(_, variable)| between[*variable] = true);
+            // Motion that begins along the surface is behind it first if that speed is changed.
+            let speed = |variables: &[f64]| {
+                let mut field = vec![0.0; n];
+                compiled.field.evaluate(variables, &mut field);
+                Self::along(&compiled, variables, &field)[place]
+            };
+            if speed(&variables) == 0.0 {
+                for (i, between) in between.iter_mut().enumerate() {
+                    let kept = variables[i];
+                    variables[i] += BESIDE * kept.abs().max(1.0);
+                    *between |= speed(&variables) != 0.0;
+                    variables[i] = kept;
+                }
+            }
         }
         between
     }

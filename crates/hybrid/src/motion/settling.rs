@@ -552,10 +552,13 @@ impl Follower<'_> {
     }
 
     /// Puts the state, which is on these surfaces to rounding, where the fields of both sides have
-    /// values: sqrt(x - 1) has none at x - 1 = -1e-16.
+    /// values: sqrt(x - 1) has none at x - 1 = -1e-16; and where a root is zero that is of what is
+    /// zero there.
     fn put_into_domain(&mut self, zero: &[usize]) {
         /// Numbers that are tried on either side.
         const TRIED: usize = 16;
+        /// Fields that differ by this part of themselves between two such numbers have a root.
+        const ROUGH: f64 = 1e-11;
         let n = self.n;
         for guard in zero.iter().copied() {
             let Some(place) = self.compiled.place(guard).filter(|_| !self.slides[guard]) else {
@@ -567,30 +570,49 @@ impl Follower<'_> {
                 self.ask_new(&mut config);
                 (self.equation.compiled(&config), self.load(&config))
             });
-            let has_values = |x: &[f64]| {
-                sides.iter().all(|(compiled, variables)| {
+            // Both fields, where they have values.
+            let fields = |x: &[f64]| -> Option<Vec<f64>> {
+                let mut all = Vec::with_capacity(2 * n);
+                for (compiled, variables) in &sides {
                     let (mut variables, mut field) = (variables.clone(), vec![0.0; n]);
                     variables[..n].copy_from_slice(x);
                     compiled.field.evaluate(&variables, &mut field);
-                    field.iter().all(|f| f.is_finite())
-                })
+                    all.extend(field);
+                }
+                all.iter().all(|f| f.is_finite()).then_some(all)
             };
-            if has_values(&self.x) {
-                continue;
-            }
             let gradient = &self.compiled.gradients(&self.load(&self.config))[place];
             let states = self.compiled.touches[place].iter().copied().zip(gradient);
             let moves = states
                 .filter(|(state, slope)| *state < n && **slope != 0.0)
                 .max_by(|a, b| (a.1 * self.x[a.0]).abs().total_cmp(&(b.1 * self.x[b.0]).abs()));
-            let Some((state, _)) = moves else { continue };
-            let (mut up, mut down) = (self.x.clone(), self.x.clone());
-            for _ in 0..TRIED {
-                (up[state], down[state]) = (up[state].next_up(), down[state].next_down());
-                if let Some(x) = [&up, &down].into_iter().find(|x| has_values(x)) {
-                    self.x.clone_from(x);
-                    break;
+            let Some((state, slope)) = moves else { continue };
+            let whole = self.equation.guards[guard].whole;
+            let off = if whole { 0.0 } else { self.watched_values()[place] / slope };
+            let mut up = self.x.clone();
+            up[state] -= off;
+            // A root of what is zero to rounding is far from zero.
+            let rough = |here: &[f64], there: &[f64]| {
+                let size = here.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
+                here.iter().zip(there).any(|(a, b)| (a - b).abs() > ROUGH * size)
+            };
+            let here = fields(&self.x);
+            let exact = match (&here, fields(&up)) {
+                (Some(here), Some(there)) if !rough(here, &there) => continue,
+                (Some(_), None) => continue,
+                (here, _) => here.is_some(),
+            };
+            let mut down = up.clone();
+            'tried: for _ in 0..TRIED {
+                for x in [&up, &down] {
+                    self.variables[..n].copy_from_slice(x);
+                    let fits = !exact || self.values_there()[place] == 0.0;
+                    if fits && fields(x).is_some() {
+                        self.x.clone_from(x);
+                        break 'tried;
+                    }
                 }
+                (up[state], down[state]) = (up[state].next_up(), down[state].next_down());
             }
         }
     }
@@ -907,7 +929,9 @@ impl Follower<'_> {
                             return false;
                         }
                     }
-                    let Some(weights) = self.weights_in_cells(&fields, &own) else { return false };
+                    let Some(weights) = self.weights_in_cells(&fields, &own) else {
+                        return false;
+                    };
                     let goes = |i: usize| {
                         let rate: f64 = weights.iter().zip(&speeds).map(|(w, r)| w * r[i]).sum();
                         match assignment[i] {
@@ -1102,6 +1126,10 @@ impl Follower<'_> {
                 }
                 [] => {
                     let names: Vec<usize> = set.iter().map(|i| zero[*i]).collect();
+                    let here = self.rates(&self.config.clone()).1.field;
+                    if !here.iter().all(|f| f.is_finite()) {
+                        return Err(self.left_domain(self.t, &self.x.clone()));
+                    }
                     return Err(match self.options.intersection {
                         Intersection::Order(_) if names.len() > 1 => self.no_mixture(&names),
                         _ => {
@@ -1406,6 +1434,10 @@ impl Follower<'_> {
         let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; self.n]);
         self.rhs(t, &x, &mut field);
         for guard in open {
+            // On a kink both sides have one field, whatever rounding makes of it.
+            if self.equation.guards[guard].kink {
+                continue;
+            }
             let Some(place) = self.compiled.place(guard) else { continue };
             self.variables[..self.n].copy_from_slice(&x);
             self.variables[self.n] = t;
@@ -1843,9 +1875,14 @@ impl Follower<'_> {
 
     /// The values of guards and watched expressions at the present point.
     pub(super) fn watched_values(&mut self) -> Vec<f64> {
-        let mut values = vec![0.0; self.compiled.outputs];
         self.variables[..self.n].copy_from_slice(&self.x);
         self.variables[self.n] = self.t;
+        self.values_there()
+    }
+
+    /// The same at the state that the variables hold.
+    fn values_there(&self) -> Vec<f64> {
+        let mut values = vec![0.0; self.compiled.outputs];
         self.compiled.watched.evaluate(&self.variables, &mut values);
         values
     }

@@ -47,6 +47,7 @@ impl Follower<'_> {
         for guard in &sliding {
             config.sides[*guard] = self.low(*guard);
         }
+        config.slid = if self.equation.has_domain_ends { sliding.clone() } else { Vec::new() };
         self.follow_sides(&mut config, &sliding);
         let also = self.asked_beyond(&mut config, &sliding);
         self.slides.fill(false);

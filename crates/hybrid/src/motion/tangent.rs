@@ -23,6 +23,24 @@ use twofold_system::Expression;
 /// Local error of a tangent vector, relative to itself.
 const TANGENT_TOLERANCE: f64 = 1e-9;
 
+/// Nodes and coefficients of Gauss' methods of orders 4 and 6 (Hairer, Norsett & Wanner 1993, tables
+/// II.7.3 and II.7.4). The weights are twice the diagonal.
+const GAUSS_2: ([f64; 2], [[f64; 2]; 2]) = {
+    let d = 0.288_675_134_594_812_9; // sqrt(3)/6
+    ([0.5 - d, 0.5 + d], [[0.25, 0.25 - d], [0.25 + d, 0.25]])
+};
+const GAUSS_3: ([f64; 3], [[f64; 3]; 3]) = {
+    let r = 3.872_983_346_207_417; // sqrt(15)
+    (
+        [0.5 - r / 10.0, 0.5, 0.5 + r / 10.0],
+        [
+            [5.0 / 36.0, 2.0 / 9.0 - r / 15.0, 5.0 / 36.0 - r / 30.0],
+            [5.0 / 36.0 + r / 24.0, 2.0 / 9.0, 5.0 / 36.0 - r / 24.0],
+            [5.0 / 36.0 + r / 30.0, 2.0 / 9.0 + r / 15.0, 5.0 / 36.0],
+        ],
+    )
+};
+
 type D = Dual<f64, 1>;
 type DD = Dual<D, 1>;
 
@@ -62,6 +80,7 @@ impl Follower<'_> {
     /// Carries the tangent vectors through a step, by the derivative of its stages; gives the
     /// largest error that the embedded formula estimates, relative to the vector.
     pub(super) fn carry(&mut self, step: &Step) -> f64 {
+        const ULPS: f64 = 8.0 * f64::EPSILON;
         let Some(mut tangents) = self.tangents.take() else { return 0.0 };
         let n = self.n;
         let mut worst = 0.0_f64;
@@ -87,15 +106,55 @@ impl Follower<'_> {
                 k.push(self.slope_beside(step.t + C[s] * step.h, &x, &v));
                 end = v;
             }
+            let mut error: Vec<f64> = (0..n)
+                .map(|i| E.iter().zip(&k).map(|(e, k)| e * k[i]).sum::<f64>() * step.h)
+                .collect();
+            if !end.iter().chain(&error).all(|v| v.is_finite()) {
+                let rough = self.carried_beside_roots(step, y, &GAUSS_2);
+                end = self.carried_beside_roots(step, y, &GAUSS_3);
+                error = end.iter().zip(&rough).map(|(a, b)| a - b).collect();
+                // On the last numbers before the root nothing is resolved, and little changes.
+                let moves = |(a, b): (&f64, &f64)| (a - b).abs() > ULPS * a.abs();
+                if !end.iter().all(|v| v.is_finite()) && !step.x.iter().zip(&step.y).any(moves) {
+                    (end, error) = (y.clone(), vec![0.0; n]);
+                }
+            }
             let size = y.iter().chain(&end).fold(0.0_f64, |most, v| most.max(v.abs()));
-            for i in 0..n {
-                let error: f64 = E.iter().zip(&k).map(|(e, k)| e * k[i]).sum::<f64>() * step.h;
+            for error in error {
                 worst = worst.max(error.abs() / size.max(f64::MIN_POSITIVE));
             }
             *y = end;
         }
         self.tangents = Some(tangents);
         worst
+    }
+
+    /// A tangent vector through a step at whose beginning or end a root is zero and its rate grows
+    /// like one over the root of the time: by collocation (Hairer, Norsett & Wanner 1993, sec.
+    /// II.7) in s, where the time is h s^2 (3 - 2 s), of which it is a smooth function.
+    fn carried_beside_roots<const K: usize>(
+        &mut self,
+        step: &Step,
+        y: &[f64],
+        (nodes, weights): &([f64; K], [[f64; K]; K]),
+    ) -> Vec<f64> {
+        /// Each iteration gains the digits of the change in the step.
+        const ITERATIONS: usize = 12;
+        let (mut rates, mut x) = (vec![vec![0.0; y.len()]; K], vec![0.0; y.len()]);
+        let sum = |weight: &dyn Fn(usize) -> f64, rates: &[Vec<f64>]| -> Vec<f64> {
+            let of = |i: usize| (0..K).map(|j| weight(j) * rates[j][i]).sum::<f64>();
+            y.iter().enumerate().map(|(i, y)| y + of(i)).collect()
+        };
+        for _ in 0..ITERATIONS {
+            for (stage, s) in nodes.iter().enumerate() {
+                let (time, clock) = (s * s * (3.0 - 2.0 * s), 6.0 * s * (1.0 - s) * step.h);
+                step.at(time, &mut x);
+                let v = sum(&|j| weights[stage][j], &rates);
+                let slope = self.slope_along(step.t + time * step.h, &x, &v);
+                rates[stage] = slope.iter().map(|v| clock * v).collect();
+            }
+        }
+        sum(&|j| weights[j][j] * 2.0, &rates)
     }
 
     /// Whether a step is too long for the tangent vectors: by which factor it should be shorter.
@@ -280,6 +339,9 @@ impl Follower<'_> {
     /// proportional to its distance, whichever side it is on.
     pub(super) fn begin_tangents(&mut self, mut vectors: Vec<Vec<f64>>) -> Result<(), HybridError> {
         let (n, k) = (self.n, self.sliding.len());
+        if self.dependent {
+            return Err(self.no_tangents("motion begins on surfaces that depend on each other"));
+        }
         if k > 0 {
             let (t, x) = (self.t, self.x.clone());
             self.variables[..n].copy_from_slice(&x);
@@ -321,8 +383,7 @@ impl Follower<'_> {
                     compiled.place(*guard).map_or(f64::NAN, |p| in_time[p] - moved[p])
                 };
                 let off: Vec<f64> = self.sliding.iter().map(off).collect();
-                let solved = (!self.dependent).then(|| solve_any(&matrix, &off, 0.0)).flatten();
-                let Some(weights) = solved else {
+                let Some(weights) = solve_any(&matrix, &off, 0.0) else {
                     return Err(self.no_tangents("motion begins where sliding is not defined"));
                 };
                 for (weight, added) in weights.iter().zip(&added) {
@@ -1277,6 +1338,9 @@ fn turn(
     }
     let Tangents { vectors, bounds, pieces, sides, .. } =
         follower.tangents.take().unwrap_or_default();
+    if !vectors.iter().flatten().all(|v| v.is_finite()) {
+        return Err(follower.no_tangents("their motion has no finite derivative"));
+    }
     // In whatever order: where a period begins they are as many.
     let of_sides = |signs: &String| signs.bytes().fold(0, |hash, b| hashed(hash, u64::from(b)));
     let on = sides.iter().map(of_sides).fold(0, u64::wrapping_add);
