@@ -270,6 +270,26 @@ impl RunFlags {
     fn switch(&self) -> Switch {
         self.switch.unwrap_or_default()
     }
+    /// The switch in words, if no flag chooses it, the system has one, and no axis varies it.
+    pub fn default_switch(&self, axes: &[Axis]) -> Option<String> {
+        let chosen = self.spec.is_some()
+            || self.switch.is_some()
+            || self.eps.is_some()
+            || self.transition.is_some()
+            || self.sigma.is_some()
+            || axes.iter().any(|axis| {
+                matches!(axis.coordinate, Coordinate::Eps | Coordinate::Sigma)
+                    || axis.coordinate == Coordinate::Parameter("eps".into())
+            });
+        (!chosen && self.described_system().is_ok()).then(|| {
+            format!(
+                "smoothed with eps = {} (the default; --switch filippov for the discontinuous \
+                    system)",
+                Short(EPS)
+            )
+        })
+    }
+
     /// Whether the switch is the smoothed one.
     pub fn is_smoothed(&self) -> bool {
         self.switch() == Switch::Smoothed

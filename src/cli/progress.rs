@@ -8,10 +8,12 @@ use std::time::{Duration, Instant};
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::Exit;
+use super::flags::RunFlags;
 use super::interrupt::{self, Grace};
 use super::speak::{complain, harmless};
 use crate::integrate::Monitor;
 use crate::job;
+use crate::job::sweep::Axis;
 
 /// The bars on the screen, if there are any: a signal clears them away.
 static BARS: OnceLock<MultiProgress> = OnceLock::new();
@@ -92,6 +94,13 @@ impl Progress {
             _ => None,
         };
         RunProgress { progress: self, bar, name: name.to_owned(), t_end, begun: Instant::now() }
+    }
+
+    /// Says which rule stands for the discontinuity, if no flag chose one.
+    pub fn say_default_switch(&self, flags: &RunFlags, axes: &[Axis]) {
+        if let Some(rule) = flags.default_switch(axes) {
+            self.line(&rule);
+        }
     }
 
     /// One line for the user, above any bars.

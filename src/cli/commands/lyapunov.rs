@@ -144,6 +144,7 @@ pub fn run(arguments: &Arguments) -> Result<cli::Exit, CliError> {
     let format = ending::format(out, arguments.format, Format::Text)?;
     try_delivery(out)?;
     let progress = Progress::with_grace(arguments.delivery.quiet);
+    progress.say_default_switch(&arguments.flags, &[]);
     let answer = match (Executor::new(None, &progress).ask(&question), progress.asked_to_stop()) {
         (Err(JobError::Interrupted), Some(exit)) => {
             return Err(CliError::Stopped {
@@ -201,6 +202,7 @@ fn of_general(arguments: &Arguments, question: &GeneralExponents) -> Result<cli:
     let format = ending::format(out, arguments.format, Format::Text)?;
     try_delivery(out)?;
     let progress = Progress::with_grace(arguments.delivery.quiet);
+    progress.say_default_switch(&arguments.flags, &[]);
     let answer = Executor::new(None, &progress).ask(question)?;
     let fact = |e| CliError::Job(JobError::Fact(e));
     let found: Vec<MeanRate> = answer.fact("exponents").map_err(fact)?;

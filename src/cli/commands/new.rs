@@ -8,8 +8,7 @@ use crate::hybrid;
 use crate::system::definition::State;
 use crate::system::library;
 
-/// Write a commented system file that runs as it stands, to be changed: `twofold run --system
-/// FILE`.
+/// Write a commented system file that runs as it stands, to be changed.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  twofold new my.toml\n  twofold new my-circuit.toml --from chua\n  \
@@ -86,9 +85,12 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     }
     let name = file.display();
     let written: Vec<String> = files.iter().map(|(f, _)| f.display().to_string()).collect();
+    // A general system has no switch to choose.
+    let is_general = hybrid::definition::is_general(text, false);
+    let switch = if is_general { "" } else { " --switch filippov" };
     print(&format!(
-        "wrote {}; try\n  twofold plot --system {name} --out picture.png\n  twofold run --system \
-            {name} --t-end 20",
+        "wrote {}; try\n  twofold plot --system {name}{switch} --out picture.png\n  twofold run \
+            --system {name}{switch} --t-end 20",
         written.join(" and ")
     ))?;
     Ok(Exit::Fine)

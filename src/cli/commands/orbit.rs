@@ -254,6 +254,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let format = ending::format(out, arguments.format, Format::Text)?;
     try_delivery(out)?;
     let progress = Progress::with_grace(arguments.delivery.quiet);
+    progress.say_default_switch(&arguments.flags, &[]);
     let answer = match Executor::new(None, &progress).ask(&question) {
         Err(JobError::Interrupted) if progress.asked_to_stop().is_some() => {
             let exit = progress.asked_to_stop().unwrap_or(Exit::Interrupted);
@@ -292,6 +293,7 @@ fn of_general(arguments: &Arguments, question: &GeneralOrbit) -> Result<Exit, Cl
     }
     try_delivery(out)?;
     let progress = Progress::with_grace(arguments.delivery.quiet);
+    progress.say_default_switch(&arguments.flags, &[]);
     let answer = match Executor::new(None, &progress).ask(question) {
         Err(JobError::Interrupted) if progress.asked_to_stop().is_some() => {
             let exit = progress.asked_to_stop().unwrap_or(Exit::Interrupted);

@@ -30,8 +30,7 @@ use crate::render::{RenderError, markup, render};
 /// same command makes the same bytes on any machine.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
-    twofold plot --system stick-slip --switch filippov --exit at-once:plus --t-end 30 --out \
-    stick-slip.png\n  \
+    twofold plot --system stick-slip --switch filippov --t-end 30 --out stick-slip.png\n  \
     twofold plot --system my.toml --set gain=2 --kind series --axes x,v --out my.svg\n  \
     twofold plot --reading reconstructed --t-end 2000 --section y=0 --out section.pdf\n  \
     twofold run --system wheel --t-end 60 --out wheel.csv && twofold plot --from wheel.csv \
@@ -207,6 +206,9 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     plot::axes(&frame, look.kind, &look.axes).map_err(unsuitable)?;
     try_delivery(Some(&arguments.out))?;
     let progress = Progress::new(arguments.quiet);
+    if recorded.is_none() {
+        progress.say_default_switch(&arguments.flags, &[]);
+    }
     let answer = match recorded {
         Some((_, answer)) => answer,
         None => (*Executor::new(None, &progress).ask(&Run(spec.clone()))?).clone(),
@@ -247,6 +249,7 @@ fn draw_general(
     plot::axes(&frame, look.kind, &look.axes).map_err(unsuitable)?;
     try_delivery(Some(&arguments.out))?;
     let progress = Progress::new(arguments.quiet);
+    progress.say_default_switch(&arguments.flags, &[]);
     let answer = Executor::new(None, &progress).ask(&run)?;
     let end: f64 = answer.fact("t").map_err(JobError::from)?;
     let mut small_print = vec![general_small_print(&run, end)];

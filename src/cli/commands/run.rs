@@ -92,6 +92,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         return Err(CliError::Usage(why.into()));
     }
     let progress = Progress::with_grace(arguments.delivery.quiet);
+    progress.say_default_switch(&arguments.flags, &[]);
     let run = Run(spec);
     let exit = record(&run, format, out, &progress)?;
     if arguments.horizon {
@@ -115,6 +116,7 @@ fn general_run(arguments: &Arguments, run: &GeneralRun) -> Result<Exit, CliError
     let format = ending::format(out, arguments.format, Format::Csv)?;
     try_delivery(out)?;
     let progress = Progress::with_grace(arguments.delivery.quiet);
+    progress.say_default_switch(&arguments.flags, &[]);
     let title = run.model.definition().title();
     if let Format::Json = format {
         let answer = Executor::new(None, &progress).ask(run)?;

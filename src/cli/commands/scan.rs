@@ -265,6 +265,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         try_delivery(Some(file))?;
     }
     let progress = Progress::with_grace(arguments.delivery.quiet);
+    progress.say_default_switch(&arguments.flags, &arguments.over);
     let runs = scan.runs();
     let monitor = job::Progress::begin(&progress, "scan", runs as f64);
     let found = in_pool(arguments.threads, || scan.compute(&*monitor))?;

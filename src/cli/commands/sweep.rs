@@ -224,6 +224,7 @@ fn computed(arguments: &Arguments) -> Result<Exit, CliError> {
     }
     let pending = Pending::of(&rows, arguments.shard);
     let progress = Progress::with_grace(arguments.quiet);
+    progress.say_default_switch(&arguments.flags, &arguments.over);
     if arguments.resume {
         progress.line(&format!("{} rows are there, {} to compute", rows.len(), pending.left()));
     }
