@@ -50,7 +50,12 @@ pub struct FigureFlags {
     #[arg(long, value_name = "SEED", allow_negative_numbers = true)]
     seed: Option<u64>,
     /// Another final time; the picture is marked as shortened.
-    #[arg(long, value_name = "T", allow_negative_numbers = true)]
+    #[arg(
+        long,
+        value_parser = crate::cli::flags::time,
+        value_name = "T",
+        allow_negative_numbers = true
+    )]
     t_end: Option<f64>,
     /// Another integration method; the picture is marked.
     #[arg(long, value_enum, value_name = "METHOD")]

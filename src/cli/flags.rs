@@ -42,41 +42,41 @@ pub struct RunFlags {
     #[arg(long, value_name = "READING", help = reading_help(), help_heading = "System")]
     pub reading: Option<String>,
     /// The caricature's alpha, the strength of its drift [default: the reading's].
-    #[arg(long, allow_hyphen_values = true, help_heading = "System")]
+    #[arg(long, value_parser = plain, allow_hyphen_values = true, help_heading = "System")]
     pub alpha: Option<f64>,
     /// The caricature's beta, the strength of its attraction [default: the reading's].
-    #[arg(long, allow_hyphen_values = true, help_heading = "System")]
+    #[arg(long, value_parser = plain, allow_hyphen_values = true, help_heading = "System")]
     pub beta: Option<f64>,
     /// The caricature's v+ [default: -1.2].
-    #[arg(long, allow_hyphen_values = true, help_heading = "System")]
+    #[arg(long, value_parser = plain, allow_hyphen_values = true, help_heading = "System")]
     pub v_plus: Option<f64>,
     /// The caricature's v- [default: -1.4].
-    #[arg(long, allow_hyphen_values = true, help_heading = "System")]
+    #[arg(long, value_parser = plain, allow_hyphen_values = true, help_heading = "System")]
     pub v_minus: Option<f64>,
     /// Delay of the delayed switch.
-    #[arg(long, allow_hyphen_values = true, help_heading = "System")]
+    #[arg(long, value_parser = time, allow_hyphen_values = true, help_heading = "System")]
     pub delay: Option<f64>,
     /// Orbit before the start of a run with a delayed switch [default: constant].
     #[arg(long, value_enum, help_heading = "System")]
     pub history: Option<History>,
     /// Half the width of a relay's band.
-    #[arg(long, allow_hyphen_values = true, help_heading = "System")]
+    #[arg(long, value_parser = plain, allow_hyphen_values = true, help_heading = "System")]
     pub band: Option<f64>,
     /// Initial field of a relay whose start lies inside its band [default: sign].
     #[arg(long, value_enum, help_heading = "System")]
     pub inside: Option<Inside>,
     /// Width of the layer of a smoothed switch, half the width of a hysteretic one [default:
     /// 0.001; with --switch delayed none, which is the sharp rule].
-    #[arg(long, allow_hyphen_values = true, help_heading = "System")]
+    #[arg(long, value_parser = plain, allow_hyphen_values = true, help_heading = "System")]
     pub eps: Option<f64>,
     /// Transition function of the smoothed switch [default: tanh].
     #[arg(long, value_enum, help_heading = "System")]
     pub transition: Option<Transition>,
     /// Size of the tanh transition's perturbation (fig. 8) [default: none].
-    #[arg(long, allow_hyphen_values = true, help_heading = "System")]
+    #[arg(long, value_parser = plain, allow_hyphen_values = true, help_heading = "System")]
     pub sigma: Option<f64>,
     /// Relaxation time of the hysteretic switch [default: 10 eps].
-    #[arg(long, allow_hyphen_values = true, help_heading = "System")]
+    #[arg(long, value_parser = plain, allow_hyphen_values = true, help_heading = "System")]
     pub eps_prime: Option<f64>,
     /// Reading of the two divisions by eps-prime in eq. (10): both, as printed, or one [default:
     /// literal].
@@ -86,6 +86,7 @@ pub struct RunFlags {
     /// suggests].
     #[arg(
         long,
+        value_parser = plain,
         value_name = "X,Y,...",
         value_delimiter = ',',
         allow_hyphen_values = true,
@@ -93,10 +94,10 @@ pub struct RunFlags {
     )]
     pub start: Option<Vec<f64>>,
     /// Time at which the run of a general system begins [default: 0].
-    #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
+    #[arg(long, value_parser = time, allow_hyphen_values = true, help_heading = "Method")]
     pub t_start: Option<f64>,
     /// Final time [default: 150; of an exponent 10000].
-    #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
+    #[arg(long, value_parser = time, allow_hyphen_values = true, help_heading = "Method")]
     pub t_end: Option<f64>,
     /// Integration method [default: lsoda; dopri5 with --switch filippov, delayed or relay, and of
     /// general systems and those of more than four states, which take dopri5, lsoda, radau5 and
@@ -105,12 +106,12 @@ pub struct RunFlags {
     pub method: Option<Method>,
     /// Relative tolerance [default: 10^-7.97727, NDSolve's; with taylor-extended 1e-32 or what
     /// --precision allows; of exponents 1e-9, of closed orbits 1e-11, of general systems 1e-10].
-    #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
+    #[arg(long, value_parser = plain, allow_hyphen_values = true, help_heading = "Method")]
     pub rtol: Option<f64>,
     /// Absolute tolerance [default: that of --rtol's default, and from a start of states below
     /// 1e-3 as many powers of ten smaller; of general systems none: --rtol measures each state by
     /// its own size, near zero by a hundredth of its largest one of late].
-    #[arg(long, allow_hyphen_values = true, help_heading = "Method")]
+    #[arg(long, value_parser = plain, allow_hyphen_values = true, help_heading = "Method")]
     pub atol: Option<f64>,
     /// Longest step, inf for any [default: a tenth of the time between restarts or kicks,
     /// NDSolve's; of general systems inf].
@@ -126,13 +127,25 @@ pub struct RunFlags {
     #[arg(long, value_name = "DEGREE", allow_negative_numbers = true, help_heading = "Method")]
     pub order: Option<u16>,
     /// Start the method afresh after each such interval [default: never].
-    #[arg(long, value_name = "INTERVAL", allow_hyphen_values = true, help_heading = "Schedule")]
+    #[arg(
+        long,
+        value_parser = time,
+        value_name = "INTERVAL",
+        allow_hyphen_values = true,
+        help_heading = "Schedule"
+    )]
     pub restart: Option<f64>,
     /// Perturb the state after each such interval [default: never].
-    #[arg(long, value_name = "INTERVAL", allow_hyphen_values = true, help_heading = "Schedule")]
+    #[arg(
+        long,
+        value_parser = time,
+        value_name = "INTERVAL",
+        allow_hyphen_values = true,
+        help_heading = "Schedule"
+    )]
     pub kick_every: Option<f64>,
     /// Size of a kick [default: eps].
-    #[arg(long, allow_hyphen_values = true, help_heading = "Schedule")]
+    #[arg(long, value_parser = plain, allow_hyphen_values = true, help_heading = "Schedule")]
     pub kick_size: Option<f64>,
     /// Distribution of a kick [default: sphere].
     #[arg(long, value_enum, help_heading = "Schedule")]
@@ -151,19 +164,37 @@ pub struct RunFlags {
     #[arg(long, value_name = "RULE", allow_hyphen_values = true, help_heading = "Filippov motion")]
     pub intersection: Option<String>,
     /// Probability of leaving to h > 0 under a random exit rule [default: 0.5].
-    #[arg(long, allow_hyphen_values = true, help_heading = "Filippov motion")]
+    #[arg(long, value_parser = plain, allow_hyphen_values = true, help_heading = "Filippov motion")]
     pub plus_probability: Option<f64>,
     /// Number of exit times of a funnel (--exit all); each is followed to both sides [default: 12].
     #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = "Filippov motion")]
     pub funnel_times: Option<usize>,
     /// Shortest time of repelling sliding in a funnel [default: 0.05].
-    #[arg(long, value_name = "T", allow_hyphen_values = true, help_heading = "Filippov motion")]
+    #[arg(
+        long,
+        value_parser = time,
+        value_name = "T",
+        allow_hyphen_values = true,
+        help_heading = "Filippov motion"
+    )]
     pub funnel_shortest: Option<f64>,
     /// Longest time of repelling sliding in a funnel [default: 2].
-    #[arg(long, value_name = "T", allow_hyphen_values = true, help_heading = "Filippov motion")]
+    #[arg(
+        long,
+        value_parser = time,
+        value_name = "T",
+        allow_hyphen_values = true,
+        help_heading = "Filippov motion"
+    )]
     pub funnel_longest: Option<f64>,
     /// Follow each future so long, or to its next two-fold [default: 50].
-    #[arg(long, value_name = "T", allow_hyphen_values = true, help_heading = "Filippov motion")]
+    #[arg(
+        long,
+        value_parser = time,
+        value_name = "T",
+        allow_hyphen_values = true,
+        help_heading = "Filippov motion"
+    )]
     pub funnel_horizon: Option<f64>,
     /// Seed of the random numbers of kicks and random exits [default: 2013].
     #[arg(long, allow_negative_numbers = true, help_heading = "Random numbers")]
@@ -181,10 +212,16 @@ pub struct RunFlags {
     pub section: Option<String>,
     /// Largest distance between the recorded polyline and the path; from a state that moves over
     /// less than 0.003 at most a thousandth of that [default: 0.001; of a picture 0.0001].
-    #[arg(long, allow_hyphen_values = true, help_heading = "Recording")]
+    #[arg(long, value_parser = plain, allow_hyphen_values = true, help_heading = "Recording")]
     pub chord: Option<f64>,
     /// Record the state at the multiples of this time, instead of points that follow the path.
-    #[arg(long, value_name = "DT", allow_hyphen_values = true, help_heading = "Recording")]
+    #[arg(
+        long,
+        value_parser = time,
+        value_name = "DT",
+        allow_hyphen_values = true,
+        help_heading = "Recording"
+    )]
     pub every: Option<f64>,
     /// Take the whole run from a file made with --print-spec, or from standard input (-); other
     /// flags of the run are then refused.
@@ -1080,6 +1117,32 @@ fn reading_help() -> String {
     format!(
         "Parameters of the caricature, by a reading of its paper: {readings} [default: {first}]"
     )
+}
+
+/// A number of a flag. Whether it is one that makes sense is said where its run is described.
+pub(crate) fn plain(text: &str) -> Result<f64, String> {
+    text.parse().map_err(|_| "not a number; write it like 0.25 or 1e-3".into())
+}
+
+/// A time of a flag.
+pub(crate) fn time(text: &str) -> Result<f64, String> {
+    text.parse().map_err(|_| {
+        "not a number; write it like 0.25 or 1e-3, without a unit: times are in the system's own"
+            .into()
+    })
+}
+
+/// An axis, with advice on the commonest slip: a parameter's name without `params.`.
+pub(crate) fn axis(text: &str) -> Result<Axis, String> {
+    let name = text.split('=').next().unwrap_or_default().trim();
+    let is_name = !name.is_empty() && name.chars().all(|c| c.is_alphanumeric() || c == '_');
+    text.parse::<Axis>().map_err(|error| match name.parse::<Coordinate>() {
+        Err(_) if is_name => format!(
+            "did you mean params.{name} (a parameter), or start.{name} (where a state begins)? \
+                {error}"
+        ),
+        _ => error.to_string(),
+    })
 }
 
 /// A length: a finite number, or the word inf.

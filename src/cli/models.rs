@@ -1,5 +1,6 @@
 //! Systems by name or file, as general ones.
 
+use std::io;
 use std::path::{Path, PathBuf};
 
 use super::CliError;
@@ -11,6 +12,20 @@ use crate::record::files::read_text;
 use crate::system::diagnostic::nearest;
 use crate::system::{Diagnostic, library};
 
+/// Reads a system's file.
+///
+/// # Errors
+/// If it cannot be read, or is no text.
+pub fn read_system(path: &Path) -> Result<String, CliError> {
+    read_text(path).map_err(|error| match error.source.kind() {
+        io::ErrorKind::InvalidData => CliError::Usage(format!(
+            "--system {}: it is not text; a system is a text file, .toml or .json",
+            path.display()
+        )),
+        _ => error.into(),
+    })
+}
+
 /// The system of this name, a general one or one with h, plus and minus read as such.
 ///
 /// # Errors
@@ -21,7 +36,7 @@ pub fn any_model(name: &str, set: &[String]) -> Result<Model, CliError> {
     }
     if names_a_file(name) {
         // The reader says why it cannot be read.
-        read_text(Path::new(name))?;
+        read_system(Path::new(name))?;
     }
     let (near, known) = known(name);
     Err(CliError::Usage(format!(
@@ -78,7 +93,7 @@ fn is_json(path: &Path) -> bool {
 /// # Errors
 /// If the system's file cannot be read.
 pub fn table_files(path: &Path) -> Result<Vec<PathBuf>, CliError> {
-    let text = read_text(path)?;
+    let text = read_system(path)?;
     let folder = path.parent().unwrap_or(Path::new(""));
     Ok(definition(path, &text, "").map_or_else(
         |_| Vec::new(),
@@ -100,7 +115,7 @@ pub fn named(name: &str, set: &[String], any: bool) -> Result<Option<Model>, Cli
             if library::text(name).is_some() || !path.is_file() {
                 return Ok(None);
             }
-            let text = read_text(path)?;
+            let text = read_system(path)?;
             if !any && !is_general(&text, is_json(path)) {
                 return Ok(None);
             }

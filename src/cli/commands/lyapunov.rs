@@ -34,7 +34,13 @@ pub struct Arguments {
     flags: RunFlags,
     /// Time before averaging begins, in which the orbit settles and the vector turns into the
     /// fastest direction [default: a tenth of --t-end].
-    #[arg(long, value_name = "T", allow_hyphen_values = true, help_heading = "Exponent")]
+    #[arg(
+        long,
+        value_parser = crate::cli::flags::time,
+        value_name = "T",
+        allow_hyphen_values = true,
+        help_heading = "Exponent"
+    )]
     transient: Option<f64>,
     /// Output format [default: what the name of --out ends in, else text].
     #[arg(long, value_enum)]

@@ -11,6 +11,7 @@ use crate::system::library;
 /// Write a commented system file that runs as it stands, to be changed.
 #[derive(Debug, clap::Args)]
 #[command(
+    override_usage = "twofold new [OPTIONS] <FILE>\n       twofold new --list",
     after_help = "Examples:\n  twofold new my.toml\n  twofold new my-circuit.toml --from chua\n  \
         twofold new my-ball.toml --from bouncing-ball\n  twofold new --list"
 )]

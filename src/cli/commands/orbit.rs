@@ -54,11 +54,18 @@ pub struct Arguments {
     #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = "Orbit")]
     returns: Option<usize>,
     /// Time in which the motion settles before the search; 0: none [default: 200].
-    #[arg(long, value_name = "T", allow_hyphen_values = true, help_heading = "Orbit")]
+    #[arg(
+        long,
+        value_parser = crate::cli::flags::time,
+        value_name = "T",
+        allow_hyphen_values = true,
+        help_heading = "Orbit"
+    )]
     settle: Option<f64>,
     /// Give up on a return after this time.
     #[arg(
         long,
+        value_parser = crate::cli::flags::time,
         value_name = "T",
         default_value_t = 1000.0,
         allow_hyphen_values = true,
@@ -75,7 +82,13 @@ pub struct Arguments {
     )]
     along: Option<String>,
     /// Period of a general system that depends on the time, instead of --section.
-    #[arg(long, value_name = "T", allow_hyphen_values = true, help_heading = "Orbit")]
+    #[arg(
+        long,
+        value_parser = crate::cli::flags::time,
+        value_name = "T",
+        allow_hyphen_values = true,
+        help_heading = "Orbit"
+    )]
     period: Option<f64>,
     /// Output format [default: what the name of --out ends in, else text].
     #[arg(long, value_enum)]

@@ -45,6 +45,7 @@ pub struct Arguments {
     /// FROM..TO:log:COUNT or a,b,c; once or twice.
     #[arg(
         long,
+        value_parser = crate::cli::flags::axis,
         value_name = "NAME=VALUES",
         required = true,
         allow_hyphen_values = true,
@@ -53,11 +54,23 @@ pub struct Arguments {
     over: Vec<Axis>,
     /// Over two settings, attractors this near (as a share of the largest number in any start or
     /// attractor) have one number [default: 0.01].
-    #[arg(long, value_name = "SHARE", allow_hyphen_values = true, help_heading = "Scan")]
+    #[arg(
+        long,
+        value_parser = crate::cli::flags::plain,
+        value_name = "SHARE",
+        allow_hyphen_values = true,
+        help_heading = "Scan"
+    )]
     alike: Option<f64>,
     /// Period of a general system that depends on the time: its states at the multiples of it,
     /// instead of a --section.
-    #[arg(long, value_name = "T", allow_hyphen_values = true, help_heading = "Scan")]
+    #[arg(
+        long,
+        value_parser = crate::cli::flags::time,
+        value_name = "T",
+        allow_hyphen_values = true,
+        help_heading = "Scan"
+    )]
     period: Option<f64>,
     /// Over one setting, begin each run where that of the value below or above ended; both: up,
     /// then down. Not for switches with a memory.

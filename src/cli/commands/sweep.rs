@@ -61,7 +61,12 @@ pub struct Arguments {
     #[command(flatten)]
     flags: RunFlags,
     /// Vary this; may be repeated, and rows then run over all combinations, the last axis fastest.
-    #[arg(long, value_name = "NAME=VALUES", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_parser = crate::cli::flags::axis,
+        value_name = "NAME=VALUES",
+        allow_hyphen_values = true
+    )]
     over: Vec<Axis>,
     /// Draw axes given as FROM..TO this many times for each combination of the others.
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
@@ -71,7 +76,12 @@ pub struct Arguments {
     random_seed: Option<u64>,
     /// Period of a general system that depends on the time: its states at the multiples of it are
     /// compared, instead of those at a --section.
-    #[arg(long, value_name = "T", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_parser = crate::cli::flags::time,
+        value_name = "T",
+        allow_hyphen_values = true
+    )]
     period: Option<f64>,
     /// Number of runs: short for --over shift.NAME=SHIFT*RUNS with the first component's name
     /// [default: 40].
@@ -79,7 +89,7 @@ pub struct Arguments {
     runs: Option<u64>,
     /// With --runs: the first component of the start is shifted by this, twice this, three times
     /// this ... [default: 1e-9].
-    #[arg(long, allow_hyphen_values = true)]
+    #[arg(long, value_parser = crate::cli::flags::plain, allow_hyphen_values = true)]
     shift: Option<f64>,
     /// Compute only every Nth row, from the Kth on.
     #[arg(long, value_name = "K/N", default_value = "1/1")]

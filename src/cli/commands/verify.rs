@@ -35,7 +35,8 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let mut rows = Vec::new();
     for file in &arguments.files {
         let shown = file.display().to_string();
-        match verify(&read_text(file)?) {
+        let text = read_text(file)?;
+        match verify(&text) {
             Ok(v) => {
                 if !arguments.json {
                     print(&format!("{}: verified", v.theorem))?;
@@ -49,10 +50,11 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
                 }));
             }
             Err(Refused::Unreadable(why)) => {
-                return Err(CliError::Usage(format!(
-                    "{shown}: not a certificate: {}",
-                    harmless(&why)
-                )));
+                let why = match serde_json::from_str::<serde::de::IgnoredAny>(&text) {
+                    Err(_) => "it is not JSON".to_owned(),
+                    Ok(_) => harmless(&why),
+                };
+                return Err(CliError::Usage(format!("{shown}: not a certificate: {why}")));
             }
             Err(wrong @ Refused::Wrong { .. }) => {
                 exit = Exit::CheckFailed;
