@@ -1,6 +1,6 @@
 //! `twofold run`: computes one run of any system.
 
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
 use std::path::Path;
 
 use serde_json::json;
@@ -60,7 +60,23 @@ enum Format {
     Json,
 }
 
+/// Refuses to pour onto a terminal a run that no flag describes.
+fn names_a_run(arguments: &Arguments, terminal: bool) -> Result<(), CliError> {
+    let nothing = arguments.flags.first_given().is_none()
+        && arguments.delivery.out.is_none()
+        && !arguments.print_spec;
+    if terminal && nothing {
+        return Err(CliError::Usage(
+            "name a system: twofold run --system FILE (twofold new my.toml writes one, twofold new \
+                --list names those that are built in)"
+                .into(),
+        ));
+    }
+    Ok(())
+}
+
 pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
+    names_a_run(arguments, io::stdout().is_terminal())?;
     if let Some(run) = general::run_of(&arguments.flags)? {
         return general_run(arguments, &run);
     }
@@ -379,4 +395,33 @@ fn stream(run: &Run, out: Option<&Path>, progress: &Progress) -> Result<Exit, Cl
         file.finish(part.as_deref())?;
     }
     Err(stopped_at(found.t, found.rows, part.as_deref(), exit))
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        arguments: Arguments,
+    }
+
+    #[test]
+    fn a_terminal_gets_no_run_that_no_flag_describes() {
+        let asked = |line: &str, terminal: bool| {
+            let line = Line::parse_from(std::iter::once("run").chain(line.split_whitespace()));
+            names_a_run(&line.arguments, terminal)
+        };
+        let refused = asked("", true).unwrap_err();
+        assert_eq!(refused.exit(), Exit::Usage);
+        assert!(refused.to_string().starts_with("name a system: "), "{refused}");
+        for (line, terminal) in
+            [("", false), ("--out a.csv", true), ("--t-end 1", true), ("--print-spec", true)]
+        {
+            assert!(asked(line, terminal).is_ok(), "{line}");
+        }
+    }
 }
