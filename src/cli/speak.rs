@@ -28,6 +28,34 @@ pub fn with_digits(value: f64, error: f64, places: usize) -> String {
     }
 }
 
+/// A value and its error for people: two digits of the error, and of the value no more than these
+/// leave. The error is rounded up, so that the interval printed holds the one given.
+pub fn with_error(value: f64, error: f64) -> String {
+    let power = |x: f64| format!("{x:e}").split('e').nth(1).and_then(|e| e.parse::<i32>().ok());
+    let size = value.abs().max(error);
+    let (true, Some(first), Some(leading)) =
+        (value.is_finite() && error.is_finite() && error > 0.0, power(error), power(size))
+    else {
+        return format!("{} +- {error:.1e}", with_digits(value, error, 6));
+    };
+    let plain = (1e-3..1e6).contains(&size);
+    // The place of the last digit.
+    let last = if plain { (first - 1).min(0) } else { first - 1 };
+    let shown = match plain {
+        true => format!("{value:.*}", last.unsigned_abs() as usize),
+        false if value == 0.0 => "0".to_owned(),
+        false => format!("{value:.*e}", (leading - last).unsigned_abs() as usize),
+    };
+    let unit: f64 = format!("1e{last}").parse().unwrap_or(f64::NAN);
+    let moved = (value - shown.parse().unwrap_or(value)).abs();
+    // Less what dividing adds to a whole number.
+    let units = ((error + moved) / unit - 1e-9).ceil();
+    match plain && first >= -3 {
+        true => format!("{shown} +- {:.*}", last.unsigned_abs() as usize, units * unit),
+        false => format!("{shown} +- {:.1e}", units * unit),
+    }
+}
+
 /// A state for people: "x = 0.2, y = 1".
 pub fn state_in_words(names: &[&str], state: &[f64]) -> String {
     let said = |(name, x): (&&str, &f64)| format!("{name} = {}", Short(*x));
@@ -148,6 +176,36 @@ mod tests {
         let text = "a\u{1b}[2Jb\u{9b}2Jc\rd\u{7}e\u{202e}f\u{7f}g\nh é ε′";
         let said = harmless(text);
         assert_eq!(said, "a\u{fffd}[2Jb\u{fffd}2Jc\u{fffd}d\u{fffd}e\u{fffd}f\u{fffd}g\nh é ε′");
+    }
+
+    #[test]
+    fn a_value_has_no_more_digits_than_its_error() {
+        for (value, error, shown) in [
+            (0.330_59, 0.125, "0.33 +- 0.13"),
+            (0.330_59, 0.13, "0.33 +- 0.14"),
+            (0.0, 1.5e-3, "0.0000 +- 0.0015"),
+            (1234.56, 250.0, "1235 +- 251"),
+            (2.714_6e-5, 1.1e-6, "2.71e-5 +- 1.2e-6"),
+            (0.0, 1e-9, "0 +- 1.0e-9"),
+            (f64::NEG_INFINITY, 0.0, "-inf +- 0.0e0"),
+        ] {
+            assert_eq!(with_error(value, error), shown);
+        }
+    }
+
+    #[test]
+    fn an_error_that_is_shown_covers_the_interval() {
+        for value in [0.330_59, -12.345_678, 4.0e-7, 1.234e8, 0.05] {
+            for error in [2.0e-9, 3.33e-4, 0.049, 0.1, 9.99] {
+                let shown = with_error(value, error);
+                let (near, wide) = shown.split_once(" +- ").unwrap();
+                let [near, wide] = [near, wide].map(|n| n.parse::<f64>().unwrap());
+                let slack = 1e-8 * error + 4.0 * f64::EPSILON * value.abs();
+                assert!((near - value).abs() + error <= wide + slack, "{shown}");
+                let enough = 1.2 * error + 2.0 * f64::EPSILON * value.abs();
+                assert!(wide <= enough.max(error + 1.0), "{shown}");
+            }
+        }
     }
 
     #[test]

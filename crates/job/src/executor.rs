@@ -191,7 +191,8 @@ fn said(answer: &Answer) -> String {
     let rows = if answer.tables.is_empty() {
         "done".to_owned()
     } else {
-        format!("{} rows", answer.rows())
+        let count = answer.rows();
+        format!("{count} row{}", if count == 1 { "" } else { "s" })
     };
     let work =
         answer.statistics.as_ref().map(|s| format!("{} steps, {rows}", s.steps)).unwrap_or(rows);

@@ -9,7 +9,7 @@ use crate::cli::ending;
 use crate::cli::flags::{RunFlags, Use};
 use crate::cli::general;
 use crate::cli::progress::Progress;
-use crate::cli::speak::{Delivery, deliver, try_delivery, with_digits};
+use crate::cli::speak::{Delivery, deliver, try_delivery, with_error};
 use crate::cli::{self, CliError};
 use crate::integrate::StepCap;
 use crate::job::general::{GeneralExponents, GeneralRun, MeanRate};
@@ -178,9 +178,9 @@ pub fn run(arguments: &Arguments) -> Result<cli::Exit, CliError> {
                 Sign::Zero => "not distinguishable from zero",
             };
             let until = transient + found.duration;
-            let value = with_digits(value, half_width, 6);
+            let value = with_error(value, half_width);
             format!(
-                "{value} +- {half_width:.1e} per unit time ({meaning}; mean over t = \
+                "{value} per unit time ({meaning}; mean over t = \
                     {transient} to {until}, 95 % interval)\n"
             )
             .into_bytes()
@@ -235,8 +235,8 @@ fn of_general(arguments: &Arguments, question: &GeneralExponents) -> Result<cli:
                 } else {
                     String::new()
                 };
-                let value = with_digits(value, *half_width, 6);
-                text += &format!("{value} +- {half_width:.1e} per unit time ({meaning}{mean})\n");
+                let value = with_error(value, *half_width);
+                text += &format!("{value} per unit time ({meaning}{mean})\n");
             }
             if found.len() < question.count {
                 let missing = question.count - found.len();

@@ -530,7 +530,7 @@ fn complex(numbers: &[[f64; 2]], error: f64) -> String {
         return "none: with one state there is no direction off the orbit".into();
     }
     let said = |m: &[f64; 2]| {
-        let real = with_digits(m[0], error, 9);
+        let real = if m[0] == 0.0 { "0".to_owned() } else { with_digits(m[0], error, 9) };
         let sign = if m[1] < 0.0 { '-' } else { '+' };
         match with_digits(m[1].abs(), error, 9) {
             _ if m[1] == 0.0 => real,

@@ -89,7 +89,10 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let bytes = match format {
         Format::Text => {
             let found: Vec<Resting> = answer.fact("rests").map_err(JobError::from)?;
-            let lines: Vec<String> = found.iter().map(|rest| line(rest, &names, several)).collect();
+            let sizes: Vec<f64> =
+                question.within.iter().map(|(low, high)| low.abs().max(high.abs())).collect();
+            let lines: Vec<String> =
+                found.iter().map(|rest| line(rest, &names, &sizes, several)).collect();
             let none = "no rest was found in the box (--within)".to_owned();
             format!("{}\n", if lines.is_empty() { none } else { lines.join("\n") }).into_bytes()
         }
@@ -101,8 +104,20 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     Ok(Exit::Fine)
 }
 
-fn line(rest: &Resting, names: &[&str], with_mode: bool) -> String {
-    let point = |state: &[f64]| state_in_words(names, state);
+/// A number to twelve digits; what is within rounding of `size` is 0.
+fn rounded(x: f64, size: f64) -> f64 {
+    match size.is_finite() && x.abs() <= 1e-15 * size {
+        true => 0.0,
+        false => format!("{x:.11e}").parse().unwrap_or(x),
+    }
+}
+
+/// A rest for people; `sizes` are those of the box that was searched.
+fn line(rest: &Resting, names: &[&str], sizes: &[f64], with_mode: bool) -> String {
+    let point = |state: &[f64]| {
+        let state: Vec<f64> = state.iter().zip(sizes).map(|(x, size)| rounded(*x, *size)).collect();
+        state_in_words(names, &state)
+    };
     let changes = rest.family.as_ref().is_some_and(|f| f.changes);
     let on = |surfaces: &str, moves: &str| {
         format!("pseudo-equilibrium on {surfaces} = 0{}", if changes { "" } else { moves })
@@ -117,7 +132,7 @@ fn line(rest: &Resting, names: &[&str], with_mode: bool) -> String {
                 Some(false) => ", which repels",
                 None => ", to which the fields are tangent",
             };
-            (on(surface, moves), format!(" (weight {weight})"))
+            (on(surface, moves), format!(" (weight {})", rounded(*weight, 1.0)))
         }
         RestPlace::Intersection { surfaces, weights, attracting } => {
             let moves = match attracting {
@@ -125,7 +140,8 @@ fn line(rest: &Resting, names: &[&str], with_mode: bool) -> String {
                 Some(false) => ", which repel",
                 None => ", and the fields there do not tell whether these attract",
             };
-            let weights: Vec<String> = weights.iter().map(f64::to_string).collect();
+            let weights: Vec<String> =
+                weights.iter().map(|w| rounded(*w, 1.0).to_string()).collect();
             (on(&surfaces.join(" = 0 and "), moves), format!(" (weights {})", weights.join(", ")))
         }
     };
@@ -146,12 +162,14 @@ fn line(rest: &Resting, names: &[&str], with_mode: bool) -> String {
             format!("one of a set of {dimension} dimensions: {}", point(&rest.state))
         }
     };
+    let largest = rest.eigenvalues.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
     let values: Vec<String> = rest
         .eigenvalues
         .iter()
+        .map(|value| value.map(|x| rounded(x, largest)))
         .map(|[re, im]| match im {
             0.0 => format!("{re}"),
-            im if *im < 0.0 => format!("{re} - {}i", -im),
+            im if im < 0.0 => format!("{re} - {}i", -im),
             im => format!("{re} + {im}i"),
         })
         .collect();
@@ -166,4 +184,22 @@ fn line(rest: &Resting, names: &[&str], with_mode: bool) -> String {
         .map(|event| format!("; behind the event {event:?}, which changes motion before"));
     let behind = behind.unwrap_or_default();
     format!("{place}{mode}: {state}{weights}; {}{values}{behind}", rest.kind)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::rounded;
+
+    #[test]
+    fn numbers_of_rests_are_shown_without_rounding_errors() {
+        for (x, size, shown) in [
+            (0.862_499_999_999_999_9, 10.0, 0.8625),
+            (-6.162_975_822_039_155e-33, 10.0, 0.0),
+            (1e-12, 10.0, 1e-12),
+            (3e-20, 1e-18, 3e-20),
+            (1e-20, f64::INFINITY, 1e-20),
+        ] {
+            assert_eq!(rounded(x, size), shown, "{x}");
+        }
+    }
 }
