@@ -375,9 +375,9 @@ fn the_table_knows_every_command_and_flag() {
     };
     let commands: Vec<String> = help(&[])
         .lines()
-        .skip_while(|l| !l.starts_with("Commands:"))
-        .skip(1)
-        .take_while(|l| l.starts_with("  "))
+        .skip_while(|l| *l != "Systems:")
+        .take_while(|l| !l.starts_with("  -h,"))
+        .filter(|l| l.starts_with("  "))
         .filter_map(|l| l.split_whitespace().next().map(str::to_owned))
         .filter(|c| c != "help")
         .collect();

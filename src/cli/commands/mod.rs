@@ -29,10 +29,10 @@ use super::speak::complain;
 use super::{CliError, Exit, LONG_VERSION, interrupt};
 use crate::paper::{Figure, figures};
 
-/// Reference software for the breakdown of determinism at a two-fold singularity (Jeffrey 2013).
+/// Integrate, draw and examine piecewise-smooth systems, and check papers about them.
 #[derive(Debug, Parser)]
 #[command(name = "twofold", version, long_version = LONG_VERSION, propagate_version = true,
-    max_term_width = 120, after_help = Exit::HELP)]
+    max_term_width = 120, help_template = overview(), after_help = Exit::HELP)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -60,6 +60,60 @@ enum Command {
     Paper(paper::Arguments),
     Completions(manual::Completions),
     Man(manual::Man),
+}
+
+/// The commands with a line each, for `twofold --help`.
+const OVERVIEW: [(&str, &[(&str, &str)]); 3] = [
+    (
+        "Systems",
+        &[
+            ("new", "a system file to start from"),
+            ("run", "one trajectory or Poincaré section"),
+            ("plot", "a picture of a run"),
+            ("orbit", "a closed orbit, its multipliers, its branch along a parameter"),
+            ("lyapunov", "Lyapunov exponents with intervals"),
+            ("rests", "equilibria and pseudo-equilibria"),
+            ("scan", "orbit diagrams, and maps of where runs end"),
+            ("sensitivities", "derivatives of a run's end"),
+            ("sweep", "many runs, resumable, in shards"),
+        ],
+    ),
+    (
+        "Papers and figures",
+        &[
+            ("paper", "a paper as a folder: made, checked, reported"),
+            ("figure", "compute the figures that ship with the program"),
+            ("check", "compare them with their references"),
+            ("report", "one page about them"),
+            ("bless", "make them the references"),
+        ],
+    ),
+    (
+        "Files and the program",
+        &[
+            ("audit", "recompute a sample of a sweep's rows"),
+            ("inspect", "what a picture says of its origin, and its seal"),
+            ("verify", "check a theorem's certificate"),
+            ("store", "answers kept from earlier computations"),
+            ("completions", "completions for a shell"),
+            ("man", "manual pages"),
+            ("help", "the help of a command"),
+        ],
+    ),
+];
+
+/// The template of the program's help.
+fn overview() -> String {
+    let width = OVERVIEW.iter().flat_map(|(_, lines)| *lines).map(|(name, _)| name.len()).max();
+    let width = width.unwrap_or(0);
+    let mut text = String::from("{about}\n\n{usage-heading} {usage}\n");
+    for (heading, lines) in OVERVIEW {
+        text += &format!("\n{heading}:\n");
+        for (name, what) in lines {
+            text += &format!("  {name:width$}  {what}\n");
+        }
+    }
+    text + "\nOptions:\n{options}{after-help}"
 }
 
 /// The definition of every command and flag, from which help, manual pages and docs/commands.md are
@@ -184,6 +238,22 @@ mod tests {
         ] {
             assert_eq!(asked(&words), wanted, "{words:?}");
         }
+    }
+
+    #[test]
+    fn the_overview_has_a_line_for_every_command() {
+        let mut listed: Vec<&str> =
+            OVERVIEW.iter().flat_map(|(_, lines)| *lines).map(|(name, _)| *name).collect();
+        let definition = Arguments::command();
+        let mut known: Vec<&str> = definition.get_subcommands().map(|c| c.get_name()).collect();
+        known.push("help");
+        listed.sort_unstable();
+        known.sort_unstable();
+        assert_eq!(listed, known);
+        let help = Arguments::command().render_long_help().to_string();
+        let long: Vec<&str> = help.lines().filter(|l| l.chars().count() > 120).collect();
+        assert!(long.is_empty(), "{long:?}");
+        assert!(help.contains("\nOptions:\n") && help.contains("\nExit codes: "), "{help}");
     }
 
     #[test]
