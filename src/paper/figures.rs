@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 
 use crate::folder::Folder;
 use crate::paper::Figure;
-use crate::record::{FileBytes, FileError, read_tree};
+use crate::record::{FileBytes, FileError, Manifest, read_tree};
 
 pub use super::code::{FILES, FOLDER, data};
 
@@ -57,13 +57,22 @@ fn beside(expected: &Path) -> Option<PathBuf> {
     Some(checkout.join(FOLDER).join("expected")).filter(|own| own.exists())
 }
 
-/// Reference of a figure: that of the paper's folder if `expected` is a checkout's `figures`, or
-/// NAME/expected.json in a folder of the program's pictures.
+/// Reference of a figure: that of the paper's folder if `expected` is a checkout's `figures`, else
+/// NAME.json in a paper's folder of references, or NAME/expected.json.
 pub fn reference_file(expected: &Path, id: &str) -> PathBuf {
+    let flat = |folder: &Path| folder.join(format!("{id}.json"));
     match beside(expected) {
-        Some(own) => own.join(format!("{id}.json")),
+        Some(own) => flat(&own),
+        None if flat(expected).is_file() => flat(expected),
         None => expected.join(id).join("expected.json"),
     }
+}
+
+/// The figure of a reference that lies in a paper's folder as NAME.json.
+fn flat_reference(file: &FileBytes) -> Option<String> {
+    let name = file.path.strip_suffix(".json").filter(|name| !name.contains('/'))?;
+    let text = String::from_utf8_lossy(&file.bytes);
+    Manifest::parse(&text, name).is_ok_and(|m| m.figure == name).then(|| name.to_owned())
 }
 
 /// The references and pictures in `expected`, each reference as NAME/expected.json.
@@ -73,6 +82,11 @@ pub fn reference_file(expected: &Path, id: &str) -> PathBuf {
 pub fn references_in(expected: &Path) -> Result<Vec<FileBytes>, FileError> {
     let mut files =
         read_tree(expected, &|path| path.ends_with(".json") || path.ends_with(".png"))?.files;
+    for file in &mut files {
+        if let Some(name) = flat_reference(file) {
+            file.path = format!("{name}/expected.json");
+        }
+    }
     if let Some(own) = beside(expected) {
         for FileBytes { path, bytes } in read_tree(&own, &is_manifest)?.files {
             files.push(FileBytes {
@@ -105,6 +119,18 @@ mod tests {
             );
             assert_eq!(references_in(&expected).unwrap().len(), usize::from(beside));
         }
+    }
+
+    #[test]
+    fn a_papers_folder_of_references_is_one_by_itself() {
+        let own = Path::new(env!("CARGO_MANIFEST_DIR")).join(FOLDER).join("expected");
+        assert_eq!(reference_file(&own, "fig7"), own.join("fig7.json"));
+        let found = references_in(&own).unwrap();
+        for figure in all() {
+            let path = format!("{}/expected.json", figure.id);
+            assert!(found.iter().any(|f| f.path == path), "{path}");
+        }
+        assert!(found.iter().all(|f| f.path != "claims/expected.json"));
     }
 
     /// The folder on disk is the one that is embedded, file by file.

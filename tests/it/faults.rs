@@ -745,12 +745,13 @@ fn hostile_pictures_cost_one_line_each() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     fs::write(at("fig1.png"), &bytes).unwrap();
-    let nowhere = at("nowhere");
+    let nothing = at("nothing");
+    fs::create_dir(&nothing).unwrap();
     let inspected = twofold(&[
         "inspect",
         at("fig1.png").to_str().unwrap(),
         "--expected",
-        nowhere.to_str().unwrap(),
+        nothing.to_str().unwrap(),
     ]);
     refuses(&inspected, 1, &["Not made by twofold"]);
     let here = folder.path().to_str().unwrap();

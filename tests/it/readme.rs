@@ -29,8 +29,8 @@ fn golden_table_of_verdicts_is_that_of_the_references() {
         .expect("docs/findings.md has a place for the table of verdicts");
     assert!(
         made == written,
-        "the table of verdicts in docs/findings.md is not that of figures/*/expected.json; run \
-            `twofold bless`:\n{table}"
+        "the table of verdicts in docs/findings.md is not that of papers/jeffrey-2013/expected; \
+            run `twofold bless`:\n{table}"
     );
 }
 

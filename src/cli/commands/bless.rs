@@ -29,7 +29,7 @@ pub struct Arguments {
     /// Why the reference changes; kept in figures/CHANGES.md. Must be given.
     #[arg(long, value_name = "TEXT")]
     reason: String,
-    /// A checkout's `figures`, or another folder, which gets figN/expected.json.
+    /// A checkout's `figures`, or another folder, which gets NAME/expected.json.
     #[arg(long, value_name = "DIR", default_value = "figures")]
     expected: PathBuf,
     /// Threads; 0 is one per core.

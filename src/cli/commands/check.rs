@@ -27,8 +27,8 @@ pub struct Arguments {
     /// that does: same file, same pixels, few and slightly changed pixels, small RMS, high SSIM.
     #[arg(long, value_name = "DIR|MANIFEST")]
     against: Option<PathBuf>,
-    /// Folder that holds figN/expected.json [default: the references that this program was built
-    /// with].
+    /// Folder with references, NAME.json or NAME/expected.json, or a checkout's `figures` [default:
+    /// the references that this program was built with].
     #[arg(long, value_name = "DIR", conflicts_with = "against")]
     expected: Option<PathBuf>,
     /// Threads; 0 is one per core.
@@ -116,7 +116,8 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     };
     if let Some(folder) = arguments.expected.as_ref().filter(|folder| !folder.is_dir()) {
         return Err(CliError::Usage(format!(
-            "--expected {}: there is no such folder; it holds figN/expected.json",
+            "--expected {}: there is no such folder; it holds references, NAME.json or \
+                NAME/expected.json",
             folder.display()
         )));
     }

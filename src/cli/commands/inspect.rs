@@ -23,9 +23,10 @@ use crate::render::{Format, Provenance, ProvenanceError, decode_png, read_proven
 pub struct Arguments {
     /// The picture.
     file: PathBuf,
-    /// Folder that holds figN/expected.json; without it the file is judged by its seal alone.
-    #[arg(long, value_name = "DIR", default_value = "figures")]
-    expected: PathBuf,
+    /// Folder with references, NAME.json or NAME/expected.json, or a checkout's `figures` [default:
+    /// figures, or where there are none the file is judged by its seal alone].
+    #[arg(long, value_name = "DIR")]
+    expected: Option<PathBuf>,
     /// JSON on standard output.
     #[arg(long)]
     json: bool,
@@ -79,19 +80,27 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     if let Err(error @ ProvenanceError::UnknownFormat) = read {
         return Err(CliError::Usage(format!("{}: {error}", arguments.file.display())));
     }
-    let manifests = manifests(&arguments.expected)?;
+    let manifests = manifests(arguments.expected.as_deref())?;
     let inspection =
         inspect(&bytes, read, &manifests, arguments.file.file_stem().and_then(|s| s.to_str()));
     if arguments.json {
         print_json(&inspection)?;
     } else {
-        print(&describe(&inspection, &arguments.file, &arguments.expected))?;
+        print(&describe(&inspection, &arguments.file))?;
     }
     Ok(if inspection.ours_and_unchanged { Exit::Fine } else { Exit::CheckFailed })
 }
 
-/// All committed manifests; none if the folder is not there.
-fn manifests(folder: &Path) -> Result<Vec<Manifest>, CliError> {
+/// All committed manifests; none if no folder is given and there is none.
+fn manifests(given: Option<&Path>) -> Result<Vec<Manifest>, CliError> {
+    let folder = given.unwrap_or(Path::new("figures"));
+    if given.is_some() && !folder.is_dir() {
+        return Err(CliError::Usage(format!(
+            "--expected {}: there is no such folder; it holds references, NAME.json or \
+                NAME/expected.json",
+            folder.display()
+        )));
+    }
     if !folder.exists() {
         return Ok(Vec::new());
     }
@@ -179,7 +188,7 @@ fn committed(
     }
 }
 
-fn describe(i: &Inspection, file: &Path, expected: &Path) -> String {
+fn describe(i: &Inspection, file: &Path) -> String {
     let mut lines =
         vec![format!("{}: {}, SHA-256 {}", file.display(), i.format, i.sha256.as_str())];
     let width = i.provenance.iter().map(|(k, _)| k.chars().count()).max().unwrap_or(0);
@@ -211,9 +220,7 @@ fn describe(i: &Inspection, file: &Path, expected: &Path) -> String {
                 version's)"
                 .into()
         }
-        Committed::NoManifests => {
-            format!("Reference: no manifests in {}; judged by its seal alone", expected.display())
-        }
+        Committed::NoManifests => "Reference: none; judged by its seal alone".into(),
     });
     lines.push(
         match (i.ours_and_unchanged, i.seal) {

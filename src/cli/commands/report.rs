@@ -38,8 +38,8 @@ pub struct Arguments {
     /// Folder with the figures; the JSON files are written to it.
     #[arg(long, value_name = "DIR", default_value = "target/figures")]
     figures: PathBuf,
-    /// Folder that holds figN/expected.json [default: figures, or away from a checkout the hashes
-    /// that this program was built with].
+    /// Folder with references, NAME.json or NAME/expected.json, or a checkout's `figures` [default:
+    /// figures, or away from a checkout the hashes that this program was built with].
     #[arg(long, value_name = "DIR")]
     expected: Option<PathBuf>,
     /// The page; index.html in the folder with the figures if not given. Elsewhere it names the
@@ -125,7 +125,8 @@ pub fn references(given: Option<&Path>) -> Result<Vec<FileBytes>, CliError> {
     }
     if !folder.is_dir() {
         return Err(CliError::Usage(format!(
-            "--expected {}: there is no such folder; it holds figN/expected.json",
+            "--expected {}: there is no such folder; it holds references, NAME.json or \
+                NAME/expected.json",
             folder.display()
         )));
     }

@@ -7,7 +7,7 @@ use twofold_job::record::{Manifest, PanelEntry, VerdictEntry};
 
 /// Stands before the table.
 pub const BEGIN: &str =
-    "<!-- verdicts: made by `twofold bless` from figures/*/expected.json; do not edit -->";
+    "<!-- verdicts: made by `twofold bless` from papers/jeffrey-2013/expected; do not edit -->";
 /// Stands after it.
 pub const END: &str = "<!-- end of verdicts -->";
 
