@@ -74,7 +74,7 @@ impl Finding {
         match &self.state {
             State::Same => format!("{name}: same{known}"),
             State::Differs { what } => format!("{name}: DIFFERS in its {what}"),
-            State::New => format!("{name}: NEW: nothing is expected of it yet"),
+            State::New => format!("{name}: NEW: expected/ has nothing of it yet"),
             State::Failed { why } => format!("{name}: FAILED: {why}"),
             State::Gone => {
                 format!("{name}: GONE: it is expected, and the folder has no such picture or claim")

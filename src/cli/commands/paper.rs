@@ -166,6 +166,14 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
             } else {
                 findings.iter().try_for_each(|f| print(&f.line()))?;
                 print(&if same { format!("{score}; all the same as expected") } else { score })?;
+                let new = findings.iter().filter(|f| f.state == State::New).count();
+                if new > 0 {
+                    print(&format!(
+                        "{new} new, with nothing to compare; keep them: twofold paper bless {} \
+                            --reason \"...\"",
+                        flags.folder.display()
+                    ))?;
+                }
             }
             Ok(match same {
                 true => Exit::Fine,
