@@ -5,8 +5,8 @@
 //! own description of the machine, so everything made with them is labelled "reconstruction".
 //!
 //! A wheel of mass m rolls along a line at distance d from the axle of a disc that turns at omega0,
-//! with its axle at the angle gamma to the line. The housing that carries the line turns at omega;
-//! O = omega - omega0 is its speed relative to the disc. The Lagrangian is
+//! with its rolling direction at the angle gamma to the line. The housing that carries the line
+//! turns at omega; O = omega - omega0 is its speed relative to the disc. The Lagrangian is
 //!
 //! ```text
 //! T = m [(v - d omega)^2 + r^2 omega^2]/2 + J omega^2/2,     spring k_w (r - r0)^2/2,
@@ -33,7 +33,7 @@ pub struct Wheel {
     pub j: f64,
     /// Distance of the wheel's line from the disc's axle.
     pub d: f64,
-    /// Angle between the wheel's axle and its line, radians.
+    /// Angle between the wheel's rolling direction and its line, radians.
     pub gamma: f64,
     /// Spring constant between wheel and housing.
     pub k_w: f64,
