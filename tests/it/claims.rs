@@ -381,6 +381,8 @@ fn transition_functions_against_eq_9() {
     let eps = 1e-8;
     let sides = (perturbed.eval(0.1, eps) - 1.0).abs().max(perturbed.eval(-0.1, eps).abs());
     reads.read("8.5", "distance of phi from 1 and 0 on the two sides at eps = 1e-8", sides);
+    let left = (perturbed.eval(-0.1, eps) + 1.0).abs();
+    reads.read("8.5", "distance of phi from sign(x) on the left at eps = 1e-8", left);
 }
 
 #[test]

@@ -102,6 +102,9 @@ pub struct Sentence {
     /// Why it is not measured.
     #[serde(default)]
     pub untested: Option<String>,
+    /// The outcome in place of "false", of a statement that no number makes false.
+    #[serde(default)]
+    pub otherwise: Option<String>,
 }
 
 /// A quantity that decides a sentence.
@@ -145,6 +148,7 @@ mod tests {
                 "{}: measured or untested, one of the two",
                 s.id
             );
+            assert!(s.otherwise.is_none() || s.reads.iter().all(|r| !r.holds), "{}", s.id);
             assert!(
                 !s.quote.is_empty() && !s.true_if.is_empty() && !s.measure.is_empty(),
                 "{}",
