@@ -684,54 +684,54 @@ pub fn text(found: &[Found; 2], reference: impl Fn(&str) -> Option<&'static str>
             writeln!(text, "| fig. {figure}, three runs | all as said | {} | {} |", all[0], all[1]);
         let _ = writeln!(text, "| | different attractors | {} | {} |", differ[0], differ[1]);
     }
-    let _ = writeln!(text);
-    for one in found {
-        let words: Vec<String> =
-            one.shares.iter().map(|s| format!("{}: {}", s.panel, in_words(&s.at_end))).collect();
-        let _ =
-            writeln!(text, "Where runs end, {} reading: {}.", one.reading.word(), words.join("; "));
-    }
-    let listed = |ways: &[(String, [u64; 6])]| -> String {
-        ways.iter()
-            .map(|(name, n)| format!("{name}: {}", in_words(n)))
-            .collect::<Vec<_>>()
-            .join("; ")
+    let kinds = MotionKind::ALL.map(MotionKind::words).join(" | ");
+    let numbers = |n: &[u64; 6]| n.map(|n| n.to_string()).join(" | ");
+    // A paragraph before a table, and the table's head.
+    let begin = |text: &mut String, what: &str, first: &str| {
+        let columns = first.matches('|').count() + 1 + MotionKind::ALL.len();
+        let _ = writeln!(text, "\n{what}\n\n| {first} | {kinds} |\n|{}", "---|".repeat(columns));
     };
+    begin(&mut text, "Where runs end, at t = 2·10⁵:", "reading | panel");
     for one in found {
-        let _ = writeln!(
-            text,
-            "Interval 100 by method, and by Dormand-Prince at other tolerances, {} reading: {}.",
-            one.reading.word(),
-            listed(&one.ways)
-        );
+        for s in &one.shares {
+            let _ =
+                writeln!(text, "| {} | {} | {} |", one.reading.word(), s.panel, numbers(&s.at_end));
+        }
     }
+    begin(
+        &mut text,
+        "Where runs with interval 100 end, by method, and by Dormand-Prince at other tolerances:",
+        "reading | method or tolerance",
+    );
+    for one in found {
+        for (name, n) in &one.ways {
+            let _ = writeln!(text, "| {} | {name} | {} |", one.reading.word(), numbers(n));
+        }
+    }
+    begin(
+        &mut text,
+        "Shorter runs: the share seen to be captured by their end, and where they are then:",
+        "reading | method | until | captured",
+    );
     for one in found {
         for (name, end, n) in &one.shorter {
             let of = n.iter().sum();
             let captured = of - n[3] - n[5];
             let share = percent(captured as f64 / of as f64, wilson(captured, of, 0.95));
             let reading = one.reading.word();
-            let _ = writeln!(
-                text,
-                "Seen to be captured in runs to t = {end}, {name}, {reading} reading: {share} \
-                    ({}).",
-                in_words(n)
-            );
+            let _ = writeln!(text, "| {reading} | {name} | {end} | {share} | {} |", numbers(n));
         }
     }
-    for one in found {
-        let tests: Vec<String> = one
-            .tests
-            .iter()
-            .filter(|(_, h)| h.freedom > 0)
-            .map(|(name, h)| format!("{name} {}", p_in_words(h.p_permutation)))
-            .collect();
-        let _ = write!(
-            text,
-            "\nThe same odds (permutation tests), {} reading: {}.",
-            one.reading.word(),
-            if tests.is_empty() { "one outcome only".to_owned() } else { tests.join("; ") }
-        );
+    let _ = writeln!(
+        text,
+        "\nWhether groups have the same odds, by permutation tests:\n\n| groups | printed reading \
+            | reconstructed reading |\n|---|---|---|"
+    );
+    for ((name, a), (_, b)) in printed.tests.iter().zip(&reconstructed.tests) {
+        let said = |h: &Homogeneity| {
+            if h.freedom > 0 { p_in_words(h.p_permutation) } else { "one outcome only".to_owned() }
+        };
+        let _ = writeln!(text, "| {name} | {} | {} |", said(a), said(b));
     }
     text
 }
