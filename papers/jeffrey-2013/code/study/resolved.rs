@@ -113,8 +113,8 @@ pub fn belongs(all: &[Compared], rules: &Rules) -> Vec<(Belongs, f64)> {
 /// The table of outcomes.
 pub fn outcomes_text(all: &[Compared], rules: &Rules) -> String {
     let mut text = String::from(
-        "| reading | panel | the paper says | LSODA | resolved | difference in points | p | the \
-            outcome is |\n|---|---|---|---|---|---|---|---|\n",
+        "| reading | panel | the paper says | LSODA | resolved | difference in points | p \
+            | verdict by the rule (p ≥ 0.05: these odds) |\n|---|---|---|---|---|---|---|---|\n",
     );
     for (c, (whose, p)) in all.iter().zip(belongs(all, rules)) {
         let [a, b] = [&c.reference, &c.runs].map(|runs| shown(&c.panel, runs, rules));
