@@ -127,6 +127,7 @@ pub fn assemble(made: &[MadeFile], committed: &[FileBytes], program: &Program<'_
         problems,
         findings: prose::of_the_project(program.findings),
         odds: prose::of_the_odds(program.odds),
+        occurring: prose::occurring(program.odds),
     }
 }
 

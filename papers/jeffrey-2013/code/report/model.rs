@@ -42,6 +42,20 @@ pub struct Report {
     /// Odds of docs/census.md and docs/parameters.md, as HTML; for the page alone.
     #[serde(skip)]
     pub odds: Vec<String>,
+    /// Panels of docs/census.md with a run that shows the paper's outcome; for the page alone.
+    #[serde(skip)]
+    pub occurring: Option<Occurring>,
+}
+
+/// Panels of the census of which some run shows the paper's outcome.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Occurring {
+    /// In each reading, printed first.
+    pub panels: [usize; 2],
+    /// Number of panels.
+    pub of: usize,
+    /// Runs of each.
+    pub runs: u64,
 }
 
 /// The file in the folder of the figures that says how they were made. It is the one file there

@@ -4,7 +4,7 @@
 
 use std::fmt::Write as _;
 
-use super::model::{Report, VerdictReport, of_the_paper};
+use super::model::{Occurring, Report, VerdictReport, of_the_paper};
 use crate::Reading;
 use twofold_paper::html::escape;
 
@@ -120,6 +120,34 @@ pub fn of_the_odds(page: &str) -> Vec<String> {
     blocks
 }
 
+/// The count of panels of docs/census.md whose outcome occurs, if the page has them.
+pub fn occurring(page: &str) -> Option<Occurring> {
+    let mut found: Option<Occurring> = None;
+    for line in page.lines() {
+        let cells: Vec<&str> = line.trim_matches(['|', ' ']).split(" | ").collect();
+        let [panel, _, printed, reconstructed] = cells[..] else { continue };
+        if !(panel.starts_with("7(") || panel.starts_with("8(")) {
+            continue;
+        }
+        // "52 % [46, 58], 156 of 300".
+        let counts = |cell: &str| -> Option<[u64; 2]> {
+            let (hits, rest) = cell.split_once(" of ")?;
+            let runs = rest.split(|c: char| !c.is_ascii_digit()).next()?;
+            Some([hits.rsplit(' ').next()?.parse().ok()?, runs.parse().ok()?])
+        };
+        let [a, b] = [counts(printed)?, counts(reconstructed)?];
+        let all = found.get_or_insert(Occurring { panels: [0; 2], of: 0, runs: a[1] });
+        if [a[1], b[1]] != [all.runs; 2] {
+            return None;
+        }
+        all.of += 1;
+        for (panels, [hits, _]) in all.panels.iter_mut().zip([a, b]) {
+            *panels += usize::from(hits > 0);
+        }
+    }
+    found
+}
+
 /// A table of Markdown; its caption is the section's heading.
 fn table(markdown: &str, caption: &str, number: usize) -> String {
     let row = |line: &str, [open, close]: [&str; 2]| {
@@ -230,6 +258,9 @@ mod tests {
         let rows = page.lines().filter(|l| l.starts_with('|') && !l.starts_with("|---")).count();
         assert_eq!(tables.iter().map(|t| t.matches("<tr>").count()).sum::<usize>(), rows);
         assert!(tables[0].contains("<td>7(ii)</td><td>period three</td>"), "{}", tables[0]);
+        // 7(i), 8(ii) and 8(iii) as printed.
+        assert_eq!(occurring(page), Some(Occurring { panels: [3, 6], of: 6, runs: 300 }));
+        assert_eq!(occurring("no table"), None);
         assert!(
             blocks.iter().all(|b| !b.contains("](") && !b.contains("**") && !b.contains("|---")),
             "{blocks:#?}"

@@ -6,18 +6,25 @@ use super::super::model::*;
 use crate::Reading;
 use twofold_paper::html::{escape, identifier};
 
-/// "Figure 7" for fig7, the folder's name with a capital for others.
+/// Names of the project's studies.
+const STUDIES: [(&str, &str); 5] = [
+    ("audit", "Parameter map"),
+    ("basin", "Basins"),
+    ("digits", "Digits lost"),
+    ("lottery", "Fig. 7 by three methods"),
+    ("workprecision", "Error against work"),
+];
+
+/// "Figure 7" for fig7, a study's name, the folder's name with a capital for others.
 pub(super) fn figure_name(id: &str) -> String {
     match id.strip_prefix("fig") {
         Some(number) if !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit()) => {
             format!("Figure {number}")
         }
-        _ => {
-            let mut characters = id.chars();
-            characters
-                .next()
-                .map_or(String::new(), |first| first.to_uppercase().chain(characters).collect())
-        }
+        _ => match STUDIES.iter().find(|(study, _)| *study == id) {
+            Some((_, name)) => (*name).to_owned(),
+            None => capitalised(id),
+        },
     }
 }
 
@@ -70,7 +77,8 @@ pub(super) fn short(verdict: &VerdictReport) -> &str {
 
 /// A table in a box of its own that scrolls sideways, also with the keyboard.
 pub(super) fn table_start(html: &mut String, caption: &str, id: &str, announce: Option<&str>) {
-    let class = if id == "claims-table" { "scroll claims" } else { "scroll" };
+    let claims = ["claims-table", "beside-table"].contains(&id);
+    let class = if claims { "scroll claims" } else { "scroll" };
     put!(
         html,
         "<section class=\"{class}\" tabindex=\"0\" aria-labelledby=\"{id}-caption\">\n<table \

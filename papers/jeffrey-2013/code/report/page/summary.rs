@@ -52,6 +52,15 @@ pub(super) fn summary(html: &mut String, report: &Report) {
             reading.agree,
             reading.claims
         );
+        if let (Some(r), Some(o)) = (reading.reading, report.occurring) {
+            put!(
+                html,
+                "<p>Outcomes of figs 7 and 8 that occur in any of {} runs: {} of {}</p>",
+                o.runs,
+                o.panels[usize::from(r == Reading::Reconstructed)],
+                o.of
+            );
+        }
         put!(html, "<p>What its judged panels show:</p>\n<ul>");
         for found in &reading.found {
             put!(
@@ -154,20 +163,33 @@ pub(super) fn claims(html: &mut String, report: &Report) {
             }
         }
     }
-    if lines.is_empty() {
+    let (papers, others): (Vec<_>, Vec<_>) =
+        lines.into_iter().partition(|line| of_the_paper(&line.figure.id));
+    if papers.is_empty() {
         put!(html, "<p>No claim of the paper was judged in these pictures.</p>");
-        return;
+    } else {
+        put!(html, "<h3 id=\"claims\">The paper’s claims, panel by panel</h3>");
+        let caption = "What the paper says and what each reading shows";
+        lines_of(html, report, &papers, caption, "claims-table");
     }
+    if !others.is_empty() {
+        put!(html, "<h3 id=\"beside\">The same panels in studies of the project</h3>");
+        let caption = "Held against the same claims, and counted nowhere";
+        lines_of(html, report, &others, caption, "beside-table");
+    }
+}
+
+/// A table of claims.
+fn lines_of(html: &mut String, report: &Report, lines: &[ClaimLine<'_>], caption: &str, id: &str) {
     let readings: Vec<Option<Reading>> =
         report.summary.readings.iter().map(|r| r.reading).collect();
-    put!(html, "<h3 id=\"claims\">The paper’s claims, panel by panel</h3>");
-    table_start(html, "What the paper says and what each reading shows", "claims-table", None);
+    table_start(html, caption, id, None);
     put!(html, "<thead><tr><th scope=\"col\">Panel, and what the paper says</th>");
     for reading in &readings {
         put!(html, "<th scope=\"col\">{}</th>", escape(&capitalised(reading_name(*reading))));
     }
     put!(html, "</tr></thead>\n<tbody>");
-    for line in &lines {
+    for line in lines {
         put!(
             html,
             "<tr><th scope=\"row\"><a href=\"#{}\">{} ({})</a>: {}</th>",
