@@ -27,6 +27,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let system = System::new(Definition::from_toml(REFUGE, "refuge.toml")?).with("refuge", 1.0)?;
     // Continuation where the future is not unique: must be chosen.
     let rule = ExitRule::AtOnce { side: Side::Plus };
+    // Four points of the path for each step.
     let mut record = Trajectory::new(4);
     let end = run(
         &system.bind::<2>()?,

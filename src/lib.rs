@@ -1,8 +1,17 @@
-//! `twofold`: reference software for the breakdown of determinism at a two-fold singularity.
+//! `twofold` integrates, draws and examines piecewise-smooth systems, and checks papers about them.
 //!
-//! The crate regenerates every figure of M. R. Jeffrey, *Singularities that induce a breakdown of
-//! determinism in mechanics* (2013), byte for byte the same on any machine, and says panel by panel
-//! whether the paper's claim holds.
+//! It regenerates every figure of M. R. Jeffrey, *Singularities that induce a breakdown of
+//! determinism in mechanics* (2013), byte for byte the same on every machine tried, and says panel
+//! by panel whether the paper's claim holds.
+//!
+//! | I want to ... | use | in `examples/` |
+//! |---|---|---|
+//! | integrate my vector field | [`integrate::drive`] | `own_method.rs` |
+//! | follow Filippov motion | [`integrate::filippov::run`] | `own_system.rs` |
+//! | follow a text with events | [`hybrid::follow`] | `hybrid_from_text.rs` |
+//! | ask, and keep the answer | [`job::Executor`] | below |
+//! | draw | [`render`] | `render_gallery.rs` |
+//! | add a figure | [`paper`] | `own_figure.rs` |
 //!
 //! # Parts
 //!
@@ -16,6 +25,8 @@
 //!   stepping.
 //! - [`integrate`]: time stepping. One file a method; a step carries its interpolant; one driver
 //!   loop; restarts and kicks are a schedule around a run.
+//! - [`hybrid`]: systems as plain equations with switches, events, modes and tables, followed from
+//!   switch to switch.
 //! - [`rigor`]: validated steps, sets, Poincaré maps, closed orbits: enclosures that are theorems.
 //!   The theorems: `proofs/`.
 //! - [`verify`]: checks the theorems' certificates in exact arithmetic; shares nothing with
@@ -34,14 +45,12 @@
 //!
 //! - *a platform `tanh`?* It differs by an ulp between C libraries, and an ulp near the singularity
 //!   is visible in a picture.
-//! - *a time argument in the right-hand side?* Every system of the paper is autonomous; a forced
-//!   one carries its phase.
 //! - *noise inside a system?* Noise and restarts happen around a run; see [`integrate::Schedule`].
 //! - *an integer for a crossing's direction?* `Up` and `Down` cannot be mixed up.
 //! - *an error when two runs differ in the last digit?* That they do is the paper's subject; what
 //!   must not differ is the same run on two machines, and that is what the hashes are for.
 //!
-//! # In five lines
+//! # An example
 //!
 //! ```
 //! use twofold::job::{Executor, Run, spec::*};

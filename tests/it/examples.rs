@@ -1,6 +1,9 @@
 //! CONTRIBUTING's worked examples are built and run, and do what they say.
 
 #[allow(dead_code)]
+#[path = "../../examples/hybrid_from_text.rs"]
+mod hybrid_from_text;
+#[allow(dead_code)]
 #[path = "../../examples/own_figure.rs"]
 mod own_figure;
 #[allow(dead_code)]
@@ -18,6 +21,7 @@ pub mod visits;
 
 use twofold::integrate::filippov::EventKind;
 use twofold::job::Executor;
+use twofold::num::elementary::{cos, sin};
 
 #[test]
 fn own_system_slides_on_its_surface() {
@@ -26,6 +30,20 @@ fn own_system_slides_on_its_surface() {
     // to be hunted.
     assert!(matches!(events[0].kind, EventKind::Landing { .. }), "{events:?}");
     assert!(events.iter().all(|e| (e.state[0] - 1.0).abs() < 1e-9), "{events:?}");
+}
+
+#[test]
+fn a_block_of_text_sticks_until_the_push_exceeds_friction() {
+    let story = hybrid_from_text::follow_block(30.0).unwrap();
+    // sin t = 1/2.
+    let free = story.free.unwrap();
+    assert!((free - std::f64::consts::FRAC_PI_6).abs() < 1e-2, "{free}");
+    assert_eq!(story.bounces[0].1, "right wall");
+    // From rest at pi/6, x = cos(pi/6) s - sin t + 1/2 - s^2/4 after a time s.
+    let (t, start) = (story.bounces[0].0, std::f64::consts::FRAC_PI_6);
+    let s = t - start;
+    let x = cos(start) * s - sin(t) + 0.5 - 0.25 * s * s;
+    assert!((x - 0.4).abs() < 1e-8, "{x}");
 }
 
 #[test]
