@@ -3,7 +3,8 @@
 //! A block ```` ```sh ```` holds commands, one a line; `sh,exit=N` those that must end with another
 //! exit code than 0. A block after a line `<!-- file: NAME -->` is written to that file first. A
 //! chapter's commands are run in their order, in a folder of their own, through a shell, with the
-//! program that was built for the tests.
+//! program that was built for the tests. A picture in docs/CHAPTER is the one that a command of the
+//! chapter writes under its name; `TWOFOLD_UPDATE=1` writes it anew.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -17,6 +18,15 @@ const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 enum Action {
     Write { file: String, text: String },
     Run { command: String, exit: i32, line: usize },
+}
+
+/// The pictures that chapters show of their commands: those in a folder of the chapter's name.
+fn pictures() -> BTreeSet<PathBuf> {
+    chapters()
+        .iter()
+        .filter_map(|chapter| fs::read_dir(chapter.with_extension("")).ok())
+        .flat_map(|folder| folder.map(|e| e.unwrap().path()))
+        .collect()
 }
 
 /// Reads a chapter's blocks.
@@ -83,6 +93,7 @@ fn every_command_of_the_book_does_what_it_says() {
     )
     .unwrap();
     let makefile = fs::read_to_string(Path::new(ROOT).join("Makefile")).unwrap();
+    let mut unseen = pictures();
     let mut run = 0;
     for chapter in chapters() {
         let folder = tempfile::tempdir().unwrap();
@@ -151,12 +162,28 @@ fn every_command_of_the_book_does_what_it_says() {
                             "{place}: {out} was not written"
                         );
                     }
+                    for shown in ["--out", "--plot"] {
+                        let named = command.split_whitespace().skip_while(|w| *w != shown).nth(1);
+                        let Some(name) = named else { continue };
+                        let shown = chapter.with_extension("").join(name);
+                        if !unseen.remove(&shown) {
+                            continue;
+                        }
+                        let made = fs::read(folder.path().join(name)).unwrap();
+                        if std::env::var_os("TWOFOLD_UPDATE").is_some() {
+                            fs::write(&shown, made).unwrap();
+                        } else {
+                            let same = fs::read(&shown).unwrap() == made;
+                            assert!(same, "{place}: {} is another picture", shown.display());
+                        }
+                    }
                     run += 1;
                 }
             }
         }
     }
     assert!(run >= 20, "only {run} commands were found");
+    assert!(unseen.is_empty(), "no command of their chapter makes {unseen:?}");
 }
 
 /// The anchor of a heading, as GitHub and mdBook make it.
