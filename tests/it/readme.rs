@@ -147,6 +147,27 @@ fn readme_is_short() {
     assert!(long.is_empty(), "{long:?}");
 }
 
+/// A command in README that begins with "$" prints the lines below it.
+#[test]
+fn readme_shows_what_commands_print() {
+    let readme = text("README.md");
+    let mut lines = readme.lines();
+    let mut shown = 0;
+    while let Some(line) = lines.next() {
+        let Some(command) = line.strip_prefix("    $ twofold ") else { continue };
+        let said: Vec<&str> =
+            lines.by_ref().take_while(|l| !l.is_empty()).map(|l| l.trim_start()).collect();
+        let output = std::process::Command::new(env!("CARGO_BIN_EXE_twofold"))
+            .args(command.split_whitespace())
+            .output()
+            .unwrap();
+        let printed = String::from_utf8(output.stdout).unwrap();
+        assert_eq!(printed.lines().collect::<Vec<_>>(), said, "{command}");
+        shown += 1;
+    }
+    assert_eq!(shown, 1);
+}
+
 #[test]
 fn the_commands_and_tests_behind_the_numbers_exist() {
     let help = |arguments: &[&str]| {
