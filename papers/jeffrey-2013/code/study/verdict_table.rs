@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use crate::Reading;
 use twofold_job::record::{Manifest, PanelEntry, VerdictEntry};
+use twofold_paper::Support;
 
 /// Stands before the table.
 pub const BEGIN: &str =
@@ -17,8 +18,8 @@ const PAPER: [&str; 4] = ["fig6", "fig7", "fig8", "fig9"];
 /// The table, and how many claims agree in each reading.
 pub fn table(manifests: &[Manifest]) -> String {
     let mut text = String::from(
-        "| panel | the paper says | printed reading | | reconstructed reading | \
-            |\n|---|---|---|---|---|---|\n",
+        "| panel | the paper says | printed reading | | census | reconstructed reading | | census \
+            |\n|---|---|---|---|---|---|---|---|\n",
     );
     let mut counts = [[0_usize; 2]; 2];
     for figure in PAPER {
@@ -35,35 +36,39 @@ pub fn table(manifests: &[Manifest]) -> String {
             });
             let [Some(first), _] = verdicts else { continue };
             let number = figure.trim_start_matches("fig");
+            let name = format!("{number}({})", panel.label);
             let cells: Vec<String> = verdicts
                 .iter()
                 .zip(&mut counts)
-                .map(|(verdict, count)| match verdict {
+                .zip(Reading::ALL)
+                .map(|((verdict, count), reading)| match verdict {
                     Some(VerdictEntry { found, agrees, .. }) => {
                         *count = [count[0] + usize::from(*agrees), count[1] + 1];
                         format!(
-                            "{} | {}",
+                            "{} | {} | {}",
                             found.replace('|', "\\|"),
-                            if *agrees { "agrees" } else { "differs" }
+                            if *agrees { "agrees" } else { "differs" },
+                            share(&name, reading)
                         )
                     }
-                    None => " | ".into(),
+                    None => " | | ".into(),
                 })
                 .collect();
             // Writing to a String cannot fail.
-            let _ = writeln!(
-                text,
-                "| {number}({}) | {} | {} |",
-                panel.label,
-                first.claim,
-                cells.join(" | ")
-            );
+            let _ = writeln!(text, "| {name} | {} | {} |", first.claim, cells.join(" | "));
         }
     }
     let [printed, reconstructed] = counts.map(|[agree, of]| format!("{agree} of {of}"));
     let _ =
         write!(text, "\nClaims that agree: {printed} (printed), {reconstructed} (reconstructed).");
     text
+}
+
+/// The share of the census' runs that support a panel's claim, if the census repeats the panel.
+fn share(panel: &str, reading: Reading) -> String {
+    crate::census::support(panel, reading).map_or(String::new(), |Support { support, runs }| {
+        format!("{:.0} %", 100.0 * support as f64 / runs.max(1) as f64)
+    })
 }
 
 /// A page with its table replaced; `None` if it has no place for one.
