@@ -669,6 +669,25 @@ fn periods_do_not_depend_on_the_origin() {
     assert_eq!(found.0, ["period-1", "period-2", "period-2"]);
 }
 
+/// A boost converter under control of its current, whose attractor is nearly a curve: exponents of
+/// an exact map are 652, 1197 and 1979 a second.
+#[test]
+fn chaos_on_what_is_nearly_a_curve_is_told_by_its_exponent() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(
+        at.join("boost.toml"),
+        "states = ['i', 'v']\nstart = [0.2, 16]\n[parameters]\nVin = 10\nL = 2e-3\nC = 100e-6\n\
+         R = 20\nT = 100e-6\nIr = 1.5\n[modes.on]\nf = ['Vin/L', '-v/(R*C)']\n\
+         [modes.off]\nf = ['(Vin - v)/L', '(i - v/R)/C']\n[[event]]\nwhen = 'i - Ir'\n\
+         direction = 'up'\nfrom = 'on'\nmode = 'off'\n[[event]]\nevery = 'T'\nmode = 'on'",
+    )
+    .unwrap();
+    let boost = ["--system", "boost.toml", "--period", "1e-4", "--t-end", "0.2"];
+    let found = outcomes(at, &[&boost[..], &["--over", "params.Ir=2.4,2.6,3"]].concat());
+    assert_eq!(found.0, ["irregular", "irregular", "irregular"]);
+}
+
 /// Orbits of a pendulum fill the plane: that through the start is found, to the separatrix, with
 /// its period 4 K(k), k = v/2, by the arithmetic-geometric mean.
 #[test]

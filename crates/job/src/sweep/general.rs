@@ -196,7 +196,12 @@ impl GeneralOutcome {
                         (evidence, middle) = judged(&section, &question, least);
                         let regular = !has_sign(0) && (driven || !has_sign(1));
                         if !is_borne_out(&evidence, regular) {
-                            evidence.verdict = Verdict::Undecided { lyapunov };
+                            let parts = growth.first().is_some_and(|g| g.is_clear() && g.parts());
+                            evidence.verdict = if parts && keeps_its_size(&section, shown_from) {
+                                Verdict::Chaotic { lyapunov, bands: 1 }
+                            } else {
+                                Verdict::Undecided { lyapunov }
+                            };
                         }
                     }
                     place = place_of(&evidence);
@@ -260,6 +265,12 @@ impl Growth {
         self.value * self.duration
     }
 
+    /// Whether neighbours that rounding alone keeps apart would be as far apart as the motion goes.
+    fn parts(&self) -> bool {
+        const FROM_ROUNDING: f64 = 36.0;
+        self.total() > FROM_ROUNDING
+    }
+
     fn exponent(&self) -> Option<Exponent> {
         let Self { value, error, duration } = *self;
         let standard_error = error / SIGNIFICANCE;
@@ -288,6 +299,14 @@ fn is_borne_out(evidence: &Evidence, regular: bool) -> bool {
         Verdict::Periodic(_) | Verdict::Spiralling(_) => false,
         _ => true,
     }
+}
+
+/// Whether the later half of a run's points from `from` on reaches no further than the earlier one.
+fn keeps_its_size(section: &[SectionPoint], from: f64) -> bool {
+    const FURTHER: f64 = 1.1;
+    let late: Vec<SectionPoint> = section.iter().filter(|p| p.t >= from).copied().collect();
+    let (earlier, last) = late.split_at(late.len() / 2);
+    Late::of(last, from).swing <= FURTHER * Late::of(earlier, from).swing
 }
 
 /// Whether the two sides of the turns come together, as they do on the way to a rest: points at
