@@ -241,6 +241,12 @@ pub fn rests(model: &Model, within: &[(f64, f64)]) -> Result<Vec<Rest>, RestErro
     // The edge of a set of rests is a zero of a field, or of a mixture on fewer surfaces, too.
     let families: Vec<Rest> = found.iter().filter(|r| r.family.is_some()).cloned().collect();
     found.retain(|r| {
+        // A start may have come to a point of a curve before that was found.
+        let is_point_of =
+            |f: &Rest| f.mode == r.mode && same_surfaces(f, r) && search.passes(f, &r.x);
+        if r.family.is_none() && families.iter().any(is_point_of) {
+            return false;
+        }
         let Some(boundary) = &r.boundary else { return true };
         let is_edge_of = |f: &Rest| {
             let on = |surface: &String| f.on.iter().any(|on| on.surface == *surface);
@@ -345,6 +351,9 @@ struct Zero {
 const DEPENDENT: f64 = 1e-8;
 /// The same where no such walk does.
 const ROUNDING: f64 = 1e-15;
+/// Change of the state, in widths of the box, with a weight that goes from 0 to 1: rests on less
+/// are one.
+const SHORTEST: f64 = 1e-6;
 /// Length of that walk in widths of the box, and of a step along a curve of rests.
 const WALK: f64 = 1e-4;
 const STRIDE: f64 = 0.02;
@@ -980,6 +989,10 @@ impl Search<'_> {
     }
 }
 
+fn same_surfaces(a: &Rest, b: &Rest) -> bool {
+    a.on.iter().map(|on| &on.surface).eq(b.on.iter().map(|on| &on.surface))
+}
+
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
@@ -1014,7 +1027,8 @@ impl Step {
             v.iter_mut().for_each(|v| *v /= size);
             let states = v[..n].to_vec();
             let states = sqrt(dot(&states, &states));
-            if states > 1e-3 {
+            // Sticking zones may be that short; what moves weights alone is no set of rests.
+            if states > SHORTEST {
                 open.push(v.iter().map(|v| v / states).collect());
             }
             span.push(v);

@@ -4699,3 +4699,27 @@ fn starts_on_surfaces_have_derivatives_of_one_side_only() {
     let error = at(agents).unwrap_err().to_string();
     assert!(error.contains("surfaces that depend on each other"), "{error}");
 }
+
+/// Sticking zones that are a thousandth and a millionth of the box are curves, and points of a curve
+/// that was found are no rests of their own.
+#[test]
+fn curves_of_rests_are_found_at_any_length() {
+    use crate::rests::rests;
+    for (field, from, to) in [
+        ("-200*x - v - if(v > 0, 3, 0)", -0.015, 0.0),
+        ("-2000*x - v - 3*sign(v)", -0.0015, 0.0015),
+        ("-2e5*x - v - 3*sign(v)", -1.5e-5, 1.5e-5),
+    ] {
+        let text = format!("states = ['x', 'v']\nf = ['v', '{field}']");
+        let found = rests(&model(&text), &[(-10.0, 10.0); 2]).unwrap();
+        let [rest] = found.as_slice() else { panic!("{field}: {found:?}") };
+        let [a, b] = rest.family.clone().unwrap().ends.unwrap();
+        near(a[0], from, 1e-8);
+        near(b[0], to, 1e-8);
+        assert!(rest.kind().starts_with("stable"), "{}", rest.kind());
+    }
+    let epidemic = model("states = ['S', 'I']\nf = ['-0.2*S*I', '0.2*S*I - 0.2*I']");
+    let found = rests(&epidemic, &[(0.0, 3.0), (0.0, 1.0)]).unwrap();
+    let [rest] = found.as_slice() else { panic!("{found:?}") };
+    assert!(rest.family.as_ref().unwrap().changes);
+}
