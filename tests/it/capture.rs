@@ -4,13 +4,13 @@
 use std::fs;
 
 use twofold::analyse::counts::wilson;
-use twofold::jeffrey_2013::Reading;
-use twofold::jeffrey_2013::study::capture::{self, ByMethod, Candidate};
+use twofold::jeffrey_2013::study::capture::{self, ByMethod};
 use twofold::jeffrey_2013::study::census::PANELS;
 use twofold::jeffrey_2013::study::claims::claims;
 use twofold::jeffrey_2013::study::effects;
+use twofold::jeffrey_2013::{Reading, audit};
 use twofold::job::sweep::Rows;
-use twofold::job::table::{Column, Entry, Table};
+use twofold::job::table::{Entry, Table};
 
 use crate::census::{path, rows};
 use crate::examples::visits;
@@ -37,27 +37,6 @@ fn methods() -> Vec<(Reading, Vec<ByMethod>)> {
         (reading, [lsoda].into_iter().chain(others.into_iter().map(made).map(by)).collect())
     };
     Reading::ALL.map(of).to_vec()
-}
-
-/// The committed visits.
-fn visited() -> Table {
-    let text = fs::read_to_string(path("papers/jeffrey-2013/code/capture/visits.csv")).unwrap();
-    let mut lines = text.lines();
-    let mut table = Table::new("visits", lines.next().unwrap().split(',').map(Column::numbers));
-    for line in lines {
-        table.push(line.split(',').map(|v| Entry::Number(v.parse().unwrap())));
-    }
-    table
-}
-
-fn candidates() -> Vec<Candidate> {
-    let of = |names: &[&str]| names.iter().map(|name| table(name)).collect::<Vec<_>>();
-    let sweeps = [
-        of(&["census/fig7", "audit/alpha7", "audit/beta7", "capture/best7"]),
-        of(&["census/fig8", "audit/alpha8", "audit/beta8", "capture/best8"]),
-        of(&["audit/alpha9", "audit/beta9", "capture/best9"]),
-    ];
-    Candidate::all(&sweeps, &visited(), &claims().rules)
 }
 
 /// The texts between the marks of a page, in order, are these.
@@ -95,7 +74,7 @@ fn the_page_of_methods_says_what_the_study_says() {
 #[test]
 fn the_page_of_parameters_says_what_the_study_says() {
     let rules = &claims().rules;
-    let candidates = candidates();
+    let candidates = audit::candidates().unwrap();
     assert_eq!(candidates.len(), 8);
     let [map7, map8, old7, old8] =
         ["capture/map7", "capture/map8", "audit/fig7", "audit/fig8"].map(table);
@@ -173,7 +152,7 @@ fn committed_rows_of_the_study_come_out_the_same() {
         ("capture/taylor-printed", 3),
         ("capture/map7", 4),
     ]);
-    let table = visited();
+    let table = audit::visits().unwrap();
     for (i, at) in visits::CANDIDATES.into_iter().enumerate() {
         assert_eq!(
             f64::from(visits::visits(at, 7).unwrap()),
@@ -186,7 +165,7 @@ fn committed_rows_of_the_study_come_out_the_same() {
 /// The project's statement about the printed numbers follows from the runs.
 #[test]
 fn the_likelihood_of_the_printed_numbers_is_bounded_without_a_prior() {
-    let candidates = candidates();
+    let candidates = audit::candidates().unwrap();
     let printed = candidates.iter().find(|c| c.at == [1e-3, 1e-5]).unwrap();
     assert_eq!(printed.hits[..7].iter().filter(|k| **k == 0).count(), 4);
     let most: f64 =

@@ -233,10 +233,33 @@ impl Candidate {
     }
 }
 
+/// The eight outcomes, in the candidates' order.
+fn outcomes() -> impl Iterator<Item = &'static str> {
+    audit::PANELS.iter().map(|p| p.name).chain(["visits"])
+}
+
+/// The numbers of runs that show each outcome, as a table: a row for each candidate and outcome.
+pub fn count_table(candidates: &[Candidate]) -> Table {
+    let head = [Column::numbers("alpha"), Column::numbers("beta"), Column::words("outcome")];
+    let mut table =
+        Table::new("counts", head.into_iter().chain(["runs", "hits"].map(Column::integers)));
+    for c in candidates {
+        for (outcome, (hits, runs)) in outcomes().zip(c.counts()) {
+            table.push([
+                c.at[0].into(),
+                c.at[1].into(),
+                outcome.into(),
+                Entry::Integer(runs as i64),
+                Entry::Integer(hits as i64),
+            ]);
+        }
+    }
+    table
+}
+
 /// The table of likelihoods: the number of runs that show each outcome.
 pub fn likelihood_text(candidates: &[Candidate], rules: &Rules) -> String {
-    let names =
-        audit::PANELS.iter().map(|p| p.name).chain(["visits"]).collect::<Vec<_>>().join(" | ");
+    let names = outcomes().collect::<Vec<_>>().join(" | ");
     let mut text = format!(
         "| α, β | {names} | outcomes in no run | all eight, by the shares | at most \
             |\n|---|{}---|---|---|\n",
