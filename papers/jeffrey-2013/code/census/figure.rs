@@ -148,12 +148,27 @@ fn tables(reading: Reading) -> Result<Vec<Table>, JobError> {
     Ok(found(reading)?.tables())
 }
 
-/// Columns of counts as stacked bars with a name above each.
-fn bars(names: &[String], counts: &[Vec<f64>], below: &[Vec<String>]) -> PlanePanel {
-    let n = names.len() as f64;
-    let mut panel =
-        PlanePanel::new(Axis::linear("", -0.95, n + 0.15), Axis::linear("", -0.24, 1.16));
-    panel.axes = false;
+/// A bar: its name, its counts by kind, those of them that support a claim, and lines of text
+/// below.
+struct Bar {
+    name: String,
+    counts: [f64; 6],
+    supporting: Option<[f64; 6]>,
+    below: Vec<String>,
+}
+
+/// Stacked bars: what supports a claim first, up to a black line, the rest lighter. `labels` say
+/// what the lines below are.
+fn bars(bars: &[Bar], labels: &[&str], aspect: f64) -> PlanePanel {
+    let n = bars.len() as f64;
+    // Height of a line below the bars.
+    let leading = 0.039 / aspect;
+    let leading = 1.2 * leading / (1.0 - labels.len() as f64 * leading);
+    let mut panel = PlanePanel::new(
+        Axis::linear("", -0.95, n + 0.15),
+        Axis::linear("", -0.04 - labels.len() as f64 * leading, 1.2),
+    );
+    (panel.axes, panel.aspect) = (false, Some(aspect));
     for percent in [0.0, 50.0, 100.0] {
         let y = percent / 100.0;
         panel = panel.line(vec![[-0.08, y], [n, y]], LineStyle::new(style::GRID, 0.6)).note(
@@ -162,61 +177,110 @@ fn bars(names: &[String], counts: &[Vec<f64>], below: &[Vec<String>]) -> PlanePa
             Anchor::Right,
         );
     }
-    for (i, row) in counts.iter().enumerate() {
-        let total: f64 = row.iter().sum();
-        let (left, right) = (i as f64 + 0.12, i as f64 + 0.88);
+    let small = |at, text: &str, anchor| {
+        PlaneLayer::Note(Note { size: style::TICK_PT, ..Note::new(at, text, anchor) })
+    };
+    let line_at = |line: usize| -0.04 - leading * (line as f64 + 0.5);
+    panel.layers.extend(
+        labels
+            .iter()
+            .enumerate()
+            .map(|(i, label)| small([-0.12, line_at(i)], label, Anchor::Right)),
+    );
+    for (i, bar) in bars.iter().enumerate() {
+        let (left, middle, right) = (i as f64 + 0.12, i as f64 + 0.5, i as f64 + 0.88);
+        let total = bar.counts.iter().sum::<f64>().max(1.0);
+        let supporting = bar.supporting.unwrap_or(bar.counts);
+        let rest: [f64; 6] = std::array::from_fn(|kind| bar.counts[kind] - supporting[kind]);
         let mut low = 0.0;
-        for (count, colour) in row.iter().zip(COLOURS).filter(|(count, _)| **count > 0.0) {
-            let high = low + count / total.max(1.0);
-            panel =
-                panel.solid(vec![[left, low], [right, low], [right, high], [left, high]], colour);
-            low = high;
+        for (part, white) in [(supporting, 0.0), (rest, 0.6)] {
+            for (count, colour) in part.iter().zip(COLOURS).filter(|(count, _)| **count > 0.0) {
+                let high = low + count / total;
+                panel = panel.solid(
+                    vec![[left, low], [right, low], [right, high], [left, high]],
+                    colour.lighten(white),
+                );
+                low = high;
+            }
         }
-        let middle = i as f64 + 0.5;
-        panel = panel.note([middle, 1.02], names[i].clone(), Anchor::Above);
-        for (line, text) in below.get(i).into_iter().flatten().enumerate() {
-            panel = panel.note([middle, -0.02 - 0.1 * line as f64], text.clone(), Anchor::Below);
+        if bar.supporting.is_some() {
+            let share = supporting.iter().sum::<f64>() / total;
+            let line = LineStyle::new(style::INK, 1.2);
+            panel = panel.line(vec![[left - 0.06, share], [right + 0.06, share]], line);
         }
+        panel = panel.note([middle, 1.02], bar.name.clone(), Anchor::Above);
+        panel.layers.extend(
+            bar.below
+                .iter()
+                .enumerate()
+                .map(|(k, t)| small([middle, line_at(k)], t, Anchor::Centre)),
+        );
     }
     panel
+}
+
+/// The bars of a table of groups, with a group's name as it is shown.
+fn groups(table: &Table, name: impl Fn(&str) -> String) -> Vec<Bar> {
+    let bar = |(row, group): (usize, &str)| {
+        let counts = counts(table, row, "");
+        let below = vec![format!("{:.0}", counts.iter().sum::<f64>())];
+        Bar { name: name(group), counts, supporting: None, below }
+    };
+    table.words("group").enumerate().map(bar).collect()
+}
+
+/// The counts of a row by kind, in the order of `MotionKind::ALL`.
+fn counts(table: &Table, row: usize, suffix: &str) -> [f64; 6] {
+    let column = |k: MotionKind| format!("{}{suffix}", k.words().replace(' ', "_"));
+    MotionKind::ALL.map(|k| table.integers(&column(k))[row] as f64)
+}
+
+/// The bars of the panels of figs 7 and 8.
+fn panels(shares: &Table) -> Vec<Bar> {
+    let percent = |column: &str, row: usize| format!("{:.0}", 100.0 * shares.numbers(column)[row]);
+    let bar = |(row, (name, claim)): (usize, (&str, &str))| {
+        let hits = shares.integers("hits")[row] as f64;
+        let [one, three, ..] = counts(shares, row, "_at_shown");
+        // As `census::supporting` counts: what is periodic at the end was so from `shown_from` on.
+        let (supporting, claim) = match claim {
+            "periodic" => ([one, three, hits - one - three, 0.0, 0.0, 0.0], claim),
+            "period three" => ([0.0, hits, 0.0, 0.0, 0.0, 0.0], "period 3"),
+            _ => ([0.0, 0.0, 0.0, hits, 0.0, 0.0], claim),
+        };
+        Bar {
+            name: name.to_owned(),
+            counts: counts(shares, row, "_at_end"),
+            supporting: Some(supporting),
+            below: vec![
+                claim.to_owned(),
+                format!("{} %", percent("share", row)),
+                format!("{}–{}", percent("low", row), percent("high", row)),
+            ],
+        }
+    };
+    shares.words("panel").zip(shares.words("claim")).enumerate().map(bar).collect()
 }
 
 fn draw(tables: &[Table]) -> Sheet {
     let [shares, found, curves, ways, shorter] = tables else {
         unreachable!("the census has five tables")
     };
-    let count = |table: &Table, row: usize, suffix: &str| -> Vec<f64> {
-        MotionKind::ALL
-            .map(|k| {
-                table.integers(&format!("{}{suffix}", k.words().replace(' ', "_")))[row] as f64
-            })
-            .to_vec()
-    };
-    let names: Vec<String> = shares.words("panel").map(str::to_owned).collect();
-    let at_end: Vec<Vec<f64>> =
-        (0..shares.len()).map(|row| count(shares, row, "_at_end")).collect();
-    let percent = |v: f64| format!("{:.0}", 100.0 * v);
-    let claimed: Vec<Vec<String>> = (0..shares.len())
-        .map(|row| {
-            let [p, low, high] = ["share", "low", "high"].map(|c| shares.numbers(c)[row]);
-            vec![format!("{} %", percent(p)), format!("{}–{}", percent(low), percent(high))]
-        })
-        .collect();
+    let names: Vec<&str> = shares.words("panel").collect();
     let mut capture =
-        PlanePanel::new(Axis::log("*t*", 3.0, 2e5), Axis::linear("share captured", 0.0, 1.0));
+        PlanePanel::new(Axis::log("*t*", 100.0, 2e5), Axis::linear("share captured", 0.0, 1.0));
     for (i, name) in names.iter().enumerate() {
-        let mut points = vec![[3.0, 0.0]];
+        let mut points = vec![[100.0, 0.0]];
         let mut last = 0.0;
         for row in (0..curves.len()).filter(|row| curves.words("panel").nth(*row) == Some(name)) {
             let (t, share) = (curves.numbers("t")[row], curves.numbers("share")[row]);
-            points.extend([[t.max(3.0), last], [t.max(3.0), share]]);
+            points.extend([[t, last], [t, share]]);
             last = share;
         }
         points.push([2e5, last]);
         let line = LineStyle::new(style::SERIES[i], style::CURVE_PT);
         capture = capture
             .line(points, if i < 3 { line } else { line.dashed() })
-            .legend(LegendKey::Line(if i < 3 { line } else { line.dashed() }), name.clone());
+            .legend(LegendKey::Line(if i < 3 { line } else { line.dashed() }), *name);
     }
     capture = capture.legend_at(Corner::UpperLeft);
     // Short, so that eight stand side by side; the footer says what they mean.
@@ -230,76 +294,59 @@ fn draw(tables: &[Table]) -> Sheet {
         }
         .to_owned(),
     };
-    let ways_names: Vec<String> = ways.words("group").map(short).collect();
-    let ways_counts: Vec<Vec<f64>> = (0..ways.len()).map(|row| count(ways, row, "")).collect();
-    let ways_totals: Vec<Vec<String>> = ways_counts
-        .iter()
-        .map(|c| vec![format!("{:.0}", c.iter().sum::<f64>()), "runs".to_owned()])
-        .collect();
     let in_picture =
         |name: &str| SHORTER.iter().find(|s| s.1 == name).map_or(name, |s| s.2).to_owned();
-    let shorter_names: Vec<String> = shorter.words("group").map(in_picture).collect();
-    let shorter_counts: Vec<Vec<f64>> =
-        (0..shorter.len()).map(|row| count(shorter, row, "")).collect();
-    let shorter_totals: Vec<Vec<String>> =
-        shorter_counts.iter().map(|c| vec![format!("{:.0} runs", c.iter().sum::<f64>())]).collect();
     let horizon = shorter.numbers("t").first().copied().unwrap_or(f64::NAN);
-    let value = |what: &str, column: &str| {
+    let p = |what: &str| {
         let row = found.words("what").position(|w| w == what);
-        row.map_or(f64::NAN, |r| found.numbers(column)[r])
+        census::p_in_words(row.map_or(f64::NAN, |r| found.numbers("p_permutation")[r]))
     };
-    let p = |what: &str| census::p_in_words(value(what, "p_permutation"));
-    let together = |what: &str| {
-        let [mean, low, high] = ["value", "low", "high"].map(|c| value(what, c));
-        format!("{} % [{}, {}]", percent(mean), percent(low), percent(high))
-    };
-    let runs: Vec<i64> = shares.integers("runs").to_vec();
+    let runs = shares.integers("runs");
     let mut sheet = Sheet::new(ColumnWidth::Wide, 1, "")
-        .panel_aspect(0.5)
-        .panel("(a)", "where runs of each panel end", bars(&names, &at_end, &claimed))
+        .panel_aspect(0.36)
+        .panel(
+            "(a)",
+            "where runs of each panel end",
+            bars(&panels(shares), &["claim", "support", "95 %"], 0.5),
+        )
         .panel("(b)", "captured by a closed orbit", capture)
         .panel(
             "(c)",
             "interval 100, by method and tolerance",
-            bars(&ways_names, &ways_counts, &ways_totals),
+            bars(&groups(ways, short), &["runs"], 0.36),
         )
         .panel(
             "(d)",
             format!("interval 100 to *t* = {horizon}, by local error"),
-            bars(&shorter_names, &shorter_counts, &shorter_totals),
+            bars(&groups(shorter, in_picture), &["runs"], 0.36),
         );
     for (kind, colour) in MotionKind::ALL.into_iter().zip(COLOURS) {
         sheet = sheet.legend(LegendEntry::new(LegendKey::Area(colour, 100), kind.words()));
     }
     sheet
         .footer(format!(
-            "Runs to *t* = 200000 from starts shifted by less than 10^{{-9}}, LSODA at NDSolve's \
-             defaults, {} a panel. Below each bar of (a): share of runs that support the paper's \
-             claim about the panel, with its 95 % interval (Wilson). (c) LSODA, Dormand-Prince \
-             (DP5) and Radau IIA at NDSolve's tolerance; Dormand-Prince at other tolerances.",
+            "(a) {} runs a panel to *t* = 2×10^{{5}} from starts shifted by less than 10^{{-9}}, \
+             LSODA at NDSolve’s defaults. Full colour, up to the black line: runs that support the \
+             paper’s claim, with the share’s 95 % interval (Wilson). A run supports “periodic” or \
+             “period 3” only if it was so from 10^{{5}} on.",
             match [runs.iter().min(), runs.iter().max()].map(|n| n.copied().unwrap_or(0)) {
                 [fewest, most] if fewest == most => fewest.to_string(),
                 [fewest, most] => format!("{fewest} to {most}"),
             }
         ))
+        .footer(
+            "(c) LSODA, Dormand-Prince (DP5) and Radau IIA at NDSolve’s tolerance; Dormand-Prince \
+             at others.",
+        )
         .footer(format!(
-            "Tests for the same odds (permutation): intervals 20, 40, 100 {}; *σ* {}; all six \
-                panels {}; methods {}; tolerances {}, without 10^{{-6}} {}; (d) {}.",
+            "The same odds (permutation tests): intervals 20, 40, 100 {}; *σ* {}; all six panels \
+             {}; methods {}; tolerances {}; (d) {}.",
             p("intervals 20, 40, 100"),
             p("sigma 0.01, 0.1, 0.13"),
             p("all six panels"),
             p("methods"),
             p("tolerances"),
-            p("tolerances below 1e-6"),
             p("ordinary and small local errors"),
-        ))
-        .footer(format!(
-            "Three independent runs: fig. 7 all as claimed {}, not all the same {}; fig. 8 all as \
-                claimed {}, not all the same {}.",
-            together("fig. 7: all as claimed"),
-            together("fig. 7: not all the same"),
-            together("fig. 8: all as claimed"),
-            together("fig. 8: not all the same"),
         ))
 }
 
