@@ -1,5 +1,5 @@
 //! The delayed switch, which the paper leaves out (end of sec. 4.3), beside smoothing and
-//! hysteresis. Not a figure of the paper. The data of (b), (c) and (d) are committed beside it and
+//! hysteresis. Not a figure of the paper. The data of (c) to (j) are committed beside it and
 //! made by `make delay-data`; sentence 4.8's rules were fixed before
 //! (papers/jeffrey-2013/sentences.toml).
 
@@ -9,7 +9,7 @@ use std::sync::Arc;
 use crate::Reading;
 use crate::computed::Computed;
 use crate::study::claims::claims;
-use crate::study::similarity::{self, Rule, Score, WAYS};
+use crate::study::similarity::{self, Rule, Score, Similar, WAYS};
 use twofold::analyse::passage::Predicted;
 use twofold::integrate::Schedule;
 use twofold::integrate::delay::History;
@@ -44,32 +44,39 @@ const CHATTER: f64 = 1.8;
 const EPS: f64 = 1e-3;
 /// Its delay: eps'.
 const DELAY: f64 = 1e-2;
-/// Half the height of a strip of (a).
+/// Half the height of a strip of (b).
 const STRIP: f64 = 2.6e-3;
-/// Half the sides of what (b) shows in each reading.
+/// Half the sides of what (c) to (f) show in each reading.
 const SIDES: [[f64; 2]; 2] = [[21.0, 2.0], [1.75, 1.1]];
-/// Delays of (c), with their colours.
-const DELAYS: [(f64, Colour); 4] =
-    [(1e-2, style::FAINT), (1e-3, style::SKY), (1e-4, style::BLUE), (1e-5, style::VERMILLION)];
-/// eps of (d)'s smooth rule, from 10^-1.5 in steps of so many quarter decades, with their colours.
-const SMOOTH: [(f64, Colour, MarkerShape); 4] = [
-    (1e-2, style::INK, MarkerShape::Dot),
-    (1e-3, style::BLUE, MarkerShape::Square),
-    (1e-4, style::GREEN, MarkerShape::Triangle),
-    (1e-5, style::VERMILLION, MarkerShape::Star),
+/// Colours of the rules, in all panels.
+const SMOOTHING: Colour = style::INK;
+/// See [`SMOOTHING`].
+const HYSTERESIS: Colour = style::GREEN;
+/// See [`SMOOTHING`].
+const SHARP: Colour = style::VERMILLION;
+/// See [`SMOOTHING`].
+const SMOOTH: Colour = style::BLUE;
+/// Delays of (g) and (h), with the share of white in their colours.
+const DELAYS: [(f64, f64); 4] = [(1e-2, 0.75), (1e-3, 0.5), (1e-4, 0.25), (1e-5, 0.0)];
+/// eps of (j), with their shapes.
+const LAYERS: [(f64, MarkerShape); 4] = [
+    (1e-2, MarkerShape::Dot),
+    (1e-3, MarkerShape::Square),
+    (1e-4, MarkerShape::Triangle),
+    (1e-5, MarkerShape::Star),
 ];
 
-/// The rules of (a).
+/// The rules of (a) and (b).
 fn passages() -> [(&'static str, SwitchSpec, Colour); 4] {
     let late = |eps: Option<f64>| {
         let transition = eps.map(|_| Transition::Tanh);
         SwitchSpec::Delayed { delay: DELAY, eps, transition, history: History::Constant }
     };
     [
-        ("smoothing", SwitchSpec::tanh(EPS), style::INK),
-        ("hysteresis", SwitchSpec::hysteretic(EPS, Relaxation::Literal), style::GREEN),
-        ("sharp delay", late(None), style::VERMILLION),
-        ("smooth delay", late(Some(EPS)), style::BLUE),
+        ("smoothing", SwitchSpec::tanh(EPS), SMOOTHING),
+        ("hysteresis", SwitchSpec::hysteretic(EPS, Relaxation::Literal), HYSTERESIS),
+        ("sharp delay", late(None), SHARP),
+        ("smooth delay", late(Some(EPS)), SMOOTH),
     ]
 }
 
@@ -219,68 +226,86 @@ fn draw(answers: &[Arc<Answer>]) -> Sheet {
         unreachable!("the figure asks for four paths and four tables")
     };
     let (places, strips) = passage_panels(paths);
-    let (phases, distribution, said) = exit_panels(exits);
-    let (grown, slopes) = growth_panel(growth);
-    let (restored, changes) = smooth_panel(growth);
+    let (phases, distribution) = exit_panels(exits);
     let mut sheet = Sheet::new(ColumnWidth::Wide, 2, "")
-        .panel_aspect(0.74)
+        .panel_aspect(0.6)
         .panel("(a)", "one passage", places)
-        .panel("", "its chatter", strips);
+        .panel("(b)", "its chatter", strips);
+    let mut labels = ["(c)", "(d)", "(e)", "(f)"].into_iter();
     for (reading, half) in Reading::ALL.into_iter().zip(SIDES) {
         for (rule, words) in [(Rule::Literal, "fig. 9(i)"), (Rule::Delayed, "delay *ε*")] {
-            let label =
-                if reading == Reading::Printed && rule == Rule::Literal { "(b)" } else { "" };
-            let right = rule == Rule::Delayed;
             sheet = sheet.panel(
-                label,
+                labels.next().unwrap_or_default(),
                 format!("{words}, {}", reading.word()),
-                section_panel(sections, reading, rule, half, !right),
+                section_panel(sections, reading, rule, half, rule == Rule::Literal),
             );
         }
     }
-    for (_, words, colour) in KINDS {
-        sheet = sheet
-            .legend(LegendEntry::new(LegendKey::Line(line_of(colour)), format!("{words} (d)")));
+    for (words, _, colour) in passages() {
+        sheet = sheet.legend(LegendEntry::new(LegendKey::Line(line_of(colour)), words));
     }
-    for (_, shape, words) in SHARP {
+    for (_, shape, words) in KINDS {
         let key = LegendKey::Marker(marker(shape, style::SOFT_INK, 3.4));
-        sheet = sheet.legend(LegendEntry::new(key, format!("{words} (d)")));
+        sheet = sheet.legend(LegendEntry::new(key, format!("{words} (i)")));
     }
+    for (eps, shape) in LAYERS {
+        let key = LegendKey::Marker(marker(shape, SMOOTH, 3.4));
+        sheet = sheet.legend(LegendEntry::new(key, format!("*ε* = {} (j)", tenth(eps))));
+    }
+    let gaps = exit_gaps(exits, "sharp").into_iter().fold(0.0, f64::max);
+    let [across, along, carried] = sharp_powers(growth, "sharp").map(said);
+    let [by_band, along_by_band, carried_by_band] = sharp_powers(growth, "relay").map(said);
     sheet
-        .panel("(c)", "exits by phase", phases)
-        .panel("", "their distribution", distribution)
-        .panel("(d)", "growth, sharp rules", grown)
-        .panel("", "growth, smooth delay", restored)
+        .panel("(g)", "exits by phase", phases)
+        .panel("(h)", "their distribution", distribution)
+        .panel("(i)", "growth, sharp rules", growth_panel(growth))
+        .panel("(j)", "growth, smooth delay", smooth_panel(growth))
         .footer(format!(
-            "(a) From {} in attracting sliding; *ε* = {}, *δ* = {}, hysteresis by eq. (10) with \
-                *ε*′ = 10*ε*. The smooth delay stops chattering near the two-fold and leaves it as \
-             smoothing does. A strip is {} of *x* high.",
-            "(0, 0.3, 0.2)",
+            "(a, b) From (0, 0.3, 0.2) in attracting sliding; *ε* = {}, *δ* = {}, eq. (10) with \
+             *ε*′ = 10*ε*. Strips of (b) are {} high.",
             number(EPS),
-            number(DELAY),
+            tenth(DELAY),
             number(2.0 * STRIP)
         ))
         .footer(format!(
-            "(b) Sections *y* = 0, 10^{{5}} < *t* < 2 × 10^{{5}}, *ε* = {}: fig. 9(i) and the \
-                sharp delay *δ* = *ε*. {}",
+            "(c–f) Sections *y* = 0, 10^{{5}} < *t* < 2 × 10^{{5}}, *ε* = {}. {}",
             number(EPS),
             verdict(scores)
         ))
-        .footer(said)
-        .footer(slopes)
-        .footer(changes)
+        .footer(format!(
+            "(g, h) Sharp delay, *δ* = 10^{{−2}} (lightest), 10^{{−3}}, 10^{{−4}} and 10^{{−5}}: \
+             first *x* = 0 beyond 3*δ*. In (h) the four coincide within {gaps:.3}."
+        ))
+        .footer(format!(
+            "(i) Means of six starts. Powers (across, along, carried in) of *δ*: {across}, \
+             {along}, {carried}; of half the band: {by_band}, {along_by_band}, {carried_by_band}. \
+             Dashed: smoothing’s slopes in *ε*."
+        ))
+        .footer(
+            "(j) Three starts. Growth changes from smoothing’s to that of (i) near *δ* = √*ε*/2.",
+        )
+}
+
+/// A power of ten.
+fn tenth(value: f64) -> String {
+    format!("10^{{−{}}}", (-log10(value)).round())
+}
+
+/// A fitted power.
+fn said((value, _): (f64, f64)) -> String {
+    format!("{value:.2}").replace('-', "−")
 }
 
 fn passage_panels(paths: &[Table]) -> (PlanePanel, PlanePanel) {
     let mut places =
         PlanePanel::new(Axis::linear("*y*", -0.2, 0.32), Axis::linear("*z*", -0.22, 0.26));
-    let strips = PlanePanel::new(Axis::linear("*t*", 0.0, CHATTER), Axis::linear("", -1.3, 11.3));
+    let strips = PlanePanel::new(Axis::linear("*t*", 0.0, CHATTER), Axis::linear("", -1.5, 10.5));
     let mut strips = strips.labelled(true, false);
     let axis = LineStyle::new(style::GRID, style::FRAME_PT);
     places = places
         .line(vec![[-0.2, 0.0], [0.32, 0.0]], axis)
         .line(vec![[0.0, -0.22], [0.0, 0.26]], axis);
-    for (k, (path, (words, _, colour))) in paths.iter().zip(passages()).enumerate() {
+    for (k, (path, (_, _, colour))) in paths.iter().zip(passages()).enumerate() {
         let [t, x, y, z] = ["t", "x", "y", "z"].map(|c| path.numbers(c));
         let inside = |p: &[f64; 2]| p[0] > -0.2 && p[1] > -0.22 && p[0] < 0.32 && p[1] < 0.26;
         let shown: Vec<[f64; 2]> = (0..t.len()).map(|i| [y[i], z[i]]).take_while(inside).collect();
@@ -294,7 +319,6 @@ fn passage_panels(paths: &[Table]) -> (PlanePanel, PlanePanel) {
         for piece in pieces_within(&strip, [middle - 1.0, middle + 1.0]) {
             strips = strips.line(piece, LineStyle::new(colour, 0.7));
         }
-        strips = strips.note([0.97 * CHATTER, middle + 1.45], words, Anchor::Right);
     }
     (places.markers(vec![[0.0, 0.0]], marker(MarkerShape::Star, style::MAGENTA, 6.0)), strips)
 }
@@ -365,63 +389,54 @@ fn section_panel(
     }
 }
 
-/// Verdict on sentence 4.8 in this figure's words.
+/// Verdict on sentence 4.8 in this figure's words: the ways in which the delay is similar to
+/// hysteresis.
 fn verdict(scores: &Table) -> String {
     let column = |name: &str| -> Vec<&str> { scores.words(name).collect() };
     let [way, reading, delayed, hysteresis, outcome] =
         ["way", "reading", "delayed", "hysteresis", "outcome"].map(column);
-    let said = WAYS.map(|name| {
-        let found = Reading::ALL.map(|r| {
-            let row = (0..scores.len()).find(|i| {
-                way[*i] == name
-                    && reading[*i] == r.word()
-                    && delayed[*i] == "delayed"
-                    && hysteresis[*i] == "literal"
-            });
-            row.map_or("", |i| outcome[i])
-        });
-        let shown = if found[0] == found[1] {
-            found[0].to_owned()
-        } else {
-            format!("{}/{}", found[0], found[1])
-        };
-        format!("{name} {shown}")
+    let is_similar = |name: &str, r: Reading| {
+        (0..scores.len()).any(|i| {
+            way[i] == name
+                && reading[i] == r.word()
+                && delayed[i] == Rule::Delayed.name()
+                && hysteresis[i] == Rule::Literal.name()
+                && outcome[i] == Similar::Yes.word()
+        })
+    };
+    let ways = ["where runs settle", "occupancy", "chatter", "exits"];
+    let said = WAYS.iter().zip(ways).filter_map(|(name, words)| {
+        match Reading::ALL.map(|r| is_similar(name, r)) {
+            [true, true] => Some(words.to_owned()),
+            [true, false] => Some(format!("{words} (printed reading only)")),
+            [false, true] => Some(format!("{words} (reconstructed reading only)")),
+            [false, false] => None,
+        }
     });
-    format!("By the rules of sentence 4.8 (printed/reconstructed): {}.", said.join(", "))
+    let said: Vec<String> = said.collect();
+    format!("By the rules of sentence 4.8 delay is similar to hysteresis in: {}.", said.join(", "))
 }
 
-fn exit_panels(exits: &Table) -> (PlanePanel, PlanePanel, String) {
-    let of = |rule: &str, wanted: f64| one_period(exits, rule, wanted);
+fn exit_panels(exits: &Table) -> (PlanePanel, PlanePanel) {
     let mut phases = PlanePanel::new(
         Axis::linear("phase of the chatter", 0.0, 1.0),
         Axis::linear("*y*/*δ* at the exit", -20.0, 14.0),
     );
     let mut distribution = PlanePanel::new(
         Axis::linear("*y*/*δ* at the exit", -20.0, 14.0),
-        Axis::linear("share of phases below", 0.0, 1.19),
+        Axis::linear("share below", 0.0, 1.05),
     );
-    for (delay, colour) in DELAYS {
-        let points = of("sharp", delay);
+    for (delay, white) in DELAYS {
+        let colour = SHARP.lighten(white);
+        let points = one_period(exits, "sharp", delay);
         let values = sorted(&points);
         let count = values.len() as f64;
         let steps =
             values.iter().enumerate().map(|(i, v)| [*v, (i as f64 + 1.0) / count]).collect();
-        let words = format!("*δ* = 10^{{−{}}}", (-log10(delay)).round());
         phases = phases.dots(points, DotStyle { diameter: Some(1.1), ..DotStyle::plain(colour) });
-        distribution = distribution
-            .line(steps, line_of(colour))
-            .legend(LegendKey::Line(line_of(colour)), words);
+        distribution = distribution.line(steps, line_of(colour));
     }
-    let gaps = |rule: &str| exit_gaps(exits, rule).map(|gap| format!("{gap:.3}")).join(", ");
-    let said = format!(
-        "(c) Sharp delay: exits (first *x* = 0 beyond 3*δ*) of {} orbits whose chatter differs by \
-            phase alone. Largest distance between the distributions of neighbouring *δ*: {}; of \
-         sharp hysteresis, in units of √*b* with the same *b*: {}.",
-        of("sharp", DELAYS[0].0).len(),
-        gaps("sharp"),
-        gaps("relay")
-    );
-    (phases, distribution.legend_at(Corner::UpperLeft), said)
+    (phases, distribution)
 }
 
 /// The exits of a rule over one period of the chatter, as (phase, y) with the phase from 0 to 1.
@@ -467,16 +482,12 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().chain(b).fold(0.0, |most: f64, v| most.max((share(a, *v) - share(b, *v)).abs()))
 }
 
-/// Columns of growth, with their words and colours.
-const KINDS: [(&str, &str, Colour); 3] = [
-    ("across", "across", style::VERMILLION),
-    ("along", "along", style::BLUE),
-    ("carried_in", "carried in", style::GREEN),
+/// Columns of growth, with their shapes and words.
+const KINDS: [(&str, MarkerShape, &str); 3] = [
+    ("across", MarkerShape::Dot, "across"),
+    ("along", MarkerShape::Square, "along"),
+    ("carried_in", MarkerShape::Triangle, "carried in"),
 ];
-
-/// The sharp rules, their markers and words.
-const SHARP: [(&str, MarkerShape, &str); 2] =
-    [("sharp", MarkerShape::Dot, "delay"), ("relay", MarkerShape::Triangle, "hysteresis")];
 
 /// The growth of a kind, as (parameter, growth), under a rule, in the rows of which `is_meant` of
 /// the ratio and the parameter.
@@ -541,52 +552,33 @@ pub fn growth() -> Result<Table, JobError> {
     table(DATA[0].0, DATA[0].1)
 }
 
-fn in_words(powers: [(f64, f64); 3], digits: usize) -> String {
-    let word = |(value, error): (f64, f64)| {
-        let sign = if value < 0.0 { "−" } else { "" };
-        format!("{sign}{:.digits$} ± {error:.digits$}", value.abs())
-    };
-    let words: Vec<String> =
-        KINDS.iter().zip(powers).map(|((_, words, _), p)| format!("{words} {}", word(p))).collect();
-    words.join(", ")
-}
-
-fn growth_panel(table: &Table) -> (PlanePanel, String) {
+fn growth_panel(table: &Table) -> PlanePanel {
     let law = Predicted::of(-1.2, -1.4);
     let mut panel = PlanePanel::new(
         Axis::log("*δ*, or half the band", 5e-7, 2e-2),
-        Axis::log("growth", 1e-2, 1e12),
+        Axis::log("growth", 1e-2, 1e8),
     );
-    for ((kind, _, colour), power) in
-        KINDS.into_iter().zip([law.across(), law.along(), law.carried()])
-    {
+    for power in [law.across(), law.along(), law.carried()] {
         // The line of smoothing shows a slope, not a level: it begins at 10, or 1, at 10^-2 and
         // ends at the panel's edge.
         let log_at = |p: f64| power * (log10(p) + 2.0) + if power < 0.0 { 1.0 } else { 0.0 };
-        let end = if power < 0.0 { exp10(-2.0 - 11.0 / -power) } else { 1e-6 };
+        let end = if power < 0.0 { exp10(-2.0 - 7.0 / -power) } else { 1e-6 };
         let ends = [1e-2, end].map(|p| [p, exp10(log_at(p))]);
-        panel = panel.line(ends.into(), LineStyle::new(colour, style::CURVE_PT).dashed());
-        for (rule, shape, _) in SHARP {
+        panel = panel.line(ends.into(), line_of(SMOOTHING).dashed());
+    }
+    // Small markers upon large ones: where the two rules agree, both are seen.
+    for (rule, colour, size) in [("relay", HYSTERESIS, 4.0), ("sharp", SHARP, 2.2)] {
+        for (kind, shape, _) in KINDS {
             let mut all = growths(table, rule, kind, |_, _| true);
             all.sort_by(|a, b| a.0.total_cmp(&b.0));
             let means = all.chunk_by(|a, b| is_near(a.0, b.0)).map(|of| {
                 let logs = of.iter().map(|p| log10(p.1)).sum::<f64>();
                 [of[0].0, exp10(logs / of.len() as f64)]
             });
-            panel = panel.markers(means.collect(), marker(shape, colour, 3.0));
+            panel = panel.markers(means.collect(), marker(shape, colour, size));
         }
     }
-    let said = format!(
-        "(d) Growth in a passage, geometric means of six starts, under the sharp delay and sharp \
-            hysteresis (*f*_{{+}} until *x* falls to −*b*, *f*_{{−}} until it rises to *b*). \
-         Powers of *δ*: {}. Powers of *b*: {}. Dashed: smoothing’s slopes in *ε*, −{:.1}, −{:.1} \
-         and +1/2.",
-        in_words(sharp_powers(table, "sharp"), 3),
-        in_words(sharp_powers(table, "relay"), 3),
-        -law.across(),
-        -law.along()
-    );
-    (panel, said)
+    panel
 }
 
 /// Ratios delay/sqrt(eps) at which smoothing's law holds, and those at which the sharp rule's does.
@@ -596,26 +588,17 @@ pub const SMALL_EPS: f64 = 3.2e-3;
 /// See [`SMALL`].
 pub const LARGE: std::ops::RangeInclusive<f64> = 0.99..=1.01;
 
-fn smooth_panel(table: &Table) -> (PlanePanel, String) {
+fn smooth_panel(table: &Table) -> PlanePanel {
     let [parameter, ratio, along] = ["parameter", "ratio", "along"].map(|c| table.numbers(c));
     let mut panel =
-        PlanePanel::new(Axis::log("*δ*/√*ε*", 2e-2, 15.0), Axis::log("growth along", 0.3, 1e11));
-    for (eps, colour, shape) in SMOOTH {
+        PlanePanel::new(Axis::log("*δ*/√*ε*", 2e-2, 15.0), Axis::log("growth along", 0.3, 1e9));
+    for (eps, shape) in LAYERS {
         let chosen = rows(table, "rule", "smooth").into_iter();
         let chosen = chosen.filter(|i| is_near(parameter[*i], eps) && along[*i].is_finite());
-        let look = marker(shape, colour, 3.2);
-        panel = panel
-            .markers(chosen.map(|i| [ratio[i], along[i]]).collect(), look)
-            .legend(LegendKey::Marker(look), format!("*ε* = 10^{{−{}}}", (-log10(eps)).round()));
+        let points = chosen.map(|i| [ratio[i], along[i]]).collect();
+        panel = panel.markers(points, marker(shape, SMOOTH, 3.2));
     }
-    let said = format!(
-        "Right: smooth delay, three starts. Powers of *ε* at *δ*/√*ε* ≤ 0.1, as far as f64 \
-            resolves: {}; at *δ* = √*ε*: {}. Between the two the chatter stops within the \
-         two-fold’s neighbourhood.",
-        in_words(smooth_powers(table, SMALL, SMALL_EPS), 2),
-        in_words(smooth_powers(table, LARGE, 1e-2), 2),
-    );
-    (panel, said)
+    panel
 }
 
 /// The figure's specification.
@@ -625,13 +608,13 @@ pub fn figure() -> Figure {
         reading: None,
         title: "A switch that acts late".into(),
         caption: "(a) One passage of the two-fold under smoothing, hysteresis, sharp and smooth \
-            delay, and x during it. (b) Late sections y = 0 under the \
-                  hysteresis of fig. 9(i) and under a sharp delay of the same eps, in both \
-                  readings. (c) Where the two-fold is left under the sharp delay by the phase \
-                  of the chatter, in delays, and the distribution over phases as the delay falls. \
-                  (d) Growth of a disturbance in a passage under sharp delay and sharp \
-                  hysteresis beside smoothing's powers, and under smooth delay from one law to the \
-                  other."
+                  delay, and (b) x during it. (c–f) Late sections y = 0 under the hysteresis of \
+                  fig. 9(i) and under a sharp delay of the same eps, in both readings. (g) Where \
+                  the two-fold is left under the sharp delay by the phase of the chatter, in \
+                  delays, and (h) the distribution over phases as the delay falls. (i) Growth of a \
+                  disturbance in a passage under sharp delay and sharp hysteresis (f+ until x \
+                  falls to -b, f- until it rises to b) beside smoothing's powers, and (j) under \
+                  smooth delay from one law to the other."
             .into(),
         view: View::Study(Study { questions, draw }),
         panels: Vec::new(),
