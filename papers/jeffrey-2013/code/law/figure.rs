@@ -9,7 +9,7 @@ use twofold::analyse::passage::{PassageQuestion, Predicted};
 use twofold::integrate::{Kick, KickLaw, Schedule};
 use twofold::job::spec::SwitchSpec;
 use twofold::job::{Answer, AnyQuestion, Leaving, Table, TwoFoldPassage};
-use twofold::num::elementary::{exp, exp10, ln, log10, sqrt};
+use twofold::num::elementary::{exp, exp10, ln, sqrt};
 use twofold::num::fit::{line, median};
 use twofold::paper::wording::number;
 use twofold::paper::{Figure, Picture, Study, View};
@@ -88,12 +88,13 @@ fn slope(transition: Transition, phi: f64) -> f64 {
     }
 }
 
-/// Transition functions, their words and looks.
-const TRANSITIONS: [(Transition, &str, Colour, MarkerShape); 4] = [
-    (Transition::Tanh, "tanh", style::INK, MarkerShape::Dot),
-    (Transition::Arctan, "arctan", style::BLUE, MarkerShape::Square),
-    (Transition::Algebraic, "algebraic", style::VERMILLION, MarkerShape::Triangle),
-    (Transition::Erf, "erf", style::GREEN, MarkerShape::Star),
+/// Transition functions, their words and looks, the last lowest: tanh's dots lie on the algebraic
+/// one's triangles.
+const TRANSITIONS: [(Transition, &str, Colour, MarkerShape, f64); 4] = [
+    (Transition::Tanh, "tanh", style::INK, MarkerShape::Dot, 2.0),
+    (Transition::Arctan, "arctan", style::BLUE, MarkerShape::Square, 4.0),
+    (Transition::Algebraic, "algebraic", style::VERMILLION, MarkerShape::Triangle, 5.0),
+    (Transition::Erf, "erf", style::GREEN, MarkerShape::Star, 4.0),
 ];
 
 /// eps for the far exit.
@@ -230,12 +231,6 @@ fn jumps(rows: &[Row]) -> Vec<(f64, f64)> {
     rows.windows(2).filter(jump).map(|w| (w[0].eps, w[1].eps)).collect()
 }
 
-/// Three digits and a power of ten.
-fn short(value: f64) -> String {
-    let power = log10(value).floor();
-    format!("{:.2}·10^{{−{}}}", value / exp10(power), -power)
-}
-
 fn marker(shape: MarkerShape, colour: Colour, size: f64) -> MarkerStyle {
     MarkerStyle { shape, colour, size }
 }
@@ -247,48 +242,67 @@ fn draw_law(answers: &[Arc<Answer>]) -> Sheet {
     let (printed, others) = rest.split_at(PRINTED.len());
     let law = Predicted::of(-1.2, -1.4);
     let tanh = slope(Transition::Tanh, law.phi);
-    let (slopes, said) = slopes_panel(growth, &law, tanh);
-    let (selected, tip) = selection_panel(ladder, &law, tanh);
-    let (exits, periods) = far_panel(ladder, &law, tanh);
-    let (nearness, explained) = nearness_panel(growth, printed, &law);
-    let (exponents, measured) = exponents_panel(others);
-    let formula = LineStyle::new(style::SOFT_INK, style::CURVE_PT).dashed();
-    Sheet::new(ColumnWidth::Wide, 2, "")
-        .panel_aspect(0.8)
+    let (selected, measured, predicted) = selection_panel(ladder, &law, tanh);
+    let (nearness, times, change) = nearness_panel(growth, printed, &law);
+    let formula = LineStyle::new(style::SOFT_INK, style::CURVE_PT);
+    SERIES
+        .into_iter()
+        .map(|(words, colour, shape)| {
+            LegendEntry::new(LegendKey::Marker(marker(shape, colour, 4.0)), words)
+        })
+        .chain([
+            LegendEntry::new(LegendKey::Line(formula.dashed()), "formulas of *v*_{+}, *v*_{−}"),
+            LegendEntry::new(LegendKey::Line(formula), "the same with their logarithms"),
+        ])
+        .fold(Sheet::new(ColumnWidth::Wide, 2, ""), Sheet::legend)
+        .panel_aspect(0.75)
         .panel("(a)", "growth of a disturbance", growth_panel(growth, &law))
-        .panel("(b)", "its local exponents", slopes)
+        .panel("(b)", "its local exponents", slopes_panel(growth, &law, tanh))
         .panel("(c)", "where the surface is left", selected)
-        .panel("(d)", "the far exit", exits)
-        .panel("(e)", "other two-folds", exponents)
+        .panel("(d)", "the far exit", far_panel(ladder, &law, tanh))
+        .panel("(e)", "other two-folds", exponents_panel(others))
         .panel("(f)", "nearness to the canard", nearness)
-        .legend(LegendEntry::new(LegendKey::Line(formula), "formulas of *v*_{+}, *v*_{−}"))
-        .legend(LegendEntry::new(
-            LegendKey::Line(LineStyle::new(style::SOFT_INK, style::CURVE_PT)),
-            "the same with their logarithms",
-        ))
         .footer(format!(
             "(a, b) Disturbances made at the visit, or carried in from *t* = 0; growth until the \
-                first passage through *y* = 0 beyond {}√*ε*; double-double \
-             arithmetic. Predicted powers: −{:.3} across, −{:.3} along, +0.5 carried in. {said}",
+             first passage through *y* = 0 beyond {}√*ε*. Predicted powers: −{:.3}, −{:.3}, +0.5.",
             number(BEYOND),
             -law.across(),
             -law.along(),
         ))
-        .footer(tip)
-        .footer(periods)
-        .footer(measured)
-        .footer(explained)
+        .footer(format!(
+            "(c) First passage through *x* = 0. Slope against ln(1/*ε*): measured {measured:.3}, \
+             predicted {predicted:.3} here and {:.3} in the limit.",
+            law.selection(tanh, f64::INFINITY),
+        ))
+        .footer(format!(
+            "(d) First upward passage through *x* = 0 beyond {}: periodic in ln *ε* up to a slow \
+             logarithm. Lines: jumps, predicted from the first one on.",
+            number(FAR),
+        ))
+        .footer(format!(
+            "(e) Between *ε* = {} and {}. Dotted: resonances, 1/*μ* a whole number, at which the \
+             exponent along rises to about 1/*μ* − 1.",
+            number(BETWEEN[0]),
+            number(BETWEEN[1]),
+        ))
+        .footer(format!(
+            "(f) *C*: distance from the canard at which an orbit comes in; growth is inverse to \
+             it. The printed reading comes in {times:.0} times nearer and crosses it {change}.",
+        ))
 }
+
+/// Directions of disturbances, with their looks.
+const SERIES: [(&str, Colour, MarkerShape); 3] = [
+    ("across the layer", style::VERMILLION, MarkerShape::Dot),
+    ("along it", style::BLUE, MarkerShape::Square),
+    ("carried in", style::GREEN, MarkerShape::Triangle),
+];
 
 fn growth_panel(rows: &[Row], law: &Predicted) -> PlanePanel {
     let formula = LineStyle::new(style::SOFT_INK, style::CURVE_PT).dashed();
-    let series = [
-        ("across the layer", style::VERMILLION, MarkerShape::Dot, law.across()),
-        ("along it", style::BLUE, MarkerShape::Square, law.along()),
-        ("carried in", style::GREEN, MarkerShape::Triangle, law.carried()),
-    ];
-    let mut panel = PlanePanel::new(Axis::log("*ε*", 5e-8, 2e-2), Axis::log("growth", 1e-6, 1e60));
-    for (which, (words, colour, shape, power)) in series.into_iter().enumerate() {
+    let powers = [law.across(), law.along(), law.carried()];
+    let mut panel = PlanePanel::new(Axis::log("*ε*", 5e-8, 2e-2), Axis::log("growth", 2e-5, 5e31));
+    for (which, ((_, colour, shape), power)) in SERIES.into_iter().zip(powers).enumerate() {
         let points: Vec<[f64; 2]> =
             rows.iter().map(|r| [r.eps, r.growth[which]]).filter(|p| p[1] > 0.0).collect();
         if let Some(&[eps, at]) = points.last() {
@@ -297,42 +311,30 @@ fn growth_panel(rows: &[Row], law: &Predicted) -> PlanePanel {
             panel = panel.line(ends.into(), formula);
         }
         let look = marker(shape, colour, 4.0);
-        panel = panel.markers(points, look).legend(LegendKey::Marker(look), words);
+        panel = panel.markers(points, look);
     }
-    panel.legend_at(Corner::UpperRight)
+    panel
 }
 
-fn slopes_panel(rows: &[Row], law: &Predicted, tanh: f64) -> (PlanePanel, String) {
+fn slopes_panel(rows: &[Row], law: &Predicted, tanh: f64) -> PlanePanel {
     let formula = LineStyle::new(style::SOFT_INK, style::CURVE_PT);
     let mut panel = PlanePanel::new(
         Axis::log("*ε*", 5e-8, 2e-2),
         Axis::linear("−d ln growth/d ln *ε*", 2.8, 4.3),
     );
-    let mut said = Vec::new();
-    let series = [
-        ("across", style::VERMILLION, MarkerShape::Dot, law.across()),
-        ("along", style::BLUE, MarkerShape::Square, law.along()),
-    ];
-    for (which, (words, colour, shape, power)) in series.into_iter().enumerate() {
+    for (which, ((_, colour, shape), power)) in
+        SERIES.into_iter().zip([law.across(), law.along()]).enumerate()
+    {
         let found = local_slopes(rows, which);
         let with_logarithm: Vec<[f64; 2]> =
             found.iter().map(|&(eps, _, z2)| [eps, -power - law.correction(tanh, z2)]).collect();
         let look = marker(shape, colour, 4.0);
         panel = panel
             .line(vec![[5e-8, -power], [2e-2, -power]], formula.dashed())
-            .line(with_logarithm.clone(), formula)
-            .markers(found.iter().map(|f| [f.0, f.1]).collect(), look)
-            .legend(LegendKey::Marker(look), words);
-        let off = found.iter().zip(&with_logarithm).filter(|(f, _)| f.0 < 1e-3);
-        let worst = off.map(|(f, p)| (f.1 - p[1]).abs()).fold(0.0, f64::max);
-        let measured: Vec<String> = found.iter().map(|f| format!("{:.3}", f.1)).collect();
-        said.push(format!(
-            "Local exponents {words}: {}; off the prediction with its logarithm by at most \
-                {worst:.3} below 10^{{−3}}.",
-            measured.join(", ")
-        ));
+            .line(with_logarithm, formula)
+            .markers(found.iter().map(|f| [f.0, f.1]).collect(), look);
     }
-    (panel.legend_at(Corner::LowerLeft), said.join(" "))
+    panel
 }
 
 /// The eps from which predictions of z^2/eps start.
@@ -344,7 +346,8 @@ fn anchor(ladder: &[Row]) -> (f64, f64) {
     ladder.iter().min_by(nearest).map_or((ANCHOR, f64::NAN), |r| (r.eps, r.z2))
 }
 
-fn selection_panel(ladder: &[Row], law: &Predicted, tanh: f64) -> (PlanePanel, String) {
+/// Where the surface is left, and the measured and the predicted slope of it.
+fn selection_panel(ladder: &[Row], law: &Predicted, tanh: f64) -> (PlanePanel, f64, f64) {
     let at = anchor(ladder);
     let points: Vec<[f64; 2]> = ladder.iter().map(|r| [r.eps, r.z2]).collect();
     let formula = LineStyle::new(style::SOFT_INK, style::CURVE_PT);
@@ -353,82 +356,51 @@ fn selection_panel(ladder: &[Row], law: &Predicted, tanh: f64) -> (PlanePanel, S
     let asymptote = law.selection(tanh, f64::INFINITY);
     let straight: Vec<[f64; 2]> =
         [1e-2, 2e-7].map(|eps: f64| [eps, at.1 + asymptote * ln(at.0 / eps)]).into();
-    let dots = marker(MarkerShape::Dot, style::VERMILLION, 3.0);
+    let dots = marker(MarkerShape::Dot, style::INK, 3.0);
     let y = Axis::covering("*z*^{2}/*ε* at the first exit", points.iter().map(|p| p[1]));
     let mut panel =
         PlanePanel::new(Axis::log("*ε*", 1.5e-7, 1.5e-2), y).line(straight, formula.dashed());
-    panel = panel.markers(points.clone(), dots).line(predicted.clone(), formula);
+    panel = panel.markers(points.clone(), dots).line(predicted, formula);
     let pairs: Vec<(f64, f64)> = points.iter().map(|p| (-ln(p[0]), p[1])).collect();
     let measured = line(&pairs).map_or(f64::NAN, |l| l.slope);
-    let worst =
-        points.iter().zip(&predicted).map(|(a, b)| (a[1] / b[1] - 1.0).abs()).fold(0.0, f64::max);
-    let text = format!(
-        "(c) First passage through *x* = 0 after the visit. Slope against ln(1/*ε*): measured \
-            {measured:.3}, predicted {asymptote:.3} in the limit and \
-         {:.3} here; the solid line is the predicted slope integrated from *ε* = 10^{{−3}} and is \
-         off by at most {:.1} %.",
-        law.selection(tanh, at.1),
-        100.0 * worst,
-    );
-    (panel, text)
+    (panel, measured, law.selection(tanh, at.1))
 }
 
-fn far_panel(ladder: &[Row], law: &Predicted, tanh: f64) -> (PlanePanel, String) {
+fn far_panel(ladder: &[Row], law: &Predicted, tanh: f64) -> PlanePanel {
     let formula = LineStyle::new(style::SOFT_INK, style::CURVE_PT);
     let found = jumps(ladder);
     let mut panel = PlanePanel::new(
         Axis::log("*ε*", 1.5e-7, 1.5e-2),
-        Axis::linear("*y*, *z* of the far exit", -2.2, 4.0),
+        Axis::linear("*y*, *z* of the far exit", -2.2, 1.6),
     );
     // Branch by branch.
-    for (which, colour) in [(0, style::BLUE), (1, style::VERMILLION)] {
+    for (which, words, at) in [(0, "*y*", -1.5), (1, "*z*", 1.15)] {
+        let branch_line = LineStyle::new(style::INK, style::CURVE_PT);
         let mut branch: Vec<[f64; 2]> = Vec::new();
         for (i, r) in ladder.iter().enumerate() {
             if i > 0 && found.iter().any(|j| j.1 == r.eps) {
-                panel = panel
-                    .line(std::mem::take(&mut branch), LineStyle::new(colour, style::CURVE_PT));
+                panel = panel.line(std::mem::take(&mut branch), branch_line);
             }
             branch.push([r.eps, r.far[which]]);
         }
-        panel = panel.line(branch, LineStyle::new(colour, style::CURVE_PT));
-        let look = marker(MarkerShape::Dot, colour, 2.6);
-        panel = panel.markers(ladder.iter().map(|r| [r.eps, r.far[which]]).collect(), look);
-        panel = panel.legend(LegendKey::Marker(look), if which == 0 { "*y*" } else { "*z*" });
+        let look = marker(MarkerShape::Dot, style::INK, 2.6);
+        panel = panel
+            .line(branch, branch_line)
+            .markers(ladder.iter().map(|r| [r.eps, r.far[which]]).collect(), look)
+            .note([4e-7, at], words, Anchor::Centre);
     }
     // From the first jump, one predicted period after the other.
-    let mut said = Vec::new();
     if let Some(&(above, below)) = found.first() {
         let mut eps = sqrt(above * below);
         let mut z2 = ladder.iter().find(|r| r.eps == below).map_or(f64::NAN, |r| r.z2);
         while eps > 2e-7 {
-            panel = panel.line(vec![[eps, -2.2], [eps, 1.5]], formula);
+            panel = panel.line(vec![[eps, -2.2], [eps, 1.6]], formula);
             let r = period(law, tanh, (eps, z2));
             z2 = grown(law, tanh, (eps, z2), eps / r);
             eps /= r;
-            said.push(format!("{r:.1}"));
         }
     }
-    let between: Vec<String> = found
-        .windows(2)
-        .map(|w| format!("{:.1}", sqrt(w[0].0 * w[0].1 / (w[1].0 * w[1].1))))
-        .collect();
-    let at: Vec<String> =
-        found.iter().map(|j| format!("{} and {}", short(j.0), short(j.1))).collect();
-    let text = format!(
-        "(d) First upward passage through *x* = 0 beyond {}: it depends on *ε* through the \
-            fractional part of ln(1/*ε*)/(2 ln *λ*), *λ* = {:.4}, up to a \
-         slow logarithm, so that by this formula there is no limit. Measured jumps between {}: \
-         factors {} (each to 6 %); predicted from one to the next: {} (vertical lines, from the \
-         first \
-         jump on), in the limit *λ*^{{2}} = {:.1}.",
-        number(FAR),
-        law.turn,
-        at.join("; "),
-        between.join(", "),
-        said.join(", "),
-        law.turn * law.turn,
-    );
-    (panel.legend_at(Corner::UpperRight), text)
+    panel
 }
 
 /// Signed distance of the incoming orbit from the canard, up to a constant: d = eps^(1/(2 mu))-less
@@ -438,7 +410,9 @@ fn nearness(row: &Row, law: &Predicted) -> f64 {
     if row.minus { size } else { -size }
 }
 
-fn nearness_panel(growth: &[Row], printed: &[Row], law: &Predicted) -> (PlanePanel, String) {
+/// The distances from the canard, how many times nearer the printed reading comes, and where it
+/// changes sides.
+fn nearness_panel(growth: &[Row], printed: &[Row], law: &Predicted) -> (PlanePanel, f64, String) {
     let relative = |rows: &[Row]| -> (f64, Vec<[f64; 2]>) {
         let limit = rows.last().map_or(f64::NAN, |r| nearness(r, law));
         (limit, rows.iter().map(|r| [r.eps * 1e3, nearness(r, law) / limit]).collect())
@@ -453,43 +427,29 @@ fn nearness_panel(growth: &[Row], printed: &[Row], law: &Predicted) -> (PlanePan
     let (b, others) = relative(printed);
     let mut panel = PlanePanel::new(
         Axis::linear("10^{3} *ε*", -0.4, 10.6),
-        Axis::linear("*C*(*ε*)/*C*(0)", -0.3, 2.2),
+        Axis::linear("*C*(*ε*)/*C*(0)", -0.15, 1.2),
     )
     .line(
         vec![[-0.4, 0.0], [10.6, 0.0]],
         LineStyle::new(style::SOFT_INK, style::FRAME_PT).dotted(),
     );
-    for (points, words, colour, shape) in [
-        (reconstructed, "reconstructed", style::BLUE, MarkerShape::Square),
-        (others.clone(), "printed", style::VERMILLION, MarkerShape::Dot),
-    ] {
-        let look = marker(shape, colour, 4.0);
-        panel = panel
-            .line(points.clone(), LineStyle::new(colour, style::CURVE_PT))
-            .markers(points, look)
-            .legend(LegendKey::Marker(look), words);
-    }
-    let slopes: Vec<String> =
-        local_slopes(printed, 0).iter().map(|s| format!("{:.2}", s.1)).collect();
     let zero = others.windows(2).find(|w| w[0][1] * w[1][1] < 0.0);
-    let text = format!(
-        "(f) The growth is *ε*^{{−1/2*μ*}}/*C*(*ε*) up to the logarithm, *C* the distance from the \
-            canard at which an orbit comes in, positive if it leaves to \
-         *x* < 0. The printed reading comes in from far away, {:.0} times nearer than the \
-         reconstructed one, so near that shifts proportional to *ε* carry it across the \
-         canard {}: that is why its local exponents are {}.",
-        a / b,
-        zero.map_or_else(String::new, |w| format!(
-            "between *ε* = {:.3} and {:.3}",
-            w[1][0] * 1e-3,
-            w[0][0] * 1e-3
-        )),
-        slopes.join(", "),
-    );
-    (panel.legend_at(Corner::UpperRight), text)
+    let change = zero.map_or_else(String::new, |w| {
+        format!("between *ε* = {:.3} and {:.3}", w[1][0] * 1e-3, w[0][0] * 1e-3)
+    });
+    for (points, words, at, shape) in [
+        (reconstructed, "reconstructed", [3.4, 0.98], MarkerShape::OpenDot),
+        (others, "printed", [5.3, 0.48], MarkerShape::Dot),
+    ] {
+        panel = panel
+            .line(points.clone(), LineStyle::new(style::INK, style::CURVE_PT))
+            .markers(points, marker(shape, style::INK, 4.0))
+            .note(at, words, Anchor::Left);
+    }
+    (panel, a / b, change)
 }
 
-fn exponents_panel(rows: &[Row]) -> (PlanePanel, String) {
+fn exponents_panel(rows: &[Row]) -> PlanePanel {
     let mut panel =
         PlanePanel::new(Axis::linear("1/*μ*", 2.0, 9.6), Axis::linear("exponent", 0.0, 6.4));
     for ratio in RATIOS.into_iter().filter(|r| r.fract() == 0.0) {
@@ -506,36 +466,16 @@ fn exponents_panel(rows: &[Row]) -> (PlanePanel, String) {
             vec![[2.0, 1.0], [7.4, 6.4]],
             LineStyle::new(style::SOFT_INK, style::FRAME_PT).dotted(),
         );
-    let mut said = Vec::new();
-    let mut series = [Vec::new(), Vec::new()];
-    for (ratio, pair) in RATIOS.into_iter().zip(rows.chunks(2)) {
-        let found: Vec<f64> = (0..2)
-            .map(|which| local_slopes(pair, which).first().map_or(f64::NAN, |s| s.1))
+    for (which, (_, colour, shape)) in SERIES.into_iter().take(2).enumerate() {
+        let exponent = |pair: &[Row]| local_slopes(pair, which).first().map(|s| s.1);
+        let points = RATIOS
+            .into_iter()
+            .zip(rows.chunks(2))
+            .filter_map(|(ratio, pair)| Some([ratio, exponent(pair)?]))
             .collect();
-        for (points, exponent) in series.iter_mut().zip(&found) {
-            points.push([ratio, *exponent]);
-        }
-        said.push(format!("{}: {:.2}, {:.2}", number(ratio), found[0], found[1]));
+        panel = panel.markers(points, marker(shape, colour, 4.0));
     }
-    for (points, (words, colour, shape)) in series.into_iter().zip([
-        ("across", style::VERMILLION, MarkerShape::Dot),
-        ("along", style::BLUE, MarkerShape::Square),
-    ]) {
-        let look = marker(shape, colour, 4.0);
-        panel = panel
-            .markers(points.into_iter().filter(|p| p[1].is_finite()).collect(), look)
-            .legend(LegendKey::Marker(look), words);
-    }
-    let text = format!(
-        "(e) Local exponents between *ε* = {} and {} for other *v*_{{±}} (1/*μ*: across, along): \
-            {}. Dotted: resonances, 1/*μ* a whole number. There an incoming orbit is not \
-         parted from the canard to first order, and the next order decides: the exponent along \
-         rises to about 1/*μ* − 1 (dotted line).",
-        number(BETWEEN[0]),
-        number(BETWEEN[1]),
-        said.join(", ")
-    );
-    (panel.legend_at(Corner::LowerRight), text)
+    panel
 }
 
 /// Questions of the second picture: passages by transition, then leaving by rule.
@@ -576,9 +516,9 @@ const RULES: [Rule; 3] = [Rule::Literal, Rule::Single, Rule::Noise];
 impl Rule {
     fn look(self) -> (&'static str, Colour, MarkerShape) {
         match self {
-            Rule::Literal => ("hysteresis, literal", style::BLUE, MarkerShape::Square),
-            Rule::Single => ("hysteresis, single", style::PURPLE, MarkerShape::Star),
-            Rule::Noise => ("noise", style::VERMILLION, MarkerShape::Triangle),
+            Rule::Literal => ("hysteresis, literal", style::PURPLE, MarkerShape::Dot),
+            Rule::Single => ("hysteresis, single", style::PURPLE, MarkerShape::Cross),
+            Rule::Noise => ("noise", style::ORANGE, MarkerShape::Dot),
         }
     }
 
@@ -644,14 +584,15 @@ fn draw_selection(answers: &[Arc<Answer>]) -> Sheet {
             Axis::log(if removed { "*ε*/*κ*" } else { "*ε*" }, 3e-6, 4e-2),
             Axis::log(title, if removed { 5.0 } else { 1.0 }, if removed { 100.0 } else { 300.0 }),
         );
-        for ((rows, &k), (_, _, colour, shape)) in rows.iter().zip(&stretch).zip(TRANSITIONS) {
+        let functions = rows.iter().zip(&stretch).zip(TRANSITIONS).rev();
+        for ((rows, &k), (_, _, colour, shape, size)) in functions {
             let k = if removed { k } else { 1.0 };
             let points: Vec<[f64; 2]> = rows[..OTHERS.len()]
                 .iter()
                 .map(|r| [r.eps / k, r.growth[0] * exp(-law.across() * ln(r.eps / k))])
                 .filter(|p| p[1] > 0.0)
                 .collect();
-            let look = marker(shape, colour, 4.0);
+            let look = marker(shape, colour, size);
             panel = panel
                 .line(points.clone(), LineStyle::new(colour, style::CURVE_PT))
                 .markers(points, look);
@@ -663,11 +604,12 @@ fn draw_selection(answers: &[Arc<Answer>]) -> Sheet {
             Axis::log(if removed { "*ε*/*κ*" } else { "*ε*" }, 5e-6, 4e-2),
             Axis::linear("*y* of the far exit", -2.1, -0.5),
         );
-        for ((rows, &k), (_, _, colour, shape)) in rows.iter().zip(&stretch).zip(TRANSITIONS) {
+        let functions = rows.iter().zip(&stretch).zip(TRANSITIONS).rev();
+        for ((rows, &k), (_, _, colour, shape, size)) in functions {
             let k = if removed { k } else { 1.0 };
             let points: Vec<[f64; 2]> =
                 rows[OTHERS.len()..].iter().map(|r| [r.eps / k, r.far[0]]).collect();
-            let look = marker(shape, colour, 2.8);
+            let look = marker(shape, colour, 0.7 * size);
             panel = panel.markers(apart(points), look);
         }
         panel
@@ -679,23 +621,23 @@ fn draw_selection(answers: &[Arc<Answer>]) -> Sheet {
     );
     let mut sides = PlanePanel::new(
         Axis::log("*ε*", 6e-5, 1.6e-2),
-        Axis::linear("share that leaves to *x* < 0", -0.08, 1.3),
+        Axis::linear("share left to *x* < 0", -0.08, 1.08),
     );
     let smooth: Vec<&Row> = rows[0].iter().filter(|r| SELECTION.contains(&r.eps)).collect();
-    let dots = marker(MarkerShape::Dot, style::INK, 4.0);
+    let dots = marker(MarkerShape::Dot, style::INK, 4.6);
     let tip: Vec<[f64; 2]> = smooth.iter().map(|r| [r.eps, sqrt(r.z2)]).collect();
     places =
         places.line(tip.clone(), LineStyle::new(style::INK, style::CURVE_PT)).markers(tip, dots);
-    let mut rules = vec![LegendEntry::new(LegendKey::Marker(dots), "smoothing (e, f)")];
+    let mut legend = vec![LegendEntry::new(LegendKey::Marker(dots), "tanh")];
     let share: Vec<[f64; 2]> =
         smooth.iter().map(|r| [r.eps, if r.minus { 1.0 } else { 0.0 }]).collect();
-    sides = sides.markers(share, dots);
-    let mut said = Vec::new();
+    // Large, so that crosses do not cover them.
+    sides = sides.markers(share, MarkerStyle { size: 6.6, ..dots });
     for (rule, answers) in RULES.into_iter().zip(leavings.chunks(SELECTION.len())) {
         let (words, colour, shape) = rule.look();
         let look = marker(shape, colour, 4.0);
         let (mut middles, mut shares) = (Vec::new(), Vec::new());
-        for (i, (answer, eps)) in answers.iter().zip(SELECTION).enumerate() {
+        for (answer, eps) in answers.iter().zip(SELECTION) {
             let table = &answer.tables[0];
             let mut depths: Vec<f64> = table
                 .numbers("left_z")
@@ -706,83 +648,54 @@ fn draw_selection(answers: &[Arc<Answer>]) -> Sheet {
             if depths.is_empty() {
                 continue;
             }
-            let middle = median(&mut depths);
+            let (count, middle) = (depths.len() as f64, median(&mut depths));
             // Beside each other, not upon each other.
             let at = eps * exp10(0.05 * (rule as usize as f64 - 1.0));
-            let quartile = |q: usize| depths[(q * (depths.len() - 1)) / 4];
-            places = places.line(
-                vec![[at, quartile(0)], [at, quartile(4)]],
-                LineStyle::new(colour, style::CURVE_PT),
-            );
+            let (least, most) = range_of(depths);
+            places =
+                places.line(vec![[at, least], [at, most]], LineStyle::new(colour, style::CURVE_PT));
             middles.push([at, middle]);
             let minus = table.numbers("left_x").iter().filter(|x| **x < 0.0).count();
-            shares.push([at, minus as f64 / depths.len() as f64]);
-            if i + 1 == SELECTION.len() || i == 0 {
-                said.push(format!(
-                    "{words} at {}: {middle:.2} ({:.2} to {:.2})",
-                    number(eps),
-                    quartile(0),
-                    quartile(4)
-                ));
-            }
+            shares.push([at, minus as f64 / count]);
         }
         places = places.markers(middles, look);
-        rules.push(LegendEntry::new(LegendKey::Marker(look), format!("{words} (e, f)")));
+        legend.push(LegendEntry::new(LegendKey::Marker(look), words));
         sides = sides.markers(shares, look);
     }
     let factors: Vec<String> =
         TRANSITIONS.iter().zip(&stretch).map(|(t, k)| format!("{} {k:.3}", t.1)).collect();
-    let functions = TRANSITIONS.iter().map(|(_, words, colour, shape)| {
-        let look = LegendKey::Marker(marker(*shape, *colour, 4.0));
-        LegendEntry::new(look, format!("{words} (a–d)"))
-    });
-    functions
-        .chain(rules)
+    let mut without_phases = compensated("growth × (*ε*/*κ*)^{1/2*μ*}", true);
+    for (_, words, colour, shape, size) in TRANSITIONS {
+        without_phases =
+            without_phases.legend(LegendKey::Marker(marker(shape, colour, size)), words);
+    }
+    legend
+        .into_iter()
         .fold(Sheet::new(ColumnWidth::Wide, 2, ""), Sheet::legend)
         .panel_aspect(0.8)
-        .panel(
-            "(a)",
-            "four transition functions",
-            compensated(
-                "growth across × \
-            *ε*^{1/2*μ*}",
-                false,
-            ),
-        )
-        .panel(
-            "(b)",
-            "their phases removed",
-            compensated(
-                "growth across × \
-            (*ε*/*κ*)^{1/2*μ*}",
-                true,
-            ),
-        )
+        .panel("(a)", "four transition functions", compensated("growth × *ε*^{1/2*μ*}", false))
+        .panel("(b)", "their phases removed", without_phases.legend_at(Corner::UpperLeft))
         .panel("(c)", "the far exit", exits(false))
         .panel("(d)", "their phases removed", exits(true))
         .panel("(e)", "member selected", places)
         .panel("(f)", "side selected", sides)
         .footer(format!(
-            "(a–d) Linearised about the canard, a transition function enters through its slope \
-                there alone: *ε*/*φ*′ takes the place of *ε*. *κ* is *φ*′ on \
-             the canard divided by tanh’s: {}. What is left after that is the shape of the \
-             function. In (c, d), points that would cover each other are left out about the jumps; \
-             the tables have all.",
+            "(a–d) Legend in (b); growth across the layer. *κ*: slope of the transition function \
+             on the canard divided by tanh’s: {}. The lone square is arctan’s at *ε* = 10^{{−2}}, \
+             which first crosses *x* = 0 three times as far out as the others. (c, d) have fewer \
+             points at the jumps than the tables.",
             factors.join(", ")
         ))
         .footer(format!(
-            "(e, f) The same start under other rules: smoothing (first passage through *x* = 0); \
-                hysteresis, eq. (10) with *ε*′ = {} *ε* in both readings of it, from {ORBITS} \
-             starts shifted by multiples of {} in *x*; tanh smoothing with {ORBITS} streams of \
-             kicks of length *ε* after every {}. Where |*x*| first exceeds 3*ε* after the \
-             visit: median and range. Smoothing always selects the same side and a member that \
-             lies farther out by the root of a logarithm; the literal hysteresis and noise \
-             select members at the singularity itself, to both sides; the single reading of eq. \
-             (10) is smoothing with *ε*′ in place of *ε*. Median (range) of −*z*/√*ε*: {}.",
+            "(e, f) Where |*x*| first exceeds 3*ε* after the visit, median and range: eq. (10) \
+             with *ε*′ = {}*ε* from {ORBITS} starts shifted by multiples of {} in *x*; noise of \
+             length *ε* every {}, {ORBITS} streams. tanh selects one side; literal hysteresis and \
+             noise both, nearer to the singularity; the single reading of eq. (10) is smoothing \
+             with *ε*′. At *ε* = 10^{{−2}} no hysteretic orbit has a visit and leaves by *t* = \
+             40.",
             number(RELAXATION),
             number(SHIFT),
             number(KICKS),
-            said.join("; ")
         ))
 }
 
