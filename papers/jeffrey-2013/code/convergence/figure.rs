@@ -9,7 +9,7 @@ use twofold::analyse::limit::{AfterVisitQuestion, ConvergenceQuestion, observed_
 use twofold::integrate::filippov::{FilippovOptions, FunnelGrid};
 use twofold::job::table::{Entry, Table};
 use twofold::job::{AfterVisit, AnyQuestion, SmoothingLimit};
-use twofold::num::elementary::exp10;
+use twofold::num::elementary::{exp10, log10};
 use twofold::paper::wording::number;
 use twofold::paper::{Figure, Study};
 use twofold::render::sheet::*;
@@ -101,70 +101,44 @@ fn proportional(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
     points.iter().map(|p| [p[0], y0 * p[0] / x0]).collect()
 }
 
-/// An axis of distances with room for a legend below.
-fn with_room(room: f64, distances: impl Iterator<Item = f64>) -> Axis {
-    let mut axis = Axis::log_covering("distance", distances);
-    axis.lower /= room;
-    axis
-}
-
 fn draw(tables: &[Table]) -> Sheet {
     let [before, members, after] = tables else {
         unreachable!("the two questions have three tables")
     };
     let (before, members, after) = (before.rows(), members.rows(), after.rows());
     let expected = LineStyle::new(style::SOFT_INK, style::CURVE_PT).dashed();
-    let (approach, rates) = approach(&before, expected);
+    let (approach, legend, rates) = approach(&before, expected);
     let distances: Vec<[f64; 2]> = after.iter().map(|r| [value(&r[0]), value(&r[5])]).collect();
     let visit = after.first().map_or(f64::NAN, |r| value(&r[7]));
-    let nearest: Vec<String> = after
-        .iter()
-        .step_by(PER_DECADE)
-        .map(|r| {
-            format!(
-                "{} for *ε* = {}",
-                number((value(&r[3]) * 1e3).round() / 1e3),
-                number(value(&r[0]))
-            )
-        })
-        .collect();
-    Sheet::new(ColumnWidth::Wide, 1, "")
-        .panel_aspect(0.5)
+    legend
+        .into_iter()
+        .fold(Sheet::new(ColumnWidth::Wide, 1, ""), Sheet::legend)
+        .panel_aspect(0.42)
         .panel("(a)", "before the visit", approach)
         .panel("(b)", "crossings of *x* = 0 after it", crossings(&members, &after))
-        .panel("(c)", "nearest member", nearest_member(&after, &distances))
-        .legend(LegendEntry::new(
-            LegendKey::Line(expected),
-            "(a) distance proportional to *ε*, \
-            through the point of the smallest *ε*",
-        ))
+        .panel("(c)", "distance to the nearest Filippov orbit", nearest_member(&after, &distances))
         .footer(format!(
-            "(a) Distance of the smoothed orbit from the Filippov orbit, whose first visit to the \
-                singularity is at *t* = {visit:.3}. \
-             Measured powers of *ε*, least squares: {}.",
+            "(a) Distance of the smoothed orbit from the Filippov orbit, which first visits the \
+             singularity at *t* = {visit:.3}. Powers of *ε*, least squares: {}.",
             rates.join(", ")
         ))
         .footer(format!(
-            "(b) Where the Filippov orbits that leave the singularity after a time of repelling \
-                sliding of {} … {} first cross upwards \
-             farther than {} from it, and where smoothed orbits do, followed in double-double \
-             arithmetic through the visit: {PER_DECADE} values of *ε* a decade (labels: whole \
-             decades). They wander along the funnel and jump back, periodically in ln *ε*: figure \
-             law.",
+            "(b) First upward crossings beyond {} of the Filippov orbits that leave the \
+             singularity after repelling sliding for {} … {}, and of smoothed orbits, {PER_DECADE} \
+             values of *ε* a decade (filled: whole decades). They wander along the funnel and jump \
+             back, periodically in ln *ε* (figure law).",
+            number(BEYOND),
             number(GRID.shortest),
             number(GRID.longest),
-            number(BEYOND)
         ))
-        .footer(format!(
-            "(c) Distance in (b) to the nearest Filippov orbit: measured power of *ε*, least \
-                squares, {:.2}. That orbit’s time of repelling sliding: {}.",
-            observed_rate(distances),
-            nearest.join(", ")
-        ))
+        .footer(format!("(c) Power of *ε*, least squares: {:.2}.", observed_rate(distances)))
 }
 
-/// Distances before the visit, and their measured powers of eps in words.
-fn approach(before: &[Vec<Entry>], expected: LineStyle) -> (PlanePanel, Vec<String>) {
+/// Distances before the visit, what the marks mean, and the measured powers of eps in words.
+fn approach(
+    before: &[Vec<Entry>],
+    expected: LineStyle,
+) -> (PlanePanel, Vec<LegendEntry>, Vec<String>) {
     let mut moments: Vec<f64> = Vec::new();
     for row in before {
         if !moments.contains(&value(&row[1])) {
@@ -173,9 +147,9 @@ fn approach(before: &[Vec<Entry>], expected: LineStyle) -> (PlanePanel, Vec<Stri
     }
     let mut panel = PlanePanel::new(
         Axis::log_covering("*ε*", before.iter().map(|r| value(&r[0]))),
-        with_room(12.0, before.iter().map(|r| value(&r[3]))),
+        Axis::log_covering("distance", before.iter().map(|r| value(&r[3]))),
     );
-    let mut rates = Vec::new();
+    let (mut legend, mut rates) = (Vec::new(), Vec::new());
     for (&t, (colour, shape)) in moments.iter().zip(LOOKS) {
         let rows: Vec<_> = before.iter().filter(|r| value(&r[1]) == t).collect();
         let points: Vec<[f64; 2]> = rows.iter().map(|r| [value(&r[0]), value(&r[3])]).collect();
@@ -183,10 +157,13 @@ fn approach(before: &[Vec<Entry>], expected: LineStyle) -> (PlanePanel, Vec<Stri
         panel = panel.line(proportional(&points), expected).markers(points.clone(), marker);
         let mode =
             if rows.iter().all(|r| r[2] == Entry::from("sliding")) { "sliding" } else { "free" };
-        panel = panel.legend(LegendKey::Marker(marker), format!("*t* = {} ({mode})", number(t)));
+        let words = format!("(a) *t* = {}, {mode}", number(t));
+        legend.push(LegendEntry::new(LegendKey::Marker(marker), words));
         rates.push(format!("{:.3} at *t* = {}", observed_rate(points), number(t)));
     }
-    (panel.legend_at(Corner::LowerRight), rates)
+    let words = "(a) proportional to *ε*, through the point of the smallest *ε*";
+    legend.push(LegendEntry::new(LegendKey::Line(expected), words));
+    (panel, legend, rates)
 }
 
 /// Crossings of members of the funnel and of smoothed orbits after the visit.
@@ -201,7 +178,8 @@ fn crossings(members: &[Vec<Entry>], after: &[Vec<Entry>]) -> PlanePanel {
         (Axis::covering("*y*", all().map(|p| p[0])), Axis::covering("*z*", all().map(|p| p[1])));
     let (wide, high) = (y.upper - y.lower, z.upper - z.lower);
     let left = y.lower;
-    (y.upper, z.lower) = (y.upper + 0.3 * wide, z.lower - 0.12 * high);
+    (y.upper, z.lower, z.upper) =
+        (y.upper + 0.08 * wide, z.lower - 0.12 * high, z.upper + 0.08 * high);
     let mut panel = PlanePanel::new(y, z);
     for (name, words, colour) in
         [("plus", "left to *x* > 0", style::BLUE), ("minus", "left to *x* < 0", style::VERMILLION)]
@@ -211,15 +189,17 @@ fn crossings(members: &[Vec<Entry>], after: &[Vec<Entry>]) -> PlanePanel {
     }
     let ring = MarkerStyle { shape: MarkerShape::OpenDot, colour: style::INK, size: 4.0 };
     panel = panel.markers(exits.clone(), ring).legend(LegendKey::Marker(ring), "smoothed");
+    let disc = MarkerStyle { shape: MarkerShape::Dot, ..ring };
     for (row, &[y, z]) in after.iter().zip(&exits).step_by(PER_DECADE) {
-        // To the right above the lowest branch, below on it, but not across the frame.
+        // Above, below on the lowest branch, but not across the frame.
         let mut places = members.iter().map(|r| [value(&r[2]), value(&r[3])]);
         let lowest = !places.any(|m| (m[0] - y).abs() < 0.08 * wide && m[1] < z - 0.06 * high);
-        let text = number(value(&row[0]));
+        let text = format!("10^{{{}}}", log10(value(&row[0])).round());
+        panel = panel.markers(vec![[y, z]], disc);
         panel = if lowest && y > left + 0.2 * wide {
             panel.note([y, z - 0.03 * high], text, Anchor::Below)
         } else {
-            panel.note([y + 0.07 * wide, z + 0.02 * high], text, Anchor::Left)
+            panel.note([y + 0.03 * wide, z + 0.02 * high], text, Anchor::Above)
         };
     }
     panel
@@ -230,22 +210,23 @@ fn nearest_member(after: &[Vec<Entry>], distances: &[[f64; 2]]) -> PlanePanel {
     let widths: Vec<[f64; 2]> = after.iter().map(|r| [value(&r[0]), value(&r[6])]).collect();
     let near = MarkerStyle { shape: MarkerShape::Dot, colour: style::INK, size: 4.0 };
     let whole = LineStyle::new(style::GREEN, style::CURVE_PT);
-    PlanePanel::new(
-        Axis::log_covering("*ε*", distances.iter().map(|p| p[0])),
-        with_room(10.0, distances.iter().chain(&widths).map(|p| p[1])),
-    )
-    .line(widths, whole)
-    .markers(distances.to_vec(), near)
-    .legend(LegendKey::Line(whole), "width of the funnel")
-    .legend(LegendKey::Marker(near), "to its nearest member")
-    .legend_at(Corner::LowerRight)
+    let shown = || distances.iter().chain(&widths);
+    let x = Axis::log_covering("*ε*", shown().map(|p| p[0]));
+    let y = Axis::log_covering("distance", shown().map(|p| p[1]));
+    let panel = PlanePanel::new(x, y).line(widths.clone(), whole).markers(distances.to_vec(), near);
+    match widths.first() {
+        Some(&[eps, width]) => {
+            panel.note([eps, 0.35 * width], "width of the funnel", Anchor::Right)
+        }
+        None => panel,
+    }
 }
 
 /// The figure's specification.
 pub fn figure() -> Figure {
     studied_in_both_readings(
         "convergence",
-        "Smoothed orbits and the Filippov motion as the switch steepens",
+        "Smoothed and Filippov motion as the switch steepens",
         "(a) Distance between smoothed orbit and Filippov orbit at four times before the first \
             visit to the singularity, \
                   against ε, with lines proportional to ε. (b) After the visit the Filippov motion \

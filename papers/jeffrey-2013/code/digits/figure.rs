@@ -48,7 +48,7 @@ const AT_START: f64 = 1e-3;
 /// The exit of the first visit must come before this time.
 const EXIT_BY: f64 = 80.0;
 /// Growth of a disturbance made across the layer at the singularity, reconstructed reading,
-/// measured by another program: (eps, factor).
+/// measured by another program with 113 bits or more: (eps, factor).
 const OUTSIDE: [(f64, f64); 3] = [(1e-2, 3.36e9), (1e-3, 7.67e12), (1e-4, 5.49e16)];
 
 /// Stiffness parameters of the right panel.
@@ -132,13 +132,13 @@ fn series(growth: &[Vec<Entry>]) -> [Series; 3] {
     };
     [
         Series {
-            words: "at it, across the layer (*x*)",
+            words: "at the visit, across the layer (*x*)",
             colour: style::VERMILLION,
             shape: MarkerShape::Dot,
             points: pick(false, &[0]),
         },
         Series {
-            words: "at it, along the layer (*y*, *z*)",
+            words: "at the visit, along it (*y*, *z*)",
             colour: style::BLUE,
             shape: MarkerShape::Square,
             points: pick(false, &[1, 2]),
@@ -218,7 +218,7 @@ fn draw(reading: Reading, answers: &[Arc<Answer>]) -> Sheet {
         outside(reading).iter().map(|&(eps, growth)| [eps, growth]).collect();
     let mut amplified = PlanePanel::new(
         Axis::log("*ε*", 6e-6, 1.6e-2),
-        Axis::log("growth of a disturbance", 1e-4, 1e46),
+        Axis::log("growth of a disturbance", 2e-5, 5e25),
     );
     for (level, words, at, anchor) in [
         (1.0, "neither grows nor shrinks", 6.6e-6, Anchor::Left),
@@ -232,76 +232,55 @@ fn draw(reading: Reading, answers: &[Arc<Answer>]) -> Sheet {
             )
             .note([at, level * 5.0], words, anchor);
     }
+    let mut legend = Vec::new();
     for s in &series {
         let style = MarkerStyle { shape: s.shape, colour: s.colour, size: 4.0 };
         amplified = amplified
             .line(s.largest(), LineStyle::new(s.colour, style::CURVE_PT))
             .markers(s.points.clone(), style);
-        amplified = amplified.legend(LegendKey::Marker(style), s.words);
+        legend.push(LegendEntry::new(LegendKey::Marker(style), s.words));
     }
-    if !outside.is_empty() {
+    let is_compared = !outside.is_empty();
+    if is_compared {
         let hollow = MarkerStyle { shape: MarkerShape::OpenDot, colour: style::INK, size: 5.0 };
-        amplified = amplified
-            .markers(outside, hollow)
-            .legend(LegendKey::Marker(hollow), "measured elsewhere");
+        amplified = amplified.markers(outside, hollow);
+        legend.push(LegendEntry::new(LegendKey::Marker(hollow), "by another program"));
     }
-    let amplified = amplified.legend_at(Corner::UpperRight);
-    let sheet = Sheet::new(ColumnWidth::Wide, 1, "")
-        .panel_aspect(0.55)
+    let sheet = legend
+        .into_iter()
+        .fold(Sheet::new(ColumnWidth::Wide, 1, ""), Sheet::legend)
+        .panel_aspect(0.5)
         .panel("(a)", format!("passages through *y* = 0, *ε* = {}", number(EPS)), digits)
         .panel("(b)", "what the first visit makes of a disturbance", amplified);
-    footer(rows, visits, &series).into_iter().fold(sheet, Sheet::footer)
+    footer(&series, is_compared).into_iter().fold(sheet, Sheet::footer)
 }
 
 /// Statements about the tables, in words.
-fn footer(rows: &Table, visits: &Table, series: &[Series; 3]) -> Vec<String> {
-    let mut lines =
-        vec![
-        "(a) −log_{10} of the largest difference in a coordinate between a method’s *n*th passage \
-            and that of an orbit in \
-         double-double arithmetic (32 digits). "
-            .to_owned()
-            + &format!("Visit: a passage within {} of the singularity. Steps up to \
-                {}.", number(NEAR), number(MAX_STEP)),
-    ];
-    if let Some(first) = visits.rows().first().map(|r| value(&r[0])) {
-        let around = methods().map(|(method, tolerance, _, _)| {
-            let mine: Vec<_> = rows
-                .rows()
-                .iter()
-                .filter(|r| r[0] == Entry::from(method.name()) && r[1] == Entry::from(tolerance))
-                .map(|r| (value(&r[3]), value(&r[5])))
-                .collect();
-            let before =
-                mine.iter().filter(|r| r.0 < first).map(|r| r.1).fold(f64::INFINITY, f64::min);
-            let after = mine.iter().find(|r| r.0 > first).map_or(f64::NAN, |r| r.1);
-            format!("{} {}: {before:.1} → {after:.1}", method.name(), number(tolerance))
-                .replace('-', "−")
-        });
-        lines.push(format!(
-            "Fewest digits before the first visit (*t* = {first:.2}), and digits at the next \
-                passage after it: {}.",
-            around.join("; ")
-        ));
-    }
-    let slopes: Vec<String> = series
-        .iter()
-        .map(|s| format!("{:.2} ({})", s.digits_per_decade(), s.words).replace('-', "−"))
-        .collect();
+fn footer(series: &[Series; 3], is_compared: bool) -> Vec<String> {
+    let slopes =
+        series.each_ref().map(|s| format!("{:.2}", s.digits_per_decade()).replace('-', "−"));
     let law = Predicted::of(-1.2, -1.4);
-    lines.push(format!(
-        "(b) Distance at the exit over the size of the disturbance; the exit is the first passage \
-            beyond {}√*ε*. Made at it: {}√*ε* before, at \
-         and as much after the passage; the line joins the largest. Digits by which the growth \
-         rises for each decade that *ε* falls, least squares: {}; \
-         in the limit {:.2}, {:.2} and −0.5, from *v*_{{+}} and *v*_{{−}} alone (figure law).",
-        number(BEYOND),
-        number(OFFSETS[2]),
-        slopes.join(", "),
-        -law.across(),
-        -law.along(),
-    ));
-    lines
+    let program = if is_compared { " The other program has 113 bits or more." } else { "" };
+    vec![
+        format!(
+            "(a) −log_{{10}} of the largest difference in a coordinate between a method’s *n*th \
+             passage and that of an orbit in double-double arithmetic (32 digits); below 0, \
+             differences larger than 1. Visit: within {} of the singularity. Steps up to {}.",
+            number(NEAR),
+            number(MAX_STEP)
+        ),
+        format!(
+            "(b) Distance at the first passage through *y* = 0 beyond {}√*ε* over the size of the \
+             disturbance, made {}√*ε* before, at and as much after the visit; lines join the \
+             largest. Digits a decade of *ε*: {}; in the limit {:.2}, {:.2}, −0.5 (figure \
+             law).{program}",
+            number(BEYOND),
+            number(OFFSETS[2]),
+            slopes.join(", "),
+            -law.across(),
+            -law.along(),
+        ),
+    ]
 }
 
 /// The figure's specification.
