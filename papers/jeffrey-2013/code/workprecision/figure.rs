@@ -13,6 +13,7 @@ use crate::computed::Computed;
 use serde_json::{Value, json};
 use twofold::job::table::{Column, Entry, Table};
 use twofold::job::{AnyQuestion, JobError};
+use twofold::num::elementary::{exp10, log10};
 use twofold::paper::wording::number;
 use twofold::paper::{Figure, Picture, Study, View};
 use twofold::record::Hash;
@@ -86,18 +87,34 @@ fn run(row: &[Entry]) -> (&str, &str, [f64; 5]) {
     (word(0), word(1), std::array::from_fn(|i| value(i + 2)))
 }
 
+/// An axis that covers these values and three powers of ten, so that its labels are powers of ten.
+fn decades(title: &str, values: impl Iterator<Item = f64>) -> Axis {
+    let mut axis = Axis::log_covering(title, values);
+    let (mut first, mut last) = (log10(axis.lower).ceil(), log10(axis.upper).floor());
+    while last - first < 2.0 {
+        // The nearer power outside.
+        let (down, up) = (exp10(first - 1.0), exp10(last + 1.0));
+        if axis.lower / down < up / axis.upper {
+            (axis.lower, first) = (down, first - 1.0);
+        } else {
+            (axis.upper, last) = (up, last + 1.0);
+        }
+    }
+    axis
+}
+
 /// Panels side by side.
 const COLUMNS: usize = 2;
 
 fn draw(tables: &[Table]) -> Sheet {
     let rows = tables[0].rows();
     let runs: Vec<_> = rows.iter().map(|row| run(row)).collect();
-    let mut sheet = Sheet::new(ColumnWidth::Wide, COLUMNS, "").panel_aspect(0.72);
+    let mut sheet = Sheet::new(ColumnWidth::Wide, COLUMNS, "").panel_aspect(0.66);
     for (i, (problem, heading)) in PANELS.iter().enumerate() {
         let here: Vec<_> = runs.iter().filter(|r| r.0 == *problem).collect();
         let x = if i + COLUMNS >= PANELS.len() { "evaluations of *f*" } else { "" };
         let y = if i % COLUMNS == 0 { "error at the end" } else { "" };
-        let x = Axis::log_covering(x, here.iter().map(|r| r.2[2]));
+        let x = decades(x, here.iter().map(|r| r.2[2]));
         let y = Axis::log_covering(y, here.iter().map(|r| r.2[1]));
         let (left, right) = (x.lower, x.upper);
         let mut chart = PlanePanel::new(x, y);
@@ -119,14 +136,12 @@ fn draw(tables: &[Table]) -> Sheet {
         }
         sheet = sheet.panel("", *heading, chart);
     }
+    let mut legend = PlanePanel::sketch((0.0, 1.0), (0.0, 0.66)).legend_at(Corner::UpperLeft);
     for (_, words, shape, colour, size) in METHODS.into_iter().rev() {
-        sheet = sheet.legend(LegendEntry::new(
-            LegendKey::Marker(MarkerStyle { shape, colour, size }),
-            words,
-        ));
+        legend = legend.legend(LegendKey::Marker(MarkerStyle { shape, colour, size }), words);
     }
     let limit = LineStyle::new(style::SOFT_INK, style::FRAME_PT).dotted();
-    sheet = sheet.legend(LegendEntry::new(LegendKey::Line(limit), "uncertainty of the solution"));
+    sheet = sheet.panel("", "", legend.legend(LegendKey::Line(limit), "uncertainty"));
     footer(&runs).into_iter().fold(sheet, Sheet::footer)
 }
 
