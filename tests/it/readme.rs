@@ -252,7 +252,7 @@ fn futures_come_back_as_often_as_the_findings_say() {
             .into_iter()
             .find(|p| p.reading == Some(reading.into()))
             .unwrap();
-        let said = format!("{back} of 40 futures come back within 300;");
+        let said = format!("{back} of 40 futures come back within 300 units of time;");
         assert!(fig4.panels[0].title.starts_with(&said), "{}", fig4.panels[0].title);
     }
 }

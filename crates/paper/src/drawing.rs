@@ -256,7 +256,7 @@ fn space_panels(
             let points: Vec<[f64; 3]> = connection.points.iter().map(|x| turn(*x)).collect();
             let ends = [points[0], points[points.len() - 1]];
             chart = chart.line(points, CONNECTION).markers(ends.to_vec(), END);
-            chart = chart.note(ends[0], "*A*", Anchor::Above).note(ends[1], "*B*", Anchor::Above);
+            chart = chart.note(ends[0], "*A*", Anchor::Left).note(ends[1], "*B*", Anchor::Left);
         }
         let exits: Vec<[f64; 3]> = exits(&recording.data).into_iter().map(turn).collect();
         if !exits.is_empty() {
@@ -280,8 +280,10 @@ fn space_panels(
                 &ranges,
             )
         {
-            sheet =
-                sheet.panel("", "the passage, nearer, seen along the normal of the surface", chart);
+            let title = format!("the passage, enlarged, seen along *{}*", greek(names[order[2]]));
+            sheet = sheet.panel("", title, chart).footer(
+                "in the enlargement, thin straight lines are flights above or below the surface",
+            );
         }
     }
     let sheet = region_legend(sheet);
@@ -289,9 +291,8 @@ fn space_panels(
         Some(Data::Motion(_)) => sheet
             .legend(LegendEntry::new(LegendKey::Line(SLIDING), "sliding"))
             .legend(LegendEntry::new(LegendKey::Marker(EXIT), "exit")),
-        Some(data @ Data::Funnel { futures, .. }) => sheet
+        Some(data @ Data::Funnel { .. }) => sheet
             .footer(connection(data).map_or(String::new(), |c| c.words()))
-            .footer(returns(futures))
             .legend(LegendEntry::new(
                 LegendKey::Line(CONNECTION),
                 "from *A* to *B* through the singularity",
@@ -340,15 +341,13 @@ fn passage(
     let mut chart = PlanePanel::new(axis(0), axis(1)).equal();
     chart.aspect = Some(PASSAGE_ASPECT);
     for patch in surface::patches(&panel.run.system, &window, PASSAGE_CELLS) {
-        chart =
-            chart.area(patch.corners.iter().map(|x| axes.map(|i| x[i])).collect(), patch.colour);
+        let outline = patch.corners.iter().map(|x| axes.map(|i| x[i])).collect();
+        chart = chart.area(outline, patch.colour.lighten(0.5));
     }
     for curve in curves {
-        let seen: Vec<[f64; 2]> = curve.points.iter().map(|x| axes.map(|i| x[i])).collect();
-        // Only what lies in the window: long orbits would weigh down the file.
-        for part in seen.split(|p| distance(p) > reach).filter(|part| part.len() > 1) {
-            chart = chart.line(part.to_vec(), curve.style);
-        }
+        let seen = curve.points.iter().map(|x| axes.map(|i| x[i])).collect();
+        let width = if curve.flight { FLIGHT_FROM_ABOVE_PT } else { curve.style.width };
+        chart = chart.line(seen, LineStyle { width, ..curve.style });
     }
     let inside: Vec<[f64; 2]> = exits.into_iter().filter(|p| distance(p) <= reach).collect();
     Some(chart.markers(inside, EXIT).markers(vec![centre], SINGULARITY))
@@ -358,19 +357,8 @@ fn passage(
 const PASSAGE_ASPECT: f64 = 0.62;
 /// Cells of the switching surface along each side of the nearer view.
 const PASSAGE_CELLS: usize = 12;
-
-/// Number of futures that came back to the two-fold, in words.
-fn returns(futures: &[Future]) -> String {
-    let longest = futures
-        .iter()
-        .filter_map(|f| Some(f.motion.samples().last()?.1.t - f.motion.samples().next()?.1.t));
-    format!(
-        "drawn: {} of {} futures come back to the two-fold within {} of leaving it",
-        futures.iter().filter(|f| comes_back(f)).count(),
-        futures.len(),
-        wording::number(longest.fold(0.0, f64::max).round())
-    )
-}
+/// Width of flights in it: thinner than what lies on the surface.
+const FLIGHT_FROM_ABOVE_PT: f64 = 0.3;
 
 /// A trajectory between two points of the set, through the singularity.
 struct Connection {
@@ -421,7 +409,8 @@ fn connection(data: &Data) -> Option<Connection> {
 
 /// Curves, and on top of them a connection.
 fn connected(curves: &[Curve], connection: Option<Connection>) -> Vec<Curve> {
-    let connection = connection.map(|c| Curve { points: c.points, style: CONNECTION });
+    let connection =
+        connection.map(|c| Curve { points: c.points, style: CONNECTION, flight: false });
     curves.iter().cloned().chain(connection).collect()
 }
 
@@ -435,22 +424,26 @@ fn comes_back(future: &Future) -> bool {
 struct Curve {
     points: Vec<[f64; 3]>,
     style: LineStyle,
+    /// Whether it is a flight off the switching surface.
+    flight: bool,
 }
 
 /// Curves that are drawn of a recording in space.
 fn curves(data: &Data) -> Vec<Curve> {
     let points = |samples: &[Sample]| samples.iter().map(|s| s.x).collect::<Vec<_>>();
     let motion = |motion: &Motion, flight: LineStyle, sliding: LineStyle| -> Vec<Curve> {
-        let style = |mode: &Mode| if mode.slides() { sliding } else { flight };
-        motion
-            .pieces
-            .iter()
-            .map(|(mode, samples)| Curve { points: points(samples), style: style(mode) })
-            .collect()
+        let curve = |(mode, samples): &(Mode, Vec<Sample>)| Curve {
+            points: points(samples),
+            style: if mode.slides() { sliding } else { flight },
+            flight: !mode.slides(),
+        };
+        motion.pieces.iter().map(curve).collect()
     };
     match data {
         Data::Section(_) => Vec::new(),
-        Data::Path(samples) => vec![Curve { points: points(samples), style: PATH }],
+        Data::Path(samples) => {
+            vec![Curve { points: points(samples), style: PATH, flight: false }]
+        }
         Data::Motion(m) => motion(m, FLIGHT, SLIDING),
         Data::Funnel { approach, futures } => {
             let mut all = Vec::new();
@@ -530,5 +523,52 @@ fn greek(name: &str) -> &str {
     match name {
         "omega" => "ω",
         other => other,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use twofold_job::simulate::simulate;
+    use twofold_job::spec::{Method, MethodSpec, Observation, RunSpec, SwitchSpec};
+    use twofold_render::sheet::PlaneLayer;
+
+    #[test]
+    fn the_enlarged_passage_shows_flights_whole() {
+        let run = RunSpec {
+            system: twofold_system::Caricature::with_reinjection(0.1, 1e-5).into(),
+            switch: SwitchSpec::Filippov {
+                exit: twofold_integrate::filippov::ExitRule::AfterTime {
+                    time: 0.3,
+                    side: Side::Plus,
+                },
+                funnel: None,
+            },
+            start: vec![0.2, 0.0, -1.0],
+            t_end: 40.0,
+            method: MethodSpec::ndsolve_defaults(Method::Dopri5),
+            schedule: twofold_integrate::Schedule::default(),
+            observe: Observation::Path { chord: 1e-3 },
+        };
+        let recording = simulate(&run, &()).unwrap();
+        let curves = curves(&recording.data);
+        let panel = FigurePanel::new("i", "", run);
+        let ranges = [(-2.0, 2.0); 3];
+        let chart = passage(&panel, &recording, &curves, [0.0; 3], [1, 2], &ranges).unwrap();
+        let within = |p: &[f64; 2]| {
+            (chart.x.lower..=chart.x.upper).contains(&p[0])
+                && (chart.y.lower..=chart.y.upper).contains(&p[1])
+        };
+        let ends = curves.iter().flat_map(|c| [c.points.first(), c.points.last()]).flatten();
+        let ends: Vec<[f64; 2]> = ends.map(|x| [x[1], x[2]]).collect();
+        let mut left = 0;
+        for layer in &chart.layers {
+            let PlaneLayer::Line { points, .. } = layer else { continue };
+            left += usize::from(!points.iter().all(within));
+            for end in [points.first(), points.last()].into_iter().flatten() {
+                assert!(!within(end) || ends.contains(end), "a line ends in mid-air at {end:?}");
+            }
+        }
+        assert!(left > 3, "only {left} lines leave the window");
     }
 }

@@ -456,6 +456,26 @@ fn what_lies_behind_a_surface_is_drawn_before_it_and_the_rest_after() {
 }
 
 #[test]
+fn a_line_is_drawn_up_to_the_frame_where_no_vertex_lies_inside() {
+    let blue = LineStyle::new(Colour::rgb(0, 0, 255), 1.0);
+    let panel = dot_panel(Vec::new()).line(vec![[-12.0, 15.0], [13.0, 15.0]], blue);
+    let scene = layout::draw(&Sheet::new(ColumnWidth::Single, 1, "").panel("", "", panel)).unwrap();
+    let [left, _, right, _] = frame(&scene);
+    let drawn: Vec<Position> = scene
+        .items
+        .iter()
+        .filter_map(|item| match item {
+            Item::Stroke { paint, lines, .. } if paint.colour == blue.colour => Some(lines),
+            _ => None,
+        })
+        .flatten()
+        .flatten()
+        .copied()
+        .collect();
+    assert_eq!(drawn.iter().map(|p| p.0).collect::<Vec<_>>(), [left, right]);
+}
+
+#[test]
 fn region_colours_differ_in_greyscale() {
     // Relative luminance (IEC 61966-2-1) of each region as it appears on paper.
     let share = f64::from(style::SURFACE_OPACITY) / 100.0;

@@ -16,11 +16,10 @@ pub fn figure() -> Figure {
         |_| {
             "The orbit from (0.2, 0, −1) reaches the two-fold; from there its future is a set. \
                 Five exit times from the repelling \
-             region, each to both sides, followed until they come back to the two-fold; the foot \
-             says how many have within the time drawn. \
+             region, each to both sides, followed until they come back to the two-fold. \
              All these orbits pass through one point, so that a trajectory leads from any of their \
              points to any other: thick, one from A to B. \
-             Below, the passage nearer. Orbits of the printed reading are larger and slower, so \
+             Below, the passage enlarged. Orbits of the printed reading are larger and slower, so \
              exits are \
              spread up to 2 and orbits followed for 60 there, up to 0.8 and for 16 in the \
              reconstructed one."
@@ -28,12 +27,12 @@ pub fn figure() -> Figure {
         },
         |reading| {
             let (longest, horizon, back) = match reading {
-                Reading::Printed => (2.0, 60.0, "35 of 40 futures come back within 300"),
-                Reading::Reconstructed => (0.8, 16.0, "40 of 40 futures come back within 300"),
+                Reading::Printed => (2.0, 60.0, 35),
+                Reading::Reconstructed => (0.8, 16.0, 40),
             };
             vec![FigurePanel::new(
                 "i",
-                format!("{back}; 10 are drawn, for {horizon}"),
+                format!("{back} of 40 futures come back within 300 units of time; 10 are drawn"),
                 RunSpec {
                     system: reading.caricature().into(),
                     switch: SwitchSpec::Filippov {
