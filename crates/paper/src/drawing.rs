@@ -264,7 +264,7 @@ fn space_panels(
         }
         let singularity = surface::singularity(&panel.run.system, &ranges);
         if let Some(point) = singularity {
-            chart = chart.markers(vec![turn(point)], SINGULARITY);
+            chart = chart.markers(vec![turn(point)], surface::TWO_FOLD);
         }
         sheet = sheet
             .panel(label(picture, panel), panel.title.as_str(), chart)
@@ -286,9 +286,10 @@ fn space_panels(
             );
         }
     }
-    let sheet = region_legend(sheet);
+    let sheet = surface::two_fold_legend(surface::region_legend(sheet, |_| true));
     match recordings.first().map(|r| &r.data) {
         Some(Data::Motion(_)) => sheet
+            .legend(LegendEntry::new(LegendKey::Line(FLIGHT), "flight"))
             .legend(LegendEntry::new(LegendKey::Line(SLIDING), "sliding"))
             .legend(LegendEntry::new(LegendKey::Marker(EXIT), "exit")),
         Some(data @ Data::Funnel { .. }) => sheet
@@ -350,7 +351,7 @@ fn passage(
         chart = chart.line(seen, LineStyle { width, ..curve.style });
     }
     let inside: Vec<[f64; 2]> = exits.into_iter().filter(|p| distance(p) <= reach).collect();
-    Some(chart.markers(inside, EXIT).markers(vec![centre], SINGULARITY))
+    Some(chart.markers(inside, EXIT).markers(vec![centre], surface::TWO_FOLD))
 }
 
 /// Height of the nearer view divided by its width.
@@ -475,18 +476,6 @@ fn exits(data: &Data) -> Vec<[f64; 3]> {
     }
 }
 
-/// Legend of the surface's colours.
-fn region_legend(sheet: Sheet) -> Sheet {
-    let area = |colour, text: &str| {
-        LegendEntry::new(LegendKey::Area(colour, style::SURFACE_OPACITY), text)
-    };
-    sheet
-        .legend(area(style::ATTRACTING, "attracting"))
-        .legend(area(style::REPELLING, "repelling"))
-        .legend(area(style::CROSSING, "crossing"))
-        .legend(LegendEntry::new(LegendKey::Marker(SINGULARITY), "two-fold singularity"))
-}
-
 /// Cells of the switching surface along each side.
 const SURFACE_CELLS: usize = 60;
 /// A long path: thinner and lighter than a curve, so that its windings stay apart.
@@ -508,8 +497,6 @@ const TO_MINUS: LineStyle = LineStyle::new(style::VERMILLION, 0.35);
 /// The end of repelling sliding.
 const EXIT: MarkerStyle =
     MarkerStyle { shape: MarkerShape::OpenDot, colour: style::GREEN, size: 3.6 };
-/// The two-fold.
-const SINGULARITY: MarkerStyle = MarkerStyle::new(MarkerShape::Dot, style::MAGENTA);
 
 fn crossings(data: &Data) -> &[Crossing] {
     match data {

@@ -510,18 +510,14 @@ fn space(
     if let Some((azimuth, elevation)) = camera {
         panel = panel.camera(azimuth, elevation);
     }
-    let (mut regions, mut seen) = (false, Vec::new());
+    let mut regions = false;
     let mut patches = Vec::new();
     for level in run.levels(&order, &[]) {
         regions |= level.has_regions();
         patches.extend(level.patches(&ranges));
     }
+    let colours: Vec<_> = patches.iter().map(|p| p.colour).collect();
     if !patches.is_empty() {
-        for colour in [style::ATTRACTING, style::REPELLING, style::CROSSING] {
-            if patches.iter().any(|p| p.colour == colour) {
-                seen.push(colour);
-            }
-        }
         panel = panel.surface(patches);
     }
     for line in lines {
@@ -539,24 +535,20 @@ fn space(
         surface::singularity(system, &box_of_states)
     });
     if let Some(point) = singular {
-        panel = panel.markers(vec![order.map(|i| point[i])], SINGULARITY);
+        panel = panel.markers(vec![order.map(|i| point[i])], surface::TWO_FOLD);
     }
     sheet = line_legend(sheet.panel("", "", panel), lines);
-    for colour in seen {
-        let text = match colour {
-            _ if !regions => "*h* = 0",
-            style::ATTRACTING => "attracting",
-            style::REPELLING => "repelling",
-            _ => "crossing",
-        };
-        sheet =
-            sheet.legend(LegendEntry::new(LegendKey::Area(colour, style::SURFACE_OPACITY), text));
-    }
+    sheet = match colours.first() {
+        Some(_) if regions => surface::region_legend(sheet, |colour| colours.contains(&colour)),
+        Some(colour) => sheet
+            .legend(LegendEntry::new(LegendKey::Area(*colour, style::SURFACE_OPACITY), "*h* = 0")),
+        None => sheet,
+    };
     if any_exits {
         sheet = sheet.legend(LegendEntry::new(LegendKey::Marker(EXIT), "exit"));
     }
     if singular.is_some() {
-        sheet = sheet.legend(LegendEntry::new(LegendKey::Marker(SINGULARITY), "two-fold"));
+        sheet = surface::two_fold_legend(sheet);
     }
     sheet
 }
@@ -646,5 +638,3 @@ const START: MarkerStyle =
 /// The end of repelling sliding.
 const EXIT: MarkerStyle =
     MarkerStyle { shape: MarkerShape::OpenDot, colour: style::GREEN, size: 3.6 };
-/// A two-fold.
-const SINGULARITY: MarkerStyle = MarkerStyle::new(MarkerShape::Dot, style::MAGENTA);

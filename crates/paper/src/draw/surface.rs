@@ -3,7 +3,10 @@
 use nalgebra::{SVector, vector};
 
 use super::level::{Level, colour};
-use twofold_render::sheet::Patch;
+use twofold_render::sheet::{
+    Colour, LegendEntry, LegendKey, MarkerShape, MarkerStyle, Patch, Sheet,
+};
+use twofold_render::style;
 use twofold_system::filippov::{
     TwoFold, Visibility, lie_derivatives, normal_form_constants, region, two_fold,
 };
@@ -22,6 +25,30 @@ pub fn patches(system: &System, ranges: &[(f64, f64); 3], cells: usize) -> Vec<P
             Level::new(system, &[0, 1, 2], &[]).map_or(Vec::new(), |level| level.patches(ranges))
         }
     }
+}
+
+/// The marker of a two-fold.
+pub const TWO_FOLD: MarkerStyle = MarkerStyle::new(MarkerShape::Dot, style::MAGENTA);
+
+/// Adds the surface's regions that `shown` has to a legend.
+pub fn region_legend(mut sheet: Sheet, shown: impl Fn(Colour) -> bool) -> Sheet {
+    let regions = [
+        (style::ATTRACTING, "attracting"),
+        (style::REPELLING, "repelling"),
+        (style::CROSSING, "crossing"),
+    ];
+    let shown = regions.into_iter().filter(|(colour, _)| shown(*colour));
+    for (k, (colour, name)) in shown.enumerate() {
+        let text = if k == 0 { format!("*h* = 0, {name}") } else { name.to_owned() };
+        let key = LegendKey::Area(colour, style::SURFACE_OPACITY);
+        sheet = sheet.legend(LegendEntry::new(key, text));
+    }
+    sheet
+}
+
+/// Adds the two-fold to a legend.
+pub fn two_fold_legend(sheet: Sheet) -> Sheet {
+    sheet.legend(LegendEntry::new(LegendKey::Marker(TWO_FOLD), "two-fold"))
 }
 
 /// The two-fold inside the box `ranges` where determinism breaks, if there is one; of a system

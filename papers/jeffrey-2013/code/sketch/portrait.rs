@@ -10,9 +10,7 @@ use twofold_job::table::Table;
 use twofold_paper::draw::surface;
 use twofold_render::Sheet;
 use twofold_render::number::number;
-use twofold_render::sheet::{
-    Axis, ColumnWidth, LegendEntry, LegendKey, LineStyle, MarkerShape, MarkerStyle, SpacePanel,
-};
+use twofold_render::sheet::{Axis, ColumnWidth, LegendEntry, LegendKey, LineStyle, SpacePanel};
 use twofold_render::style;
 use twofold_system::Caricature;
 
@@ -120,23 +118,12 @@ pub fn draw(tables: &[Table], v: f64, w: f64) -> Sheet {
             chart = chart.line(points, sliding);
         }
     }
-    chart =
-        chart.markers(vec![[0.0, 0.0, 0.0]], MarkerStyle::new(MarkerShape::Dot, style::MAGENTA));
-    let area = |colour, text: &str| {
-        LegendEntry::new(LegendKey::Area(colour, style::SURFACE_OPACITY), text)
-    };
-    Sheet::new(ColumnWidth::Wide, 1, "")
-        .subtitle("normal form (4)")
-        .panel("", "", chart)
-        .legend(area(style::ATTRACTING, "sticking attracts"))
-        .legend(area(style::REPELLING, "sticking repels"))
-        .legend(area(style::CROSSING, "orbits cross"))
+    chart = chart.markers(vec![[0.0, 0.0, 0.0]], surface::TWO_FOLD);
+    let sheet =
+        Sheet::new(ColumnWidth::Wide, 1, "").subtitle("normal form (4)").panel("", "", chart);
+    surface::two_fold_legend(surface::region_legend(sheet, |_| true))
         .legend(LegendEntry::new(LegendKey::Line(flight), "flight"))
         .legend(LegendEntry::new(LegendKey::Line(sliding), "sliding"))
-        .legend(LegendEntry::new(
-            LegendKey::Marker(MarkerStyle::new(MarkerShape::Dot, style::MAGENTA)),
-            "two-fold",
-        ))
         .footer(format!(
             "*v* = {}, *w* = {}, *vw* = {} > 1; every line is a computed orbit",
             number(v),
