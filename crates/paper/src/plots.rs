@@ -211,9 +211,7 @@ impl Plots {
         parts.retain(|(_, text)| !text.is_empty());
         let parts: Vec<String> =
             parts.into_iter().map(|(l, text)| format!("{} {text}", l.join(", "))).collect();
-        // Lines break between parameters, not beside a sign.
-        let text = parts.join("; ").trim_start().replace(" = ", "\u{a0}=\u{a0}");
-        (!parts.is_empty()).then_some(text)
+        (!parts.is_empty()).then(|| parts.join("; ").trim_start().to_owned())
     }
 }
 
@@ -445,10 +443,7 @@ mod tests {
             let run = GeneralRun { model, options: Options::default() };
             Plot { label: label.into(), ..plane(&Recorded::General(run, None)) }
         };
-        let said = |plots| {
-            let said = Plots { columns: 1, plots }.parameters();
-            said.map(|text| text.replace('\u{a0}', " "))
-        };
+        let said = |plots| Plots { columns: 1, plots }.parameters();
         let [a, b] = ["k = 1e-5\nalpha = 0.3", "k = 1e-5\nalpha = 2"];
         assert_eq!(said(vec![panel("a", "")]), None);
         assert_eq!(said(vec![panel("a", a)]).unwrap(), "*k* = 10^{-5}, *α* = 0.3");

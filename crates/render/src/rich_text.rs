@@ -188,13 +188,14 @@ pub fn width(source: &str, face: FontFace, size: f64) -> f64 {
     set(source, face).map_or(0.0, |line| line.width * size)
 }
 
-/// Breaks a text at spaces outside braces into lines no wider than `limit` points. A single long
-/// word stays whole. An italic passage must not contain a break; each line has to be complete
-/// markup, so a break inside one is not taken.
+/// Breaks a text at spaces outside braces, but for those beside an equals sign, into lines no wider
+/// than `limit` points. A single long word stays whole. An italic passage must not contain a break;
+/// each line has to be complete markup, so a break inside one is not taken.
 pub fn wrap(source: &str, face: FontFace, size: f64, limit: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     let mut current = String::new();
-    for word in source.split(' ') {
+    let joined = source.replace(" = ", "\u{a0}=\u{a0}");
+    for word in joined.split(' ') {
         let longer = if current.is_empty() { word.to_owned() } else { format!("{current} {word}") };
         let complete = current.is_empty() || set(&current, face).is_ok();
         let fits = set(&longer, face).map_or(true, |line| line.width * size <= limit);
@@ -205,7 +206,7 @@ pub fn wrap(source: &str, face: FontFace, size: f64, limit: f64) -> Vec<String> 
         }
     }
     lines.push(current);
-    lines
+    lines.into_iter().map(|line| line.replace('\u{a0}', " ")).collect()
 }
 
 #[cfg(test)]
@@ -263,5 +264,19 @@ mod tests {
         assert!(lines.len() > 1);
         assert_eq!(lines.join(" "), text);
         assert!(lines.iter().all(|l| width(l, FontFace::Regular, 7.0) <= 120.0));
+    }
+
+    #[test]
+    fn lines_do_not_break_beside_an_equals_sign() {
+        let text = "*F* = 25, *q* = 1, *V* = 2";
+        for limit in 10..90 {
+            let lines = wrap(text, FontFace::Regular, 8.0, f64::from(limit));
+            assert_eq!(lines.join(" "), text);
+            let whole = |line: &String| {
+                line.trim_end_matches(',').split(", ").all(|part| part.contains(" = "))
+            };
+            assert!(lines.iter().all(whole), "{lines:?}");
+        }
+        assert_eq!(wrap(text, FontFace::Regular, 8.0, 10.0).len(), 3);
     }
 }
