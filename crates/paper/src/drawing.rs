@@ -31,9 +31,7 @@ pub fn sheet(
     let runs: Vec<_> = picture.panels.iter().map(|p| &p.run).collect();
     let mut sheet = dress(Sheet::new(ColumnWidth::Wide, columns(picture), ""), picture, spec, data);
     if picture.panels.iter().any(|p| matches!(p.run.system.compiled(), Some(Compiled::Wheel(_)))) {
-        sheet = sheet.subtitle(
-            "our reconstruction: the paper gives the form of the equations, not their coefficients",
-        );
+        sheet = sheet.subtitle("our reconstruction: the paper gives no coefficients");
     }
     for line in wording::small_print(picture.reading_name(), &runs) {
         sheet = sheet.footer(line);

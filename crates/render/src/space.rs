@@ -603,7 +603,9 @@ fn draw_curves(chart: &mut Chart, pieces: &[Piece], hidden: bool) -> Result<(), 
             // clear which is in front. It is drawn before the neighbouring class, so that it does
             // not cut into the curve's own continuation.
             for piece in of(level + 1) {
-                let width = piece.style.width + 2.0 * style::CASING_PT;
+                // Thin lines have thin margins: many side by side would hide what they lie on.
+                let casing = style::CASING_PT * (piece.style.width / style::CURVE_PT).min(1.0);
+                let width = piece.style.width + 2.0 * casing;
                 chart.thinned_line(&piece.points, &LineStyle::new(style::WHITE, width))?;
             }
         }
