@@ -334,8 +334,8 @@ impl<'a> Canvas<'a> {
         )
     }
 
-    /// Sets a note at a place on the sheet.
-    pub fn note<P>(&self, note: &Note<P>, at: Position) -> Result<(), RenderError> {
+    /// The rectangle of a note's capitals at a place on the sheet.
+    pub fn note_rect<P>(note: &Note<P>, at: Position) -> Rect {
         let width = text_width(&note.text, note.size);
         let (cap, gap) = (units(CAP_HEIGHT * note.size), units(0.45 * note.size));
         let (x, baseline) = match note.anchor {
@@ -345,7 +345,14 @@ impl<'a> Canvas<'a> {
             Anchor::Above => (at.0 - width / 2, at.1 - gap),
             Anchor::Below => (at.0 - width / 2, at.1 + gap + cap),
         };
-        self.text(&note.text, (x, baseline), TextFormat::new(note.size).colour(note.colour).halo())
+        Rect { x, y: baseline - cap, w: width, h: cap }
+    }
+
+    /// Sets a note at a place on the sheet.
+    pub fn note<P>(&self, note: &Note<P>, at: Position) -> Result<(), RenderError> {
+        let rect = Self::note_rect(note, at);
+        let how = TextFormat::new(note.size).colour(note.colour).halo();
+        self.text(&note.text, (rect.x, rect.bottom()), how)
     }
 
     /// Width of a legend entry.

@@ -292,20 +292,37 @@ pub fn natural_height(panel: &SpacePanel, width: i32, highest: i32) -> i32 {
     ((e[3] - e[1]).ceil() as i32 + 4).min(highest)
 }
 
-/// Left, upper, right and lower end of the box with its labels relative to the box's centre, in
-/// units.
+/// Left, upper, right and lower end of the box with its labels, or of what is drawn if there is no
+/// box, relative to the box's centre, in units.
 fn extent(panel: &SpacePanel, bounds: &Bounds, scale: f64) -> [f64; 4] {
     let mut e = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
     let mut add = |x: f64, y: f64| e = [e[0].min(x), e[1].min(y), e[2].max(x), e[3].max(y)];
-    for c in corners() {
-        let s = bounds.corner(c);
-        add(s[0] * scale, -s[1] * scale);
-    }
+    let mut rects: Vec<Rect> = Vec::new();
     if panel.boxed {
-        for l in labels(panel, bounds, scale) {
-            add(f64::from(l.rect.x), f64::from(l.rect.y));
-            add(f64::from(l.rect.right()), f64::from(l.rect.bottom()));
+        for s in corners().map(|c| bounds.corner(c)) {
+            add(s[0] * scale, -s[1] * scale);
         }
+        rects.extend(labels(panel, bounds, scale).into_iter().map(|l| l.rect));
+    } else {
+        for layer in &panel.layers {
+            let corners = match layer {
+                SpaceLayer::Surface { patches, .. } => patches.as_slice(),
+                _ => &[],
+            };
+            let corners = corners.iter().flat_map(|patch| &patch.corners);
+            for p in layer.positions().iter().chain(corners) {
+                let s = bounds.see(*p);
+                let place = [s[0] * scale, -s[1] * scale];
+                add(place[0], place[1]);
+                if let SpaceLayer::Note(note) = layer {
+                    rects.push(Canvas::note_rect(note, (place[0] as i32, place[1] as i32)));
+                }
+            }
+        }
+    }
+    for rect in rects {
+        add(f64::from(rect.x), f64::from(rect.y));
+        add(f64::from(rect.right()), f64::from(rect.bottom()));
     }
     e
 }

@@ -131,13 +131,19 @@ fn oblique(lines: &[Line]) -> SpacePanel {
                 let wheel = tread.chain([near.clone(), far.clone()]).map(grey).collect();
                 panel.surface(wheel).line(far, ink).line(near, ink)
             }
-            "spring" => panel.line(lifted, LineStyle::new(style::BLUE, 0.9)),
+            "spring" => {
+                let along = |share: f64| [share * last[0], last[1], HUB];
+                panel
+                    .line(lifted, LineStyle::new(style::BLUE, 0.9))
+                    .note(along(0.3), "*k*_{w}, *c*_{w}", Anchor::Above)
+                    .note(along(0.35), "*r*", Anchor::Below)
+            }
             "slip" => panel.arrow(lifted, LineStyle::new(style::VERMILLION, 1.1)).note(
                 last,
                 " slip *h*",
                 Anchor::Below,
             ),
-            "rolling" => panel.arrow(lifted, ink).note(last, " *V*", Anchor::Left),
+            "rolling" => panel.arrow(lifted, ink).note(last, "rolling *V*", Anchor::Below),
             "speed" => panel.arrow(lifted, LineStyle::new(style::BLUE, 1.1)).note(
                 last,
                 "*v*",
@@ -166,8 +172,8 @@ fn wheel_side([from, to]: [[f64; 2]; 2]) -> Vec<[f64; 3]> {
 fn from_above(lines: &[Line]) -> PlanePanel {
     let thin = LineStyle::new(style::SOFT_INK, 0.6);
     let ink = LineStyle::new(style::INK, 0.9);
-    let mut panel = PlanePanel::sketch((-2.15, 2.15), (-2.0, 2.0));
-    panel.aspect = Some(0.8);
+    let mut panel = PlanePanel::sketch((-2.15, 2.15), (-2.0, 1.75));
+    panel.aspect = Some(0.85);
     for (name, points) in lines.iter().cloned() {
         let last = points[points.len() - 1];
         panel = match name.as_str() {
@@ -187,7 +193,7 @@ fn from_above(lines: &[Line]) -> PlanePanel {
             }
             "tyre" => panel.solid(points.clone(), style::INK.lighten(0.35)).line(points, ink),
             "axle" => panel.line(points, ink),
-            "rolling" => panel.arrow(points, ink).note(last, " rolling speed *V*", Anchor::Left),
+            "rolling" => panel.arrow(points, ink).note(last, " rolling *V*", Anchor::Left),
             "slip" => panel.arrow(points, LineStyle::new(style::VERMILLION, 1.1)).note(
                 last,
                 " slip *h*",
