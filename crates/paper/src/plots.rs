@@ -191,7 +191,8 @@ impl Plots {
         Ok(whole)
     }
 
-    /// Parameters of the panels' systems: those that all panels have in common, then each one's.
+    /// Parameters of the panels' systems: those that all panels have in common, then each one's,
+    /// but those that its heading says.
     fn parameters(&self) -> Option<String> {
         let all: Vec<Vec<(String, f64)>> = self.plots.iter().map(Plot::parameters).collect();
         let shared = |p: &&(String, f64)| all.iter().all(|panel| panel.contains(p));
@@ -201,7 +202,12 @@ impl Plots {
         };
         let mut parts = vec![(Vec::new(), said(&common))];
         for (plot, panel) in self.plots.iter().zip(&all) {
-            let own = said(&panel.iter().filter(|p| !common.contains(p)).collect::<Vec<_>>());
+            let headed = |p: &&(String, f64)| {
+                let text = format!("{} = {}", p.0, p.1);
+                plot.title.split(", ").any(|part| part == text)
+            };
+            let own: Vec<_> = panel.iter().filter(|p| !common.contains(p) && !headed(p)).collect();
+            let own = said(&own);
             let label = format!("({})", markup::literal(&plot.label));
             match parts[1..].iter_mut().find(|(_, text)| *text == own) {
                 Some((labels, _)) => labels.push(label),
@@ -452,6 +458,8 @@ mod tests {
             "*k* = 10^{-5}; (a), (c) *α* = 0.3; (b) *α* = 2"
         );
         assert_eq!(said(vec![panel("a", "w = 2"), panel("b", "")]).unwrap(), "(a) *w* = 2");
+        let headed = Plot { title: "w = 2, slow".into(), ..panel("a", "w = 2") };
+        assert_eq!(said(vec![headed, panel("b", "w = 3")]).unwrap(), "(b) *w* = 3");
         let system = twofold_system::System::builtin("two-fold").unwrap();
         let run = RunSpec {
             system,

@@ -107,6 +107,8 @@ pub fn switch(switch: &SwitchSpec) -> String {
             None => format!("switch delayed by {}", number(*delay)),
         },
         SwitchSpec::Relay { band, .. } => format!("relay with memory, band ±{}", number(*band)),
+        // A run that needs an exit and has no rule for it is refused.
+        SwitchSpec::Filippov { exit: ExitRule::Undecided, .. } => "discontinuous (Filippov)".into(),
         SwitchSpec::Filippov { exit, .. } => {
             format!("discontinuous (Filippov), exit {}", exit_rule(exit))
         }
