@@ -134,16 +134,12 @@ fn section_panels(
     let late = |panel: &FigurePanel, c: &Crossing| c.t > 0.5 * panel.run.t_end;
     let half =
         |panel: &FigurePanel, c: &Crossing| if late(panel, c) { Half::Late } else { Half::Early };
-    let seen = || {
-        let crossings = |(p, r): (&'_ FigurePanel, &'_ Recording)| {
-            let kept = crossings(&r.data).iter().filter(|c| halves.contains(&half(p, c)));
-            kept.map(|c| axes.map(|i| c.x[i])).collect::<Vec<_>>()
-        };
-        picture.panels.iter().zip(recordings).flat_map(crossings)
-    };
     let names = picture.panels[0].run.system.coordinates();
-    let axis =
-        |i: usize| Axis::covering(format!("*{}*", greek(names[axes[i]])), seen().map(|p| p[i]));
+    // Of both halves, even if one alone is drawn: beside the transient, a tolerance is small.
+    let axis = |i: usize| {
+        let all = recordings.iter().flat_map(|r| crossings(&r.data));
+        Axis::covering(format!("*{}*", greek(names[axes[i]])), all.map(|c| c.x[axes[i]]))
+    };
     let drawn: Vec<_> = picture.panels.iter().zip(recordings).zip(notes).collect();
     let rows: Vec<_> = drawn
         .chunks(sheet.columns)
@@ -189,7 +185,7 @@ fn verdict_notes(
             return Ok(Vec::new());
         };
         let mut notes = vec![
-            format!("paper: {}", verdict.claim_text),
+            format!("{}: {}", panel.claimant, verdict.claim_text),
             format!("this run {}", outcome(verdict)),
         ];
         if let Some(repeats) = &panel.repeats {

@@ -75,6 +75,8 @@ pub struct FigurePanel {
     pub run: RunSpec,
     /// The paper's claim about it.
     pub claim: Option<Claim>,
+    /// What makes the claim, as the face says: the paper, or a panel of it that this one varies.
+    pub claimant: String,
     /// Runs that repeat the panel's from starts that a reader could not tell apart.
     pub repeats: Option<Repeats>,
 }
@@ -159,6 +161,7 @@ impl FigurePanel {
             title: title.into(),
             run,
             claim: None,
+            claimant: "paper".into(),
             repeats: None,
         }
     }

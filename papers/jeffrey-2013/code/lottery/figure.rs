@@ -43,9 +43,11 @@ pub fn figure() -> Figure {
                         observe: Observation::Section { coordinate: 1, value: 0.0 },
                     };
                     let label = format!("{row}-{column}");
-                    let title = format!("{}, interval {interval}", method.name());
-                    panels
-                        .push(FigurePanel::new(&label, title, run).claimed(Claim::Section(claim)));
+                    let title = format!("{}, {interval}", method.name());
+                    let mut panel =
+                        FigurePanel::new(&label, title, run).claimed(Claim::Section(claim));
+                    panel.claimant = format!("paper, fig. 7({column})");
+                    panels.push(panel);
                 }
             }
             panels
