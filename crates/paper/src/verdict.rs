@@ -172,8 +172,8 @@ pub fn judge(picture: &Picture, executor: &dyn Ask) -> Result<Vec<PanelVerdict>,
                 let error = sqrt(here_error * here_error + next_error * next_error);
                 let [p, q, dp, dq] = [here, next, here_error, next_error].map(|v| 100.0 * v);
                 let found = format!(
-                    "{p:.1} +- {dp:.1} % of its way leads to new places, {q:.1} +- {dq:.1} % in \
-                        the next panel ({NEIGHBOURS} neighbouring starts)"
+                    "{p:.1} +- {dp:.1} % of the path enters unvisited cells (next panel {q:.1} +- \
+                        {dq:.1} %; {NEIGHBOURS} shifted starts)"
                 );
                 let grounds = Grounds::Freshness {
                     mean: [here, next],
@@ -185,8 +185,10 @@ pub fn judge(picture: &Picture, executor: &dyn Ask) -> Result<Vec<PanelVerdict>,
             Claim::DiffersFromNext => {
                 let (freshness, shared): ([f64; 2], Shared) =
                     (answer.fact("freshness")?, answer.fact("shared")?);
-                let found =
-                    format!("the two share {:.0} % of their places", 100.0 * shared.overlap);
+                let found = format!(
+                    "the two paths have {:.0} % of their cells in common",
+                    100.0 * shared.overlap
+                );
                 (
                     Grounds::Paths { freshness, shared },
                     found.clone(),

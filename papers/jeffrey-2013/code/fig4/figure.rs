@@ -12,7 +12,7 @@ pub fn figure() -> Figure {
     in_both_readings(
         "fig4",
         "One way in, many ways out, and back",
-        View::Space { camera: Camera { axes: [1, 2, 0], azimuth: -60.0, elevation: 18.0 } },
+        View::Space { camera: Camera { axes: [1, 2, 0], azimuth: -120.0, elevation: 18.0 } },
         |_| {
             "The orbit from (0.2, 0, −1) reaches the two-fold; from there its future is a set. \
                 Five exit times from the repelling \
