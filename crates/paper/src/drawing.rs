@@ -9,11 +9,12 @@ use twofold_integrate::filippov::{EventKind, Mode, Side};
 use twofold_job::JobError;
 use twofold_job::record::Hash;
 use twofold_job::recording::{Data, Future, Recording};
+use twofold_job::spec::Observation;
 use twofold_render::sheet::{
     Anchor, Axis, ColumnWidth, DotStyle, LegendEntry, LegendKey, LineStyle, MarkerShape,
     MarkerStyle, PlanePanel, Sheet, SpacePanel, range_of,
 };
-use twofold_render::{markup, style};
+use twofold_render::style;
 use twofold_system::Compiled;
 
 /// The drawing of a picture of runs.
@@ -39,7 +40,7 @@ pub fn sheet(
     let notes = verdict_notes(picture, verdicts)?;
     // One panel's finding is said in the foot: it is too long to stand over the panel.
     for verdict in verdicts {
-        let found = markup::literal(&verdict.found);
+        let found = wording::found(&verdict.found);
         sheet = sheet.footer(if picture.panels.len() > 1 {
             format!("({}) {found}", verdict.panel)
         } else {
@@ -162,6 +163,18 @@ fn section_panels(
                 Half::Early => sheet.panel("", "", chart.dots(points, DotStyle::early())),
             };
         }
+    }
+    if let Observation::Section { coordinate, value } = picture.panels[0].run.observe {
+        sheet = sheet.footer(format!(
+            "crossings of *{}* = {} upwards and downwards: an orbit of period one has one of each",
+            greek(names[coordinate]),
+            wording::number(value)
+        ));
+    }
+    if picture.panels.iter().any(|panel| panel.repeats.is_some()) {
+        sheet = sheet.footer(
+            "*n* of *m* runs: the panel's, repeated from starts too near to its own to be told apart",
+        );
     }
     let middle = wording::number(0.5 * picture.panels[0].run.t_end);
     let as_there = if picture.alterations.is_empty() { ", as in the paper" } else { "" };

@@ -179,7 +179,7 @@ pub fn schedule(run: &RunSpec) -> String {
 
 fn kicks(kick: &Kick) -> String {
     format!(
-        "kicks of {} every {} (ChaCha8, seed {})",
+        "perturbations of length {} every {} (ChaCha8, seed {})",
         number(kick.size),
         number(kick.every),
         kick.seed
@@ -196,7 +196,7 @@ pub fn small_print(reading: Option<&str>, runs: &[&RunSpec]) -> Vec<String> {
                 said.push(text);
             }
         }
-        said.join(join)
+        together(&said).join(join)
     };
     let mut lines: Vec<Vec<String>> = vec![
         vec![
@@ -223,6 +223,37 @@ pub fn small_print(reading: Option<&str>, runs: &[&RunSpec]) -> Vec<String> {
         .collect()
 }
 
+/// Settings that differ in their last number alone as one: "*ε* = 0.1, *σ* = 1, 2".
+fn together(said: &[String]) -> Vec<String> {
+    let mut all: Vec<String> = Vec::new();
+    for text in said {
+        let (head, value) = text.rsplit_once(" = ").unwrap_or((text, ""));
+        match all.last_mut() {
+            Some(last) if last.starts_with(&format!("{head} = ")) && !value.contains(", ") => {
+                *last += &format!(", {value}");
+            }
+            _ => all.push(text.clone()),
+        }
+    }
+    all
+}
+
+/// What a verdict found as rich text: a time *t* in italics, numbers as [`number`] sets them.
+pub fn found(plain: &str) -> String {
+    let word = |word: &str| {
+        let core = word.trim_end_matches([',', ';', ')', ']']);
+        let set = match (core, core.parse::<f64>()) {
+            ("t", _) => "*t*".to_owned(),
+            ("+-", _) => "±".to_owned(),
+            // Others stand as they are: zeros at the end say how precise they are.
+            (_, Ok(v)) if v.is_finite() && (core.contains('e') || !core.contains('.')) => number(v),
+            _ => markup::literal(core),
+        };
+        set + &word[core.len()..]
+    };
+    plain.split(' ').map(word).collect::<Vec<_>>().join(" ")
+}
+
 /// Rich text without its markup, for readers without typesetting.
 pub fn plain(rich: &str) -> String {
     twofold_render::markup::plain(rich)
@@ -238,5 +269,35 @@ mod tests {
         assert_eq!(angle(0.7), "0.7");
         let wheel = twofold_system::Wheel { gamma: 0.7, ..Default::default() };
         assert!(system(&wheel.into()).contains("*γ* = 0.7,"));
+    }
+
+    #[test]
+    fn settings_that_differ_in_one_number_are_said_once() {
+        let said = |texts: &[&str]| {
+            together(&texts.iter().map(|t| (*t).to_owned()).collect::<Vec<_>>()).join("; ")
+        };
+        assert_eq!(
+            said(&["tanh, *σ* = 0.01", "tanh, *σ* = 0.1", "tanh, *σ* = 1"]),
+            "tanh, *σ* = 0.01, 0.1, 1"
+        );
+        let apart = ["tanh, *ε* = 1", "erf, *ε* = 1", "rtol = 1, steps", "rtol = 2, steps"];
+        assert_eq!(said(&apart), apart.join("; "));
+    }
+
+    #[test]
+    fn findings_are_typeset() {
+        let pairs = [
+            (
+                "captured at t = 6232, settled at t = 151811",
+                "captured at *t* = 6232, settled at *t* = 151\u{2009}811",
+            ),
+            ("radius 0.250, rate 2.7e-5", "radius 0.250, rate 2.7×10^{-5}"),
+            ("clouds of radius 3.9e-1 around period 1", "clouds of radius 0.39 around period 1"),
+            ("56.6 +- 2.0 % (12 starts)", "56.6 ± 2.0 % (12 starts)"),
+            ("0.75 [0.70, 0.80] times", "0.75 [0.70, 0.80] times"),
+        ];
+        for (plain, set) in pairs {
+            assert_eq!(found(plain), set);
+        }
     }
 }
