@@ -33,6 +33,9 @@ pub struct Guard {
     /// Whether the equations are continuous where it is zero: it is asked by `abs`, `min`, `max`
     /// and `clip` alone, in sums, products and smooth functions.
     pub kink: bool,
+    /// Whether it is such a kink, and nothing moves its argument but the sides of others: that of
+    /// clip(sign(x), 0, 1) is no surface.
+    pub(crate) of_sides: bool,
 }
 
 /// The answers to all switching functions, the mode, and the pieces of tables that hold.
@@ -252,6 +255,9 @@ impl Equation {
         for (e, rough) in terms.iter().zip(named.collect::<Vec<_>>()) {
             equation.find(e, false, !rough)?;
         }
+        let of_sides = |g: &Guard| g.kink && !g.whole && equation.is_of_sides(&g.expression);
+        let of_sides: Vec<bool> = equation.guards.iter().map(of_sides).collect();
+        equation.guards.iter_mut().zip(of_sides).for_each(|(guard, of)| guard.of_sides = of);
         equation.of_fields = equation.guards.len();
         equation.has_domain_ends = fields.iter().chain(&terms).any(has_domain_ends);
         for e in &conditions {
@@ -551,6 +557,25 @@ impl Equation {
         self.is_never_negative(base) && self.constant(exponent).is_some_and(|v| v >= 1.0)
     }
 
+    /// Whether an expression is constant while no switching function in it changes its side.
+    fn is_of_sides(&self, e: &Expression) -> bool {
+        let is = |e: &Expression| self.is_of_sides(e);
+        match e {
+            Expression::Name(name) => match self.term(name) {
+                Some(term) => is(term),
+                None => self.values.contains_key(name),
+            },
+            Expression::Call(Function::Sign, _)
+            | Expression::Apply(General::Heaviside | General::Floor, _)
+            | Expression::Greater(..)
+            | Expression::And(..)
+            | Expression::Or(..)
+            | Expression::Not(_) => true,
+            Expression::Apply(General::If, list) => list[1..].iter().all(is),
+            other => other.parts().into_iter().all(is),
+        }
+    }
+
     /// The value of an expression of numbers and parameters.
     fn constant(&self, e: &Expression) -> Option<f64> {
         let fixed = |name: &str| self.values.contains_key(name);
@@ -668,7 +693,7 @@ impl Equation {
             }
         }
         self.by_text.insert(key(&expression), (i, false));
-        self.guards.push(Guard { expression, whole, chooses, kink });
+        self.guards.push(Guard { expression, whole, chooses, kink, of_sides: false });
     }
 
     /// The guard of an expression, and whether it is the expression's negative.

@@ -4723,3 +4723,27 @@ fn curves_of_rests_are_found_at_any_length() {
     let [rest] = found.as_slice() else { panic!("{found:?}") };
     assert!(rest.family.as_ref().unwrap().changes);
 }
+
+/// Saturations of switched controls: what only the sides of others move is no surface. A thermostat
+/// holds T = 20; sliding on v = -2 x, x falls as exp(-2 t).
+#[test]
+fn saturations_of_signs_are_no_surfaces() {
+    for heat in
+        ["clip(2*heaviside(20 - T), 0, 2)", "clip(10*(T < 20), 0, 2)", "abs(1 + sign(20 - T))"]
+    {
+        let text = format!("states = ['T']\nstart = [15]\nf = ['0.1*(10 - T) + {heat}']");
+        for method in Method::ALL {
+            near(end_of(&text, 10.0, method).unwrap()[0], 20.0, 1e-12);
+        }
+    }
+    for control in ["clip(sign(s), -1, 1)", "max(-1, 2*heaviside(s) - 1)", "-min(-sign(s), 1)"] {
+        let text = format!(
+            "states = ['x', 'v']\nstart = [1, 0.5]\nf = ['v', '0.3*sin(t) - 2*v - {control}']\n\
+             [let]\ns = 'v + 2*x'"
+        );
+        for method in Method::ALL {
+            let [early, late] = [4.0, 6.0].map(|t| end_of(&text, t, method).unwrap());
+            near(late[0], early[0] * (-4.0_f64).exp(), 1e-8);
+        }
+    }
+}

@@ -627,6 +627,10 @@ impl Follower<'_> {
         self.add_what_is_zero(&mut zero);
         zero.retain(|guard| !self.guard_held[*guard]);
         self.add_what_follows(&mut zero);
+        // What only others' sides move follows those.
+        if !zero.iter().all(|guard| self.equation.guards[*guard].of_sides) {
+            zero.retain(|guard| !self.equation.guards[*guard].of_sides);
+        }
         if self.equation.has_domain_ends {
             self.put_into_domain(&zero);
         }
