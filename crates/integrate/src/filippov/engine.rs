@@ -220,7 +220,7 @@ pub(super) enum FlightStart {
     Transversal(f64),
     /// On it at a visible fold, with this second derivative of |h|.
     Tangent(f64),
-    /// On it at a tangency of higher order, off it after this time.
+    /// On it at a tangency of higher order or at a corner, off it after this time.
     Flat(f64),
 }
 
@@ -525,6 +525,10 @@ struct Limits {
     /// Distances ahead, as shares of the states, at which it is seen to which side a field leads that
     /// is tangent to the surface.
     ahead: [f64; 6],
+    /// Distances from a corner of h, as shares of the states, at which its two sides are looked at.
+    corner: [f64; 2],
+    /// Velocities of sliding at these distances that differ by less than this share are one.
+    same_velocity: f64,
     /// A field has no limit at the surface if from the first of these distances to the second, and
     /// on to the third, it grows by as much again.
     approach: [f64; 3],
@@ -564,6 +568,8 @@ const LIMITS: Limits = Limits {
     small: 1e-6,
     along: [1e-4, 1e-2, 0.1],
     ahead: [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1],
+    corner: [1e-6, 1e-4],
+    same_velocity: 1e-3,
     approach: [1e-4, 1e-8, 1e-12],
     drift: 1e-10,
     drift_in_tolerances: 10.0,
@@ -843,10 +849,44 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         what: &'static str,
     ) -> Result<State<N>, FilippovError> {
         let l = self.lie_on_surface();
-        match self.fused_here(&l) {
-            Some(folds) => Ok(self.meet(folds, from)),
-            None => self.rest_or(from, what),
+        if let Some(folds) = self.fused_here(&l) {
+            return Ok(self.meet(folds, from));
         }
+        if from == Some(Mode::SlidingAttracting) && self.slides_past_touch() {
+            return Ok(State::Sliding(Sliding::ATTRACTING));
+        }
+        self.rest_or(from, what)
+    }
+
+    /// Both fields touch the surface here, and attracting sliding goes on behind with the velocity
+    /// that it has before: past the point, if it is so.
+    fn slides_past_touch(&mut self) -> bool {
+        let sided = self.sided();
+        let velocity = |x: &SVector<f64, N>| {
+            let (field, rate) = desingularised(&sided, x);
+            field / rate
+        };
+        let here = velocity(&self.x);
+        let mean = (sided.plus(&self.x) + sided.minus(&self.x)) * 0.5;
+        let guess = if finite(&here) { here } else { mean };
+        let per_speed = self.reach() / guess.norm();
+        let [near, far] = LIMITS.corner.map(|share| share * per_speed);
+        let at = |time: f64| project(self.system, &(self.x + guess * time));
+        let ahead = velocity(&at(near));
+        let slides = |time: f64| {
+            let x = at(time);
+            let margins = Sliding::ATTRACTING.margins(&sided, &x);
+            margins.iter().all(|margin| *margin > 0.0)
+                && (velocity(&x) - ahead).norm() <= LIMITS.same_velocity * ahead.norm()
+        };
+        let time = near.min(self.t_end - self.t);
+        if ![-far, -near, near, far].into_iter().all(slides) {
+            return false;
+        }
+        let (from, to) = (self.x, project(self.system, &(self.x + ahead * time)));
+        let straight = Straight { system: self.system, from, to };
+        self.take(Mode::SlidingAttracting, self.t + time, to, &straight);
+        true
     }
 
     /// A rest, if zero lies between the fields here, or an error that says `what` else.
@@ -1432,6 +1472,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         let mut t_base = self.t;
         let mut fresh = true;
         let mut idle = 0;
+        let mut came_from;
         let mut ahead = TwoFoldAhead::new();
         let mut along = SIDES.into_iter().find(|side| {
             let touches = || self.tangency(&self.lie(&self.x), *side).presses();
@@ -1498,6 +1539,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             let off = without_clock::<N, M>(&z1);
             let drift = system.switching(&off).abs();
             idle = if t1 - self.t <= LIMITS.idle * t1.abs() { idle + 1 } else { 0 };
+            came_from = self.x;
             self.take(mode, t1, x1, &interpolant);
             if let Some((_, end)) = end {
                 break Some(end);
@@ -1549,7 +1591,13 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                 let side = sliding.plan.map_or(Side::Plus, |plan| plan.side);
                 Ok(self.exit(side, sliding.time, sliding.arc, from))
             }
-            Some(SlidingEnd::Fold(side)) => self.leave_at_fold(side, &sliding),
+            Some(SlidingEnd::Fold(side)) => {
+                let (field, rate) = desingularised(&sided, &came_from);
+                match self.leave_at_corner(side, &sliding, field / rate)? {
+                    Some(state) => Ok(state),
+                    None => self.leave_at_fold(side, &sliding),
+                }
+            }
         }
     }
 
@@ -1709,6 +1757,57 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         };
         self.event(EventKind::LeftByTangency { to: side }, from, Some(side.into()));
         Ok(State::Free { side, start })
+    }
+
+    /// The same at a corner of h, to which the motion has come with this velocity: the margin of
+    /// `side` jumps there. `None` if there is no corner.
+    fn leave_at_corner(
+        &mut self,
+        side: Side,
+        sliding: &Sliding,
+        velocity: SVector<f64, N>,
+    ) -> Result<Option<State<N>>, FilippovError> {
+        let (system, sided, from) = (self.system, self.sided(), self.x);
+        let i = usize::from(side == Side::Minus);
+        let [near, far] = LIMITS.corner.map(|share| share * self.reach());
+        let margin = |distance: f64| {
+            let x = project(system, &(from + velocity * (distance / velocity.norm())));
+            sliding.margins(&sided, &x)[i]
+        };
+        let falls = |distance: f64| margin(-distance) - margin(distance);
+        if !(margin(near) < 0.0 && falls(far) > 0.0 && falls(near) > 0.5 * falls(far)) {
+            return Ok(None);
+        }
+        // The time after which a flight is seen to leave the surface, if it does.
+        let leaves = |side: Side, field: SVector<f64, N>| {
+            let time = far / field.norm();
+            (side.sign() * system.switching(&(from + field * time)) > 0.0).then_some(time)
+        };
+        let flights = [
+            leaves(Side::Plus, sided.plus(&from)).map(|time| (Side::Plus, time)),
+            leaves(Side::Minus, sided.minus(&from)).map(|time| (Side::Minus, time)),
+        ];
+        let mode = Some(sliding.mode());
+        let (to, after) = match (flights, sliding.plan) {
+            ([Some(flight), None] | [None, Some(flight)], _) => flight,
+            ([Some(plus), Some(minus)], Some(plan)) => {
+                [plus, minus][usize::from(plan.side == Side::Minus)]
+            }
+            ([Some(_), Some(_)], None) => return self.enter_repelling(mode).map(Some),
+            ([None, None], _) => {
+                let what = "sliding ends at a corner of the surface, from which no motion leads";
+                return self.rest_or(mode, what).map(Some);
+            }
+        };
+        let kind = match sliding.repelling {
+            true => {
+                let (time, arc, rule) = (sliding.time, sliding.arc, self.chooser.rule);
+                EventKind::ExitAtBoundary { to, time, arc, rule }
+            }
+            false => EventKind::LeftByTangency { to },
+        };
+        self.event(kind, mode, Some(to.into()));
+        Ok(Some(State::Free { side: to, start: FlightStart::Flat(after) }))
     }
 
     /// Two folds in one place at the present state, if both Lie derivatives are almost zero there.

@@ -127,7 +127,7 @@ pub enum EventKind {
         /// The side it stays on.
         side: Side,
     },
-    /// Sliding ended at a visible fold: the orbit leaves tangentially.
+    /// Sliding ended at a visible fold: the orbit leaves tangentially. Or at a corner of h.
     LeftByTangency {
         /// The side it left to.
         to: Side,

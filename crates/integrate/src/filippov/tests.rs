@@ -712,6 +712,58 @@ fn tangencies_of_higher_order_are_told_by_what_comes_ahead() {
     }
 }
 
+/// Both fields touch the surface in one point: sliding goes on with the weights that it has around
+/// it, from before, from a landing there, from a start there.
+#[test]
+fn sliding_passes_a_touch_of_both_fields() {
+    for (speed, weight) in [(1.0, 1.0), (2.0, 2.0)] {
+        for shift in [0.0, 0.1] {
+            let plus = format!("'-(y - {shift})^2', '1'");
+            let minus = format!("'{weight}*(y - {shift})^2', '{speed}'");
+            // y' = (q f+ - p f-)/(q - p).
+            let rate = (weight + speed) / (1.0 + weight);
+            for start in [[0.0, -1.0], [0.0, 0.0]] {
+                let at = [start[0], start[1] + shift];
+                let end = plane(["x", &plus, &minus], at, 3.0);
+                let x = end.unwrap_or_else(|e| panic!("{plus} {minus} {at:?}: {e}")).x;
+                assert!((x[1] - at[1] - 3.0 * rate).abs() < 1e-8 && x[0].abs() < 1e-9, "{x}");
+            }
+        }
+    }
+    let x = plane(["x", "'-y^2', '1'", "'y^2', '1'"], [1.0 / 3.0, -1.0], 3.0).unwrap().x;
+    assert!((x[1] - 2.0).abs() < 1e-8 && x[0].abs() < 1e-9, "{x}");
+}
+
+/// Sliding comes to a corner of h and does not go on behind it: the motion leaves with the only
+/// field that leads away.
+#[test]
+fn sliding_ends_at_a_corner() {
+    let landed = 0.4 / 2.2;
+    let left = landed + (0.5 - 0.2 * landed) * 3.0 / 2.8 + 1.0 / 0.56;
+    for place in [0.0, 100.0] {
+        let shifted = format!("x - {place}");
+        for (h, plus, minus, start, t_end, want) in [
+            ("y - abs(X)", "'1', '-2.5'", "'1', '0.5'", [-1.0, 1.0], 2.0, [1.0, 0.5]),
+            ("y - abs(X)", "'1', '-2.5'", "'1', '0.5'", [-2.0, 2.75], 3.0, [1.0, 0.5]),
+            // Lands at t = 0.4/2.2, passes the corner (1, 0) and comes to (0, 1), which it leaves.
+            (
+                "abs(X) + abs(y) - 1",
+                "'-2', '0.2'",
+                "'2', '1.2'",
+                [0.9, -0.5],
+                left + 1.0,
+                [-2.0, 1.2],
+            ),
+        ] {
+            let h = h.replace('X', &shifted);
+            let end = plane([&h, plus, minus], [start[0] + place, start[1]], t_end);
+            let x = end.unwrap_or_else(|e| panic!("{h}: {e}")).x;
+            let off = x - SVector::from([want[0] + place, want[1]]);
+            assert!(off.amax() < 1e-8, "{h} {start:?}: {x}");
+        }
+    }
+}
+
 /// A hop beside an invisible fold that is lower than the rounding of h, and one that is not.
 #[test]
 fn hops_that_rounding_hides_are_landings() {
