@@ -1075,16 +1075,19 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
 
     /// Whether h has a simple zero at `x`, on the surface: at some distance between rounding and
     /// `before`, a state of the flight to it, h differs between both sides by what its slope says.
+    /// Each state counts in units of its own size.
     fn has_slope(&self, before: &SVector<f64, N>, x: &SVector<f64, N>) -> bool {
         let h = |x: &SVector<f64, N>| self.system.switching(x);
-        let (normal, way) = (gradient(self.system, x), (before - x).norm());
+        let units = self.size.map(|size| if size > 0.0 { size } else { self.reach() });
+        let steepness = |x: &SVector<f64, N>| gradient(self.system, x).component_mul(&units);
+        let (normal, way) = (steepness(x), (before - x).component_div(&units).norm());
         let slope = length(&normal);
-        let steepest = length(&gradient(self.system, before)).max(h(before).abs() / way);
+        let steepest = length(&steepness(before)).max(h(before).abs() / way);
         if !(slope > 0.0 && slope <= steepest / LIMITS.small) {
             return false;
         }
-        let normal = normal / slope;
-        let nearest = 10.0 * h(x).abs() / slope + 100.0 * f64::EPSILON * self.reach();
+        let normal = (normal / slope).component_mul(&units);
+        let nearest = 10.0 * h(x).abs() / slope + 100.0 * f64::EPSILON;
         let mut distances = std::iter::successors(Some(nearest), |distance| Some(10.0 * distance))
             .take_while(|distance| *distance < way)
             .peekable();

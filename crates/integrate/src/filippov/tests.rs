@@ -838,6 +838,27 @@ fn a_switching_function_without_a_simple_zero_is_named() {
     }
 }
 
+/// States of sizes far apart in one h: each counts in its own unit. With X = x/P and Y = y P the
+/// motion is the same for all P.
+#[test]
+fn states_of_any_sizes_share_a_switching_function() {
+    let end = |power: i32| {
+        let h = format!("1e-{power}*x - 0.27*sin(3e{power}*y)");
+        let plus = format!("'-0.4e{power}', '0.1e-{power}'");
+        let minus = format!("'0.8e{power}', '0.2e-{power}'");
+        let [large, small] = [power, -power].map(|p| format!("1e{p}").parse::<f64>().unwrap());
+        let end = plane([&h, &plus, &minus], [0.1 * large, small], 6.0);
+        let x = end.unwrap_or_else(|e| panic!("{power}: {e}")).x;
+        [x[0] / large, x[1] / small]
+    };
+    let want = end(0);
+    for power in [3, 6, 9, 12] {
+        let found = end(power);
+        let off = (0..2).map(|i| (found[i] - want[i]).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-8, "{power}: {found:?} {want:?}");
+    }
+}
+
 /// Fields that grow without bound towards the surface make no sliding motion; those that end there
 /// do.
 #[test]
