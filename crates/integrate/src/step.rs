@@ -478,18 +478,25 @@ impl Failure {
 
     /// The failure of an orbit of `n` states alone, without what is integrated beside them.
     pub fn of_states(mut self, n: usize) -> Self {
-        match &mut self {
-            Self::NotFinite { state, .. }
-            | Self::Undefined { state, .. }
-            | Self::Unbounded { state, .. }
-            | Self::NotSmooth { state, .. }
-            | Self::StaysOnJump { state, .. }
-            | Self::StepUnderflow { state, .. }
-            | Self::TooManySteps { state, .. }
-            | Self::NotConverged { state, .. } => state.truncate(n),
-            Self::NotApplicable { .. } => {}
+        if let Some((_, state)) = self.place() {
+            state.truncate(n);
         }
         self
+    }
+
+    /// The time and the state that it names.
+    pub(crate) fn place(&mut self) -> Option<(&mut f64, &mut Vec<f64>)> {
+        match self {
+            Self::NotFinite { t, state }
+            | Self::Undefined { t, state, .. }
+            | Self::Unbounded { t, state }
+            | Self::NotSmooth { t, state, .. }
+            | Self::StaysOnJump { t, state, .. }
+            | Self::StepUnderflow { t, state, .. }
+            | Self::TooManySteps { t, state, .. }
+            | Self::NotConverged { t, state, .. } => Some((t, state)),
+            Self::NotApplicable { .. } => None,
+        }
     }
 
     /// The state as the errors carry it.

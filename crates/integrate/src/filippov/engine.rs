@@ -298,6 +298,15 @@ impl Sliding {
     }
 }
 
+/// A failure of the sliding flow, by the motion's own state and time.
+fn in_time<const N: usize>(mut failure: Failure, t_base: f64) -> Failure {
+    if let Some((t, state)) = failure.place() {
+        *t = t_base + state[N];
+        state.truncate(N);
+    }
+    failure
+}
+
 /// A state of the sliding flow without its clock.
 fn without_clock<const N: usize, const M: usize>(z: &SVector<f64, M>) -> SVector<f64, N> {
     SVector::from_fn(|i, _| z[i])
@@ -1446,7 +1455,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         let place = if direction > 0.0 { 2 } else { 3 };
         let gates = self.gates[place].take().unwrap_or_else(|| {
             let system = Sided { system: self.system, depth: None };
-            Gates::of_part(VectorField::<M>::tape(&SlidingFlow { system, direction }))
+            let tape = VectorField::<M>::tape(&SlidingFlow { system, direction });
+            Gates::of_part(Arc::new(Tape::clone(&tape).with_names(self.system.names())))
         });
         let mut method = Automatic::new(self.settings.tolerance, gates);
         let next = self.slide_by(&mut method, sliding);
@@ -1502,7 +1512,10 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                     self.count(&before);
                     return Ok(State::Sliding(sliding));
                 }
-                Err(failure) => return Err(self.cause_on_surface().unwrap_or(failure).into()),
+                Err(failure) => {
+                    let seen = || in_time::<N>(failure, t_base);
+                    return Err(self.cause_on_surface().unwrap_or_else(seen).into());
+                }
             };
             let end = self.sliding_end(&step, &sliding, along, (t_base, clock), fresh);
             fresh = false;

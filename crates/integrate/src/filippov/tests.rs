@@ -859,6 +859,18 @@ fn states_of_any_sizes_share_a_switching_function() {
     }
 }
 
+/// A sign that attracts stops sliding at the motion's own time and state. From (0.5, 0) on the
+/// surface x = 0 is reached at t = 0.5, and y = t.
+#[test]
+fn a_jump_that_holds_sliding_is_named_by_the_motion() {
+    let end = plane(["x", "'-1', '-sign(y - 1)'", "'1', '-sign(y - 1)'"], [0.5, 0.0], 3.0);
+    let Err(FilippovError::Stepping(Failure::StaysOnJump { t, state, what })) = end else {
+        panic!("{end:?}")
+    };
+    assert!((t - 1.0).abs() < 1e-6 && (state[1] - 1.0).abs() < 1e-6, "{t} {state:?}");
+    assert_eq!((state.len(), what.as_str()), (2, "sign(y - 1)"));
+}
+
 /// Fields that grow without bound towards the surface make no sliding motion; those that end there
 /// do.
 #[test]
