@@ -316,7 +316,7 @@ pub(super) struct Gates {
     /// value: over a switching surface.
     leads_over: bool,
     /// Levels between which the last output, a switching function, is told apart.
-    levels: Option<[f64; 2]>,
+    levels: Option<Vec<f64>>,
     /// Whether the last output is a switching function at whose zero the motion leaves the field.
     ends_at_zero: bool,
 }
@@ -398,12 +398,12 @@ impl Gates {
 
     /// The same of the field on one side of h = 0, up to there.
     pub(super) fn of_side(field: Arc<Tape>, h: &Tape) -> Option<Self> {
-        Some(Self { levels: None, ends_at_zero: true, ..Self::with_switch(&[field], h, [0.0; 2])? })
+        Some(Self { levels: None, ends_at_zero: true, ..Self::with_switch(&[field], h, &[])? })
     }
 
-    /// The same of a mixture of fields and of a switching function that is told apart at two
+    /// The same of a mixture of fields and of a switching function that is told apart at some
     /// levels.
-    pub(super) fn with_switch(fields: &[Arc<Tape>], h: &Tape, levels: [f64; 2]) -> Option<Self> {
+    pub(super) fn with_switch(fields: &[Arc<Tape>], h: &Tape, levels: &[f64]) -> Option<Self> {
         let named: &Tape = fields.first().map_or(h, |field| field);
         let n = named.variables();
         let tape = Tape::record(n, |x| {
@@ -418,7 +418,7 @@ impl Gates {
         let tape = tape.with_names((0..n).map(|i| named.name(i)));
         let kept = tape.outputs().len() - 1;
         let of_fields = tape.select(0..kept).needed();
-        let mut gates = Self { levels: Some(levels), ..Self::of_part(Arc::new(tape))? };
+        let mut gates = Self { levels: Some(levels.to_vec()), ..Self::of_part(Arc::new(tape))? };
         // A kink of h is none of the motion.
         gates.signs.retain(|[sign, _]| of_fields[*sign]);
         Some(gates)
@@ -774,7 +774,7 @@ impl Gates {
         let last = f0.len() - 1;
         let has_switch = self.levels.is_some() || self.ends_at_zero;
         let components = f0.len() - usize::from(has_switch);
-        let hidden = |levels: [f64; 2], value: f64| {
+        let hidden = |levels: &[f64], value: f64| {
             levels.iter().any(|level| {
                 let beyond = |v: f64| v > *level;
                 beyond(f0[last]) == beyond(f1[last]) && beyond(value) != beyond(f0[last])
@@ -789,7 +789,7 @@ impl Gates {
             for (k, weight) in [7.0, 32.0, 12.0, 32.0, 7.0].into_iter().enumerate() {
                 let theta = from + 0.25 * k as f64 * (to - from);
                 let f = self.outputs(step.at(theta).as_slice());
-                if self.levels.is_some_and(|levels| hidden(levels, f[last])) {
+                if self.levels.as_ref().is_some_and(|levels| hidden(levels, f[last])) {
                     return Some(Missed { from, to });
                 }
                 if self.ends_at_zero {

@@ -103,7 +103,7 @@ impl<'a, P: PiecewiseSmooth<N> + Clone, M: Cuttable<N>, const N: usize> Sharp<'a
             statistics: Statistics::default(),
             steps: 0,
             again: 0,
-            gates: Gates::with_switch(&[], &sides.h, [-band, band]),
+            gates: Gates::with_switch(&[], &sides.h, &[-band, band]),
         };
         if history == History::Flow {
             sharp.look_back()?;

@@ -6,7 +6,7 @@ use super::past::{Look, Past, shortened};
 use super::tangent::{Carry, TangentStepper, square, square_of_past};
 use super::{Backwards, DelayError, Delayed, History, ONE_TIME, Sides, is_due, resolves};
 use crate::driver::{DriveOptions, Observer, drive};
-use crate::guard::{Gates, Redoable, Stage, Stages};
+use crate::guard::{Gates, Redoable, Stage, Stages, Undone};
 use crate::roots::CrossingFinder;
 use crate::step::{Driven, DrivenStepper, Failure, Flow, Statistics, Step, Stepper, Tolerance};
 use crate::{Dopri5, Guarded};
@@ -49,6 +49,11 @@ const SEEN: u32 = 5;
 const LONGEST: f64 = 0.999;
 /// The layer's half-width in eps: tanh differs from 1 by 4e-9 there.
 const LAYER: f64 = 10.0;
+/// Values of h, in eps, between which transition functions are told apart.
+const LEVELS: [f64; 15] =
+    [-LAYER, -8.0, -6.0, -4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0, 6.0, 8.0, LAYER];
+/// Parts of a structure of h at which steps end one delay later.
+const PARTS: u32 = 16;
 /// A change of h smaller than this part of eps ends no step: phi feels it less than any step does.
 /// Where h is at rest, rounding turns it in every step, and every turn would end a step one delay
 /// later, which would turn again.
@@ -123,7 +128,7 @@ impl<'a, P: PiecewiseSmooth<N> + Clone, M, const N: usize> Smooth<'a, P, M, N> {
             gates: Gates::with_switch(
                 &sides.fields.each_ref().map(|side| side.tape.clone()),
                 &sides.h,
-                [-LAYER * eps, LAYER * eps],
+                &LEVELS.map(|level| level * eps),
             ),
             stages: Stages::new(0.0, f64::INFINITY),
             tolerance,
@@ -283,6 +288,7 @@ impl<P: PiecewiseSmooth<N>, M: DrivenStepper<N> + Redoable<N>, const N: usize> S
             let Stage { end, max_step } = stages.now();
             method.restart_driven(&field, t, self.reached.1, end, max_step)?;
         }
+        let mut late = Vec::new();
         let step = loop {
             let step = method.step_driven(&field)?;
             let Step { t0, t1, x0, x1, .. } = step;
@@ -291,6 +297,10 @@ impl<P: PiecewiseSmooth<N>, M: DrivenStepper<N> + Redoable<N>, const N: usize> S
                 break Step { t0, t1, x0, x1, interpolant: method.last() };
             }
             *again += 1;
+            if let Some(Undone::Structure([from, to])) = undone {
+                let part = (to - from) / f64::from(PARTS);
+                late.extend((0..=PARTS).map(|k| from + f64::from(k) * part));
+            }
             let Stage { end, max_step } = stages.now();
             method.restart_driven(&field, t0, x0, end, max_step)?;
         };
@@ -298,7 +308,7 @@ impl<P: PiecewiseSmooth<N>, M: DrivenStepper<N> + Redoable<N>, const N: usize> S
         let times = in_layer(sides, *eps, &mut self.passages, &step);
         self.reached = (step.t1, step.x1);
         self.past.put(&step, step.t1 - 1.5 * self.delay);
-        times.into_iter().for_each(|t| self.end_at(t + self.delay));
+        times.into_iter().chain(late).for_each(|t| self.end_at(t + self.delay));
         Ok(())
     }
 }

@@ -824,4 +824,37 @@ fn thin_pulses_are_seen() {
             assert!((end.x[0] - q).abs() < 1e-4, "{method:?}: {} {q}", end.x[0]);
         }
     }
+    // Switching functions of other forms, passed by s from -1 to 1 without a step there. Above
+    // zero each is while a step function is within 0.5 of its middle.
+    let width = 2e-4 * 0.5_f64.sqrt().atanh();
+    let flat = "0.5 - tanh((s - 1.2345)/1e-4)^2";
+    let made = |h: &str| made(h, "1e4", "0");
+    for how in [How::sharp(0.1, 3.0), How::relay(1e-10, 3.0), How::relay(0.01, 3.0)] {
+        let band = how.band.map_or(0.0, |(band, _)| band);
+        let half = |at: f64| 1e-4 * (0.5_f64 + at).sqrt().atanh();
+        let q = if band > 0.0 { 1e4 * (half(-band) + half(band)) } else { 1e4 * width };
+        let (_, end) = how.run(&made(flat), [0.0, 0.0]).unwrap();
+        assert!((end.x[0] - q).abs() < 1e-6, "{band}: {} {q}", end.x[0]);
+    }
+    // In a layer wider than the switching function: the integral of phi, by Simpson's rule.
+    for (h, f) in [
+        (flat, (|u: f64| 0.5 - u.tanh().powi(2)) as fn(f64) -> f64),
+        ("exp(-((s - 1.2345)/1e-4)^2) - 0.5", |u| (-u * u).exp() - 0.5),
+        // Without a zero, on one side or the other.
+        ("exp(-((s - 1.2345)/1e-4)^2) + 0.1", |u| (-u * u).exp() + 0.1),
+        ("exp(-((s - 1.2345)/1e-4)^2) - 1.1", |u| (-u * u).exp() - 1.1),
+    ] {
+        let phi = |u: f64| 0.5 * (1.0 + (f(u) / 0.1).tanh());
+        let rest = phi(1e3);
+        let weight = |k: i32| [2.0, 4.0][k as usize % 2];
+        let pulse: f64 =
+            (-8000..8000).map(|k: i32| weight(k.abs()) * (phi(f64::from(k) * 1e-3) - rest)).sum();
+        let q = 1e4 * 3.0 * rest + pulse * 1e-3 / 3.0;
+        for method in [Method::Dopri5, Method::Radau5] {
+            let smooth = Some((Transition::Tanh, 0.1));
+            let how = How { method, smooth, ..How::sharp(0.1, 3.0) };
+            let (_, end) = how.run(&made(h), [0.0, 0.0]).unwrap();
+            assert!((end.x[0] - q).abs() < 1e-4, "{h} {method:?}: {} {q}", end.x[0]);
+        }
+    }
 }
