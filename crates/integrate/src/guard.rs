@@ -682,28 +682,43 @@ impl Gates {
     /// sec. 4): alike near it and very near, as they are beside a jump and not beside a tangency.
     fn attracts<const N: usize>(&mut self, step: &Step<'_, N>, theta: f64, argument: Node) -> bool {
         let has_switch = self.levels.is_some() || self.ends_at_zero;
-        if self.tape.outputs().len() - usize::from(has_switch) > N {
-            return false;
-        }
+        let mixed = self.tape.outputs().len() - usize::from(has_switch) > N;
+        let weight = if mixed { self.weight(step) } else { 0.0 };
         let rise = (self.along[argument].ends[1] - self.along[argument].ends[0]).signum();
-        let delta = 1e-6 * step.length();
+        // In short steps as far as rounding of the time and the state allows.
+        let resolution = 4.0 * f64::EPSILON * (step.t0.abs() + step.length());
+        let delta = (1e-6 * step.length()).max(LANDED * resolution);
+        let close = (0.1 * delta / step.length()).max(1e-6);
         // Towards the side that is come to, from `apart` behind or before the zero.
         let mut rate = |apart: f64| {
             let x = step.at((theta + apart).clamp(0.0, 1.0));
-            let velocity = self.outputs(x.as_slice());
+            let out = self.outputs(x.as_slice());
             let mut ahead = x;
-            ahead.iter_mut().zip(&velocity).for_each(|(x, v)| *x += delta * v);
+            for (i, x) in ahead.iter_mut().enumerate().take(out.len()) {
+                let other = if mixed { out[N + i] - out[i] } else { 0.0 };
+                *x += delta * (out[i] + weight * other);
+            }
             let before = self.argument(argument, x.as_slice());
             rise * (self.argument(argument, ahead.as_slice()) - before)
         };
-        let near = [rate(-1e-6), rate(1e-6)];
-        let farther = [rate(-1e-3), rate(1e-3)];
+        let near = [rate(-close), rate(close)];
+        let farther = [rate(-1e3 * close), rate(1e3 * close)];
         near[0] > 0.0
             && near[1] < 0.0
             && near[0] > 0.1 * farther[0]
             && near[1] < 0.1 * farther[1]
             && farther[0] > 0.0
             && farther[1] < 0.0
+    }
+
+    /// The weight of the second of two fields in the velocity at the beginning of the step.
+    fn weight<const N: usize>(&mut self, step: &Step<'_, N>) -> f64 {
+        let velocity = (step.at(DIFFERENCE) - step.x0) / (DIFFERENCE * step.length());
+        let out = self.outputs(step.x0.as_slice());
+        let apart = SVector::<f64, N>::from_fn(|i, _| out[N + i] - out[i]);
+        let from_first = SVector::<f64, N>::from_fn(|i, _| velocity[i] - out[i]);
+        let weight = apart.dot(&from_first) / apart.norm_squared();
+        if weight.is_nan() { 0.0 } else { weight.clamp(0.0, 1.0) }
     }
 
     #[cold]

@@ -858,3 +858,32 @@ fn thin_pulses_are_seen() {
         }
     }
 }
+
+/// The failure of a run.
+struct Failing(SVector<f64, 2>);
+
+impl WithStepper<2> for Failing {
+    type Answer = Failure;
+    fn with<M: Stepper<2>>(self, mut stepper: M) -> Failure {
+        let to = DriveOptions::to(3.0);
+        drive(&Own, self.0, &to, &mut stepper, &mut crate::Ignore, &()).unwrap_err()
+    }
+}
+
+/// A sign in the fields that attracts is refused under the smooth rule, too. Steps would have no
+/// end there.
+#[test]
+fn a_jump_that_attracts_is_refused_by_the_smooth_rule() {
+    let fields = "plus = ['-1', '-sign(y - 1)']\nminus = ['1', '-sign(y - 1)']";
+    let data = system(&format!("states = ['x', 'y']\nh = 'x - 1'\n{fields}"));
+    let bound: Bound<2> = data.bind().unwrap();
+    let smooth = Some((Transition::Tanh, 0.05));
+    let switch = LateSwitch::Delayed { delay: 0.1, smooth, history: History::Constant };
+    for method in SMOOTH_METHODS {
+        let x0 = vector![1.5, 0.0];
+        let delayed = Delayed { sides: Sides::new(&bound, &data), switch, x0 };
+        let failure = delayed.with_stepper(method, None, tolerance(1e-9), Failing(x0)).unwrap();
+        let Failure::StaysOnJump { t, state, .. } = failure else { panic!("{failure}") };
+        assert!((t - 1.0).abs() < 1e-3 && (state[1] - 1.0).abs() < 1e-3, "{t} {state:?}");
+    }
+}
