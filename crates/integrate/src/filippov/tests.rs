@@ -626,6 +626,16 @@ fn thin_pulses_are_seen() {
 
 /// A run of a plane system with these formulas.
 fn plane(
+    formulas: [&str; 3],
+    start: [f64; 2],
+    t_end: f64,
+) -> Result<FilippovSummary<2>, FilippovError> {
+    plane_within(1e-12, formulas, start, t_end)
+}
+
+/// The same with this tolerance.
+fn plane_within(
+    tolerance: f64,
     [h, plus, minus]: [&str; 3],
     start: [f64; 2],
     t_end: f64,
@@ -635,7 +645,8 @@ fn plane(
     );
     let text = twofold_system::Definition::from_toml(&text, "").unwrap_or_else(|e| panic!("{e}"));
     let bound: Bound<2> = System::new(text).bind().unwrap();
-    let settings = FilippovOptions::default();
+    let tolerance = Tolerance { rtol: tolerance, atol: tolerance };
+    let settings = FilippovOptions { tolerance, ..FilippovOptions::default() };
     let rule = ExitRule::Undecided;
     run(&bound, start.into(), t_end, &settings, rule, &mut Trajectory::new(1))
 }
@@ -762,6 +773,17 @@ fn sliding_ends_at_a_corner() {
             assert!(off.amax() < 1e-8, "{h} {start:?}: {x}");
         }
     }
+}
+
+/// Around |x - 100| + |y| = 1 to the corner where sliding ends, and on: the end is that of the
+/// engine for equations in the general form.
+#[test]
+fn a_corner_far_from_zero_is_passed() {
+    let h = "abs(x - 100) + abs(y) - 1";
+    let plus = "'-1.83 + 0.25*sin(x - 100)', '0.06 - 0.41*y + 0.16*sin(3*y)'";
+    let minus = "'1.92 - 1.22*y - 0.21*sin(3*y) - 0.5*(x - 100)', '1.15 - 0.42*y + 0.24*sin(y)'";
+    let x = plane_within(1e-8, [h, plus, minus], [100.85, -0.8], 10.0).unwrap().x;
+    assert!((x[0] - 87.83763).abs() < 1e-5 && (x[1] - 0.551752).abs() < 1e-6, "{x}");
 }
 
 /// A hop beside an invisible fold that is lower than the rounding of h, and one that is not.
