@@ -834,7 +834,7 @@ impl RunFlags {
     fn described(&self, command: Use) -> Result<RunSpec, Misuse> {
         let system = self.described_system()?;
         let (eps, transition) = (self.eps.unwrap_or(EPS), self.transition());
-        let switch = match self.switch() {
+        let mut switch = match self.switch() {
             Switch::Smoothed => SwitchSpec::Smoothed { eps, transition },
             Switch::Hysteretic => SwitchSpec::Hysteretic {
                 eps,
@@ -888,6 +888,9 @@ impl RunFlags {
             }
             Some(numbers) => numbers.clone(),
         };
+        if let SwitchSpec::Hysteretic { phi0, .. } = &mut switch {
+            *phi0 = SwitchSpec::phi_at(&system, &start);
+        }
         let by_events = matches!(self.switch(), Switch::Delayed | Switch::Relay | Switch::Filippov);
         let method = self.method.unwrap_or(if by_events { Method::Dopri5 } else { Method::Lsoda });
         let mut defaults = MethodSpec::defaults(integrate::Method::from(method));
@@ -1283,6 +1286,16 @@ mod tests {
             }
         }
         kinds
+    }
+
+    #[test]
+    fn hysteresis_begins_on_the_side_of_the_start() {
+        for (x, wanted) in [("0.2", 1.0), ("0", 1.0), ("-0.2", 0.0)] {
+            let start = format!("--start={x},0,-1");
+            let spec = parse(&["--switch", "hysteretic", &start]).spec(Use::Any).unwrap();
+            let SwitchSpec::Hysteretic { phi0, .. } = spec.switch else { panic!() };
+            assert_eq!(phi0, wanted, "{x}");
+        }
     }
 
     #[test]

@@ -154,6 +154,11 @@ impl SwitchSpec {
         }
     }
 
+    /// phi of the hysteretic system at a start: on the side of h there, and 1 on the surface.
+    pub fn phi_at(system: &System, start: &[f64]) -> f64 {
+        if switching(system, start) < 0.0 { 0.0 } else { 1.0 }
+    }
+
     /// The hysteretic system of sec. 4.3 with eps' = 10 eps and phi(0) = 1.
     pub fn hysteretic(eps: f64, relaxation: Relaxation) -> Self {
         SwitchSpec::Hysteretic { eps, eps_prime: 10.0 * eps, relaxation, phi0: 1.0 }

@@ -458,6 +458,11 @@ impl Coordinate {
             Entry::Integer(v) => u64::try_from(*v).unwrap_or(0),
             _ => 0,
         };
+        let side = |run: &RunSpec| SwitchSpec::phi_at(&run.system, &run.start);
+        let follows = match run.switch {
+            SwitchSpec::Hysteretic { phi0, .. } => phi0 == side(run),
+            _ => false,
+        };
         match self {
             Coordinate::Parameter(name) => {
                 run.system = run.system.clone().with(name, number).map_err(|e| e.to_string())?;
@@ -555,6 +560,10 @@ impl Coordinate {
                 run.method.name =
                     found.ok_or_else(|| format!("there is no method {}", value.word()))?;
             }
+        }
+        let phi = follows.then(|| side(run));
+        if let (SwitchSpec::Hysteretic { phi0, .. }, Some(phi)) = (&mut run.switch, phi) {
+            *phi0 = phi;
         }
         Ok(())
     }
@@ -680,7 +689,7 @@ mod tests {
                 .map(|()| serde_json::to_value(&run).unwrap())
         };
         type Change = fn(&mut RunSpec);
-        let cases: [(&RunSpec, &str, Change); 23] = [
+        let cases: [(&RunSpec, &str, Change); 24] = [
             (&tanh, "params.alpha=0.2", |r| {
                 r.system = Caricature::with_reinjection(0.2, 1e-5).into()
             }),
@@ -699,6 +708,10 @@ mod tests {
             (&hysteretic, "eps=1e-2", |r| {
                 let SwitchSpec::Hysteretic { eps, .. } = &mut r.switch else { panic!() };
                 *eps = 1e-2;
+            }),
+            (&hysteretic, "start.x=-1", |r| {
+                let SwitchSpec::Hysteretic { phi0, .. } = &mut r.switch else { panic!() };
+                (*phi0, r.start[0]) = (0.0, -1.0);
             }),
             (&hysteretic, "eps-prime=1e-4", |r| {
                 let SwitchSpec::Hysteretic { eps_prime, .. } = &mut r.switch else { panic!() };
