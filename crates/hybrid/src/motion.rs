@@ -634,11 +634,8 @@ fn error_of_accumulation(
 /// If the equations are not complete, or the motion is not decided there.
 pub fn starts_on_an_event(model: &Model, options: &Options) -> Result<bool, HybridError> {
     let follower = Follower::new(model, options)?;
-    let asked = |event: usize| {
-        model.definition().events()[event].from.is_none_or(|mode| mode == follower.config.mode)
-    };
-    let fresh = follower.fresh_watch.iter().zip(&follower.event_of);
-    Ok(fresh.into_iter().any(|(fresh, event)| *fresh && event.is_none_or(asked)))
+    let fresh = follower.fresh_watch.iter().enumerate();
+    Ok(fresh.into_iter().any(|(i, fresh)| *fresh && follower.is_asked(i)))
 }
 
 /// [`follow_watched`], and whether the motion at a finished run's end rests: whether it goes on for
@@ -1481,7 +1478,8 @@ impl<'a> Follower<'a> {
         for i in 0..self.watch_side.len() {
             let e = &self.equation.watched[i];
             let (side, value) = (self.watch_side[i], self.equation.value(e, self.t, &self.x));
-            if side != 0.0 && !self.fresh_watch[i] && value.abs() <= 1e-14 * self.magnitude(e) {
+            let may_pass = side != 0.0 && !self.fresh_watch[i] && self.is_asked(i);
+            if may_pass && value.abs() <= 1e-14 * self.magnitude(e) {
                 near.push((Sought::Watched(i), self.compiled.active.len() + i, -side));
             }
         }

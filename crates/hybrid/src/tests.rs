@@ -4745,5 +4745,41 @@ fn saturations_of_signs_are_no_surfaces() {
             let [early, late] = [4.0, 6.0].map(|t| end_of(&text, t, method).unwrap());
             near(late[0], early[0] * (-4.0_f64).exp(), 1e-8);
         }
+
+/// Events of another mode are not asked, however near to zero the present mode keeps their
+/// expressions: a play, a ball on a vibrating table, and an elastoplastic spring.
+#[test]
+fn events_of_other_modes_are_not_met() {
+    let play = "states = ['y']\nstart = [0]\n[modes.hold]\nf = ['0']\n[modes.up]\n\
+        f = ['cos(t)']\n[[event]]\nfrom = 'hold'\nwhen = 'sin(t) - y - 0.4'\n\
+        direction = 'up'\nmode = 'up'\n[[event]]\nfrom = 'up'\nwhen = 'cos(t)'\n\
+        direction = 'down'\nmode = 'hold'";
+    let table = "states = ['x', 'v']\nstart = [0, 1.5]\n[modes.contact]\n\
+        f = ['1.5*cos(t)', '-1.5*sin(t)']\n[modes.flight]\nf = ['v', '-1']\n[[event]]\n\
+        from = 'flight'\nwhen = 'x - 1.5*sin(t)'\ndirection = 'down'\nmode = 'contact'\n\
+        set = { x = '1.5*sin(t)', v = '1.5*cos(t)' }\n[[event]]\nfrom = 'contact'\n\
+        when = '1.5*sin(t) > 1'\nmode = 'flight'";
+    let spring = "states = ['v', 'F']\nstart = [1, 0]\n[modes.elastic]\n\
+        f = ['-sin(t)', 'v']\n[modes.plastic]\nf = ['-sin(t)', '0']\n[[event]]\n\
+        from = 'elastic'\nwhen = 'abs(F) - 0.3'\ndirection = 'up'\nmode = 'plastic'\n\
+        [[event]]\nfrom = 'plastic'\nwhen = 'v'\nmode = 'elastic'";
+    // Flights begin where the table rises with sin(t) = 2/3, at its acceleration of -1.
+    let lift = (2.0_f64 / 3.0).asin();
+    let height = |s: f64| 1.0 + 1.5 * lift.cos() * s - 0.5 * s * s;
+    let turn = 2.0 * std::f64::consts::PI;
+    for method in Method::ALL {
+        let ends = |text: &str, t_end: f64, place: usize, want: f64| {
+            let found = end_of(text, t_end, method).unwrap();
+            near(found[place], want, 1e-8);
+        };
+        ends(play, 2.0, 0, 0.6);
+        ends(play, 20.0, 0, 0.6);
+        ends(table, 4.0, 0, height(4.0 - lift));
+        ends(table, 6.0, 0, 1.5 * 6.0_f64.sin());
+        ends(table, 20.0, 0, height(20.0 - 3.0 * turn - lift));
+        // From 0.3 down by 1 - sin(t), from -0.3 up by 1 + sin(t).
+        ends(spring, 2.5, 1, 2.5_f64.sin() - 0.7);
+        ends(spring, 5.0, 1, 5.0_f64.sin() + 0.7);
+        ends(spring, 30.0, 1, 30.0_f64.sin() + 0.7);
     }
 }

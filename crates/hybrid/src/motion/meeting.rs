@@ -3,7 +3,10 @@
 use super::*;
 
 /// Smaller values of what is held at zero, and smaller speeds, relative to their sizes, are drift.
-const DRIFT: f64 = 1e-7;
+pub(super) const DRIFT: f64 = 1e-7;
+
+/// Changes of states by an event are rounding up to so small a part of their largest sizes.
+const BLOW: f64 = 1e-13;
 
 impl Follower<'_> {
     pub(super) fn meet(
@@ -232,11 +235,7 @@ impl Follower<'_> {
                     self.x[contact.state] -= speed / by;
                 }
             }
-            let e = &self.equation.watched[contact.watched];
-            let beyond = -self.equation.value(e, self.t, &self.x) * contact.above;
-            self.released[contact.watched] = beyond.max(0.0)
-                + 4.0 * self.grain_of(contact.watched, speeds)
-                + 64.0 * f64::EPSILON * self.magnitude(e);
+            self.release(contact.watched, speeds);
             self.trains[contact.event] = Train::default();
         }
         self.hold_guards_but(&freed)
@@ -418,12 +417,16 @@ impl Follower<'_> {
             return Err(HybridError::Stuck { t: self.t, x: old, why });
         }
         let changed = new != old;
+        let none = vec![false; self.watch_side.len()];
+        self.x.copy_from_slice(&old);
+        let kept = if mode.is_some() { self.kept_at_zero() } else { none };
         for i in (0..self.n).filter(|i| new[*i] != old[*i]) {
             self.lately[i] = new[i].abs();
             self.size[i] = self.size[i].max(new[i].abs());
         }
         self.x = new;
         if changed || mode.is_some() {
+            let asked: Vec<bool> = (0..self.watch_side.len()).map(|i| self.is_asked(i)).collect();
             if let Some(mode) = mode {
                 self.config.mode = mode;
             }
@@ -463,28 +466,27 @@ impl Follower<'_> {
                 // A function that the reset leaves alone is where it was, however near to zero.
                 let e = &self.equation.watched[i];
                 let now = self.equation.value(e, self.t, &self.x);
+                // But one beyond its event's zero, or not asked until now, has just come there.
+                let lies = now.abs() <= 1e-12 * self.magnitude(e)
+                    && (!asked[i] || !met && self.is_beyond(i, now));
                 let is_away = !met && !self.fresh_watch[i] && now * self.watch_side[i] > 0.0;
-                if is_away && now == self.equation.value(e, self.t, &old)
+                if is_away && !lies && asked[i] && now == self.equation.value(e, self.t, &old)
                     || self.contacts.iter().any(|c| c.watched == i)
                 {
                     continue;
                 }
-                self.begin_watching(i, watched.contains(&i), met);
+                if kept[i] && self.is_asked(i) && now.abs() <= DRIFT * self.magnitude(e) {
+                    self.begin_watching_kept(i);
+                } else {
+                    self.begin_watching(i, lies || watched.contains(&i), met);
+                }
             }
             for i in &watched {
                 let Some(event) = self.event_of[*i] else { continue };
-                let When::Zero(_, direction) = definition.events()[event].when else { continue };
                 // Pressed back into the surface at once: infinitely many in no time. What passes
                 // through with a speed does not come back.
-                let into = match direction {
-                    Direction::Down => self.watch_side[*i] < 0.0,
-                    Direction::Up => self.watch_side[*i] > 0.0,
-                    Direction::Both => false,
-                };
-                let asked =
-                    definition.events()[event].from.is_none_or(|mode| mode == self.config.mode);
-                if into
-                    && asked
+                if self.is_beyond(*i, self.watch_side[*i])
+                    && self.is_asked(*i)
                     && fired.contains(&event)
                     && !definition.events()[event].set.is_empty()
                 {
@@ -561,6 +563,16 @@ impl Follower<'_> {
         self.happen(definition, &newly, &[], observe)
     }
 
+    /// Whether a value of a watched expression is on the side that its event passes to.
+    pub(super) fn is_beyond(&self, i: usize, value: f64) -> bool {
+        let event = self.event_of[i].map(|event| &self.model.definition().events()[event].when);
+        match event {
+            Some(When::Zero(_, Direction::Up)) => value > 0.0,
+            Some(When::Zero(_, Direction::Down)) => value < 0.0,
+            _ => false,
+        }
+    }
+
     /// The time of a flight at the present speed over a watched expression's surface, into which
     /// the motion is pressed, if rounding hides its height.
     fn flight_in_rounding(&mut self, i: usize) -> Option<f64> {
@@ -595,8 +607,7 @@ impl Follower<'_> {
             if !into || !self.fresh_watch[i] || rests {
                 continue;
             }
-            let of_mode = |mode| mode == self.config.mode;
-            if !definition.events()[event].from.is_none_or(of_mode) {
+            if !self.is_asked(i) {
                 continue;
             }
             let before = match fired.iter().position(|f| *f == event) {
@@ -681,10 +692,9 @@ impl Follower<'_> {
             Direction::Up => 1.0,
             Direction::Both => return None,
         };
-        let of_mode = definition.events()[event].from.is_none_or(|mode| mode == self.config.mode);
         let e = &self.equation.watched[i];
         let is_on = self.equation.value(e, self.t, &self.x).abs() <= 1e-12 * self.magnitude(e);
-        if !of_mode || !is_on || self.contacts.iter().any(|c| c.watched == i) {
+        if !self.is_asked(i) || !is_on || self.contacts.iter().any(|c| c.watched == i) {
             return None;
         }
         // Functions that are zero with it are so on neither side, or beside it.

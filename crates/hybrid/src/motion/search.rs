@@ -47,7 +47,7 @@ impl Follower<'_> {
         }
         for (i, side) in self.watch_side.iter().enumerate() {
             let place = compiled.active.len() + i;
-            if self.held[i] {
+            if self.held[i] || !self.is_asked(i) {
                 continue;
             }
             if *side != 0.0

@@ -8,6 +8,7 @@ use twofold_num::random::RandomStream;
 use twofold_system::expression::{Function, General};
 
 use super::locate::TANGENT;
+use super::meeting::DRIFT;
 use super::*;
 use crate::cells;
 use crate::equation::same_sign;
@@ -1847,13 +1848,43 @@ impl Follower<'_> {
     /// The side to which a watched value of third order or more leaves zero: it grows by more than
     /// a square. 0 if it stays.
     pub(super) fn side_ahead(&mut self, place: usize) -> f64 {
-        const BRIEF: f64 = 0.005;
+        let [near, far] = self.watched_ahead(place);
+        if same_sign(near, far) && far.abs() > 5.0 * near.abs() { far.signum() } else { 0.0 }
+    }
+
+    /// Whether a watched expression that is zero and whose event changes its speed stays there, as
+    /// this and its change a brief time ahead are rounding: bodies that touch move on together.
+    pub(super) fn touches_on(&mut self, i: usize) -> bool {
+        let Some(event) = self.event_of[i].filter(|_| !self.held[i]) else { return false };
+        let place = self.compiled.active.len() + i;
         let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; self.n]);
         self.rhs(t, &x, &mut field);
+        let value = self.watched_values()[place];
+        let speed = Self::along(&self.compiled, &self.variables, &field)[place];
+        let small = 1e-13 * self.magnitude(&self.equation.watched[i]);
+        let changes_speed = |(state, _): &(usize, Expression)| {
+            self.second_along(&field, Some(*state))[place] != 0.0
+        };
+        (speed * self.brief(&field)).abs() <= small
+            && speed.abs() <= SMALLEST_SLOPE * self.speeds(&field, place)
+            && self.model.definition().events()[event].set.iter().any(changes_speed)
+            && self.watched_ahead(place).iter().all(|ahead| (ahead - value).abs() <= small)
+    }
+
+    /// A time in which states that move so do not change by a hundredth of their sizes.
+    fn brief(&self, field: &[f64]) -> f64 {
+        const BRIEF: f64 = 0.005;
         let moves = field.iter().zip(&self.size).filter(|(f, size)| **f != 0.0 && **size != 0.0);
-        let brief =
-            BRIEF * moves.map(|(f, size)| size / f.abs()).fold(self.options.t_end - t, f64::min);
-        let [near, far] = [brief, 2.0 * brief].map(|h| {
+        let left = self.options.t_end - self.t;
+        BRIEF * moves.map(|(f, size)| size / f.abs()).fold(left, f64::min)
+    }
+
+    /// A watched value a brief time ahead, and twice that time.
+    fn watched_ahead(&mut self, place: usize) -> [f64; 2] {
+        let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; self.n]);
+        self.rhs(t, &x, &mut field);
+        let brief = self.brief(&field);
+        [brief, 2.0 * brief].map(|h| {
             let mut rhs = |t: f64, x: &[f64]| {
                 let mut out = vec![0.0; x.len()];
                 self.rhs(t, x, &mut out);
@@ -1865,8 +1896,65 @@ impl Follower<'_> {
             let mut values = vec![0.0; self.compiled.outputs];
             self.compiled.watched.evaluate(&self.variables, &mut values);
             values[place]
-        });
-        if same_sign(near, far) && far.abs() > 5.0 * near.abs() { far.signum() } else { 0.0 }
+        })
+    }
+
+    /// Whether the event of a watched expression can fire in the present mode. A section's rows
+    /// are of all modes.
+    pub(super) fn is_asked(&self, i: usize) -> bool {
+        let events = self.model.definition().events();
+        let from = self.event_of[i].and_then(|event| events[event].from);
+        from.is_none_or(|mode| mode == self.config.mode)
+    }
+
+    /// The watched expressions that are not asked in the present mode, and that it keeps at zero.
+    pub(super) fn kept_at_zero(&mut self) -> Vec<bool> {
+        if (0..self.watch_side.len()).all(|i| self.is_asked(i)) {
+            return vec![false; self.watch_side.len()];
+        }
+        let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; self.n]);
+        let (compiled, rates) = self.rates(&self.config.clone());
+        self.rhs(t, &x, &mut field);
+        let values = self.watched_values();
+        let speeds = Self::along(&self.compiled, &self.variables, &field);
+        let active = self.compiled.active.len();
+        let kept = |i: usize| {
+            let (place, e) = (active + i, &self.equation.watched[i]);
+            let terms = rates.terms[compiled.active.len() + i];
+            !self.is_asked(i)
+                && values[place].abs() <= DRIFT * self.magnitude(e)
+                && speeds[place].abs() <= DRIFT * terms.max(self.speeds(&field, place))
+        };
+        (0..self.watch_side.len()).map(kept).collect()
+    }
+
+    /// Finds the side of a watched expression that a mode which has ended kept at zero: its value,
+    /// and a small speed, are drift.
+    pub(super) fn begin_watching_kept(&mut self, i: usize) {
+        self.begin_watching(i, true, false);
+        let place = self.compiled.active.len() + i;
+        let (compiled, rates) = self.rates(&self.config.clone());
+        let own = compiled.active.len() + i;
+        let speeds = rates.terms[own].max(self.speeds(&rates.field, place));
+        if rates.first[own].abs() > DRIFT * speeds {
+            return;
+        }
+        let value = self.watched_values()[place];
+        let [near, far] = self.watched_ahead(place).map(|ahead| ahead - value);
+        if same_sign(near, far) && far.abs() > near.abs() {
+            self.watch_side[i] = far.signum();
+        }
+        self.tangent[i] = false;
+        self.release(i, rates.terms[own]);
+    }
+
+    /// Lets a watched expression that leaves zero be beyond it by what it is now, and by rounding.
+    pub(super) fn release(&mut self, i: usize, speeds: f64) {
+        let e = &self.equation.watched[i];
+        let beyond = -self.equation.value(e, self.t, &self.x) * self.watch_side[i];
+        self.released[i] = beyond.max(0.0)
+            + 4.0 * self.grain_of(i, speeds)
+            + 64.0 * f64::EPSILON * self.magnitude(e);
     }
 
     /// Whether a watched expression has no speed at the present point.
