@@ -493,6 +493,8 @@ struct Follower<'a> {
     /// Of each watched expression whose contact has opened, and that is zero to rounding since, by
     /// how much it may be beyond zero; else zero.
     released: Vec<f64>,
+    /// Whether each watched expression is of bodies that touch and move on together.
+    touches: Vec<bool>,
     /// Whether each watched expression had no speed where it left zero, and each guard.
     tangent: Vec<bool>,
     tangent_guard: Vec<bool>,
@@ -895,6 +897,7 @@ impl<'a> Follower<'a> {
             held: vec![false; watched],
             fresh_guard: vec![false; guards],
             fresh_watch: vec![false; watched],
+            touches: vec![false; watched],
             tangent: vec![false; watched],
             tangent_guard: vec![false; guards],
             touching: vec![false; guards],
@@ -951,6 +954,8 @@ impl<'a> Follower<'a> {
         for watched in 0..follower.watch_side.len() {
             follower.begin_watching(watched, false, false);
         }
+        // What is zero at the start fires when it is next met.
+        follower.touches.fill(false);
         follower.rest_on_stops()?;
         follower.new_conditions(model.definition());
         follower.at_start = follower.true_right_after(model.definition());

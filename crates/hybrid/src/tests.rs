@@ -4783,3 +4783,45 @@ fn events_of_other_modes_are_not_met() {
         ends(spring, 30.0, 1, 30.0_f64.sin() + 0.7);
     }
 }
+
+/// Newton's cradle: equal pendula that touch hand on their speeds, and as many swing to the other
+/// side as were lifted.
+#[test]
+fn touching_pendula_hand_on_their_speeds() {
+    let cradle = |balls: usize, lifted: usize, omega: f64| {
+        let list = |item: &dyn Fn(usize) -> String| {
+            (0..balls).map(item).collect::<Vec<String>>().join(", ")
+        };
+        let start = list(&|i| if i < lifted { "-0.5".into() } else { "0".into() });
+        let events: String = (1..balls)
+            .map(|i| {
+                format!(
+                    "[[event]]\nwhen = 'x{0} - x{i}'\ndirection = 'up'\n\
+                     set = {{ v{0} = 'v{i}', v{i} = 'v{0}' }}\n",
+                    i - 1
+                )
+            })
+            .collect();
+        format!(
+            "states = [{}, {}]\nstart = [{start}, {}]\nf = [{}, {}]\n{events}",
+            list(&|i| format!("'x{i}'")),
+            list(&|i| format!("'v{i}'")),
+            list(&|_| "0".into()),
+            list(&|i| format!("'v{i}'")),
+            list(&|i| format!("'-{omega}^2*x{i}'")),
+        )
+    };
+    for method in Method::ALL {
+        for (balls, lifted, omega) in [(3, 1, 1.0), (3, 2, 1.0), (5, 1, 3.0), (5, 2, 1.0)] {
+            for t_end in [5.0, 23.0] {
+                let found = end_of(&cradle(balls, lifted, omega), t_end, method)
+                    .unwrap_or_else(|e| panic!("{method:?} {balls} {lifted} {omega}: {e}"));
+                let place = -0.5 * (omega * t_end).cos();
+                let swings = |i: usize| if place < 0.0 { i < lifted } else { i + lifted >= balls };
+                for (i, x) in found[..balls].iter().enumerate() {
+                    near(*x, if swings(i) { place } else { 0.0 }, 1e-7);
+                }
+            }
+        }
+    }
+}

@@ -395,8 +395,13 @@ impl Follower<'_> {
             if event.stop {
                 stop = Some(Ending::Stopped(event.name.clone()));
             }
+            // Blows whose changes of speed are rounding, as of bodies that touch, are no sign of
+            // an accumulation.
+            let moves = |(state, _): &(usize, Expression)| {
+                (new[*state] - self.x[*state]).abs() > BLOW * self.size[*state]
+            };
             let resets = matches!(event.when, When::Zero(..) | When::Becomes(_))
-                && (!event.set.is_empty() || event.mode.is_some());
+                && (event.set.iter().any(|set| event.sticks || moves(set)) || event.mode.is_some());
             if resets {
                 let grain = if self.trains[*i].shrinks(self.t) { self.grain(*i) } else { 0.0 };
                 let found = self.trains[*i].note(self.t, grain);
@@ -522,6 +527,15 @@ impl Follower<'_> {
             let name = &definition.events()[*setting.unwrap_or(&fired[fired.len() - 1])].name;
             if !quiet && !self.emit(self.t, Some(name), observe) {
                 return Ok(Some(Ending::Interrupted));
+            }
+        }
+        if !changed && mode.is_none() {
+            // Bodies that strike without a speed.
+            for i in 0..self.watch_side.len() {
+                let met = self.event_of[i].is_some_and(|event| fired.contains(&event));
+                if met && self.touches_on(i) {
+                    (self.watch_side[i], self.touches[i]) = (0.0, true);
+                }
             }
         }
         if stop.is_some() {

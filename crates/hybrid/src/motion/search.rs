@@ -1171,6 +1171,10 @@ impl Follower<'_> {
                     && value.abs() > 1e-13 * self.magnitude(&self.equation.watched[i])
                 {
                     self.watch_side[i] = value.signum();
+                    // Bodies that touch and are pressed into each other strike.
+                    if std::mem::take(&mut self.touches[i]) && self.is_beyond(i, value) {
+                        self.watch_side[i] = -value.signum();
+                    }
                 }
             }
         }

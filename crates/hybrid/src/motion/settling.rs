@@ -1788,6 +1788,11 @@ impl Follower<'_> {
             }
         }
         self.fresh_watch[i] = true;
+        self.touches[i] = self.touches_on(i);
+        if self.touches[i] {
+            self.watch_side[i] = 0.0;
+            return;
+        }
         // Where the motion slides or rests its speed is not that of one field.
         if !self.sliding.is_empty() || !self.contacts.is_empty() {
             let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; self.n]);
