@@ -569,8 +569,21 @@ pub fn follow_watched(
 ) -> Result<Outcome, HybridError> {
     let mut found = follow_once(model, options, observe, reached);
     let again = |t: f64, events: u64| error_of_accumulation(model, options, reached, t, events);
-    if let Ok(Outcome { ending: Ending::Zeno { t, error, .. }, events, .. }) = &mut found {
-        *error += again(*t, *events).unwrap_or(f64::INFINITY);
+    if let Ok(Outcome { ending: Ending::Zeno { t, error, event }, events, x, .. }) = &mut found {
+        /// Accumulations by two methods are the same one if the bound is no larger part of the run.
+        const SAME: f64 = 0.1;
+        match again(*t, *events) {
+            Some(more) if more <= SAME * (*t - options.t_start) || more.is_infinite() => {
+                *error += more;
+            }
+            _ => {
+                let why = format!(
+                    "{event} comes ever faster, but not so by another method: give a smaller \
+                        tolerance (--rtol), or another method (--method)"
+                );
+                return Err(HybridError::Stuck { t: *t, x: x.clone(), why });
+            }
+        }
     }
     if let Err(HybridError::Accumulation { t, error, x, surfaces }) = found {
         return Err(match again(t, 0) {
