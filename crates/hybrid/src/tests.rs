@@ -4650,6 +4650,18 @@ fn roots_of_what_is_slid_upon_are_zero() {
     }
 }
 
+/// A state is put onto surfaces that it is on to rounding, not onto those that jump over it: a car
+/// brakes to v = 0.4 exp(-5 (t - 4.8)), and accelerates from t = 8 on. (The quotient is there for
+/// the domain's end that it has.)
+#[test]
+fn what_jumps_over_zero_leaves_the_state() {
+    let text = "states = ['w', 'v']\nstart = [10, 10]\n\
+        f = ['1/(w - 4)', 'max(-5*v, if(mod(t, 20) < 8, -2, 1.5))']";
+    for method in Method::ALL {
+        near(end_of(text, 10.0, method).unwrap()[1], 3.0 + 0.4 * (-16.0_f64).exp(), 1e-8);
+    }
+}
+
 /// Exponents that are whole numbers by a parameter: z' = -z^n of negative numbers.
 #[test]
 fn whole_exponents_may_be_parameters() {
@@ -4745,6 +4757,8 @@ fn saturations_of_signs_are_no_surfaces() {
             let [early, late] = [4.0, 6.0].map(|t| end_of(&text, t, method).unwrap());
             near(late[0], early[0] * (-4.0_f64).exp(), 1e-8);
         }
+    }
+}
 
 /// Events of another mode are not asked, however near to zero the present mode keeps their
 /// expressions: a play, a ball on a vibrating table, and an elastoplastic spring.

@@ -558,6 +558,8 @@ impl Follower<'_> {
     fn put_into_domain(&mut self, zero: &[usize]) {
         /// Numbers that are tried on either side.
         const TRIED: usize = 16;
+        /// Zero to rounding, in units of a function's terms.
+        const NEAR: f64 = 1e-12;
         /// Fields that differ by this part of themselves between two such numbers have a root.
         const ROUGH: f64 = 1e-11;
         let n = self.n;
@@ -589,7 +591,12 @@ impl Follower<'_> {
                 .max_by(|a, b| (a.1 * self.x[a.0]).abs().total_cmp(&(b.1 * self.x[b.0]).abs()));
             let Some((state, slope)) = moves else { continue };
             let whole = self.equation.guards[guard].whole;
-            let off = if whole { 0.0 } else { self.watched_values()[place] / slope };
+            let value = if whole { 0.0 } else { self.watched_values()[place] };
+            // What jumps over zero is not there.
+            if value.abs() > NEAR * self.magnitude(&self.equation.guards[guard].expression) {
+                continue;
+            }
+            let off = value / slope;
             let mut up = self.x.clone();
             up[state] -= off;
             // A root of what is zero to rounding is far from zero.
