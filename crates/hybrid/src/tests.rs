@@ -4660,6 +4660,14 @@ fn what_jumps_over_zero_leaves_the_state() {
     for method in Method::ALL {
         near(end_of(text, 10.0, method).unwrap()[1], 3.0 + 0.4 * (-16.0_f64).exp(), 1e-8);
     }
+    // A product that is zero by its first factor, where the second one's zero is far.
+    let text = "states = ['a', 'b']\nstart = [1, 1]\n\
+        f = ['1/(a + 4) - 1/(a + 4) + 1', '-1 + 0*max(0, b*(1.2 + (b - a)/3))']";
+    for method in Method::ALL {
+        let x = end_of(text, 3.0, method).unwrap();
+        near(x[0], 4.0, 1e-9);
+        near(x[1], -2.0, 1e-9);
+    }
 }
 
 /// Exponents that are whole numbers by a parameter: z' = -z^n of negative numbers.

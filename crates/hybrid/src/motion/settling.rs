@@ -558,7 +558,7 @@ impl Follower<'_> {
     fn put_into_domain(&mut self, zero: &[usize]) {
         /// Numbers that are tried on either side.
         const TRIED: usize = 16;
-        /// Zero to rounding, in units of a function's terms.
+        /// A state is no farther off by rounding, in units of its size.
         const NEAR: f64 = 1e-12;
         /// Fields that differ by this part of themselves between two such numbers have a root.
         const ROUGH: f64 = 1e-11;
@@ -586,17 +586,18 @@ impl Follower<'_> {
             };
             let gradient = &self.compiled.gradients(&self.load(&self.config))[place];
             let states = self.compiled.touches[place].iter().copied().zip(gradient);
-            let moves = states
-                .filter(|(state, slope)| *state < n && **slope != 0.0)
-                .max_by(|a, b| (a.1 * self.x[a.0]).abs().total_cmp(&(b.1 * self.x[b.0]).abs()));
+            let moves =
+                states.filter(|(state, slope)| *state < n && **slope != 0.0).max_by(|a, b| {
+                    (a.1 * self.size[a.0]).abs().total_cmp(&(b.1 * self.size[b.0]).abs())
+                });
             let Some((state, slope)) = moves else { continue };
             let whole = self.equation.guards[guard].whole;
             let value = if whole { 0.0 } else { self.watched_values()[place] };
+            let off = value / slope;
             // What jumps over zero is not there.
-            if value.abs() > NEAR * self.magnitude(&self.equation.guards[guard].expression) {
+            if off.abs() > NEAR * self.size[state] {
                 continue;
             }
-            let off = value / slope;
             let mut up = self.x.clone();
             up[state] -= off;
             // A root of what is zero to rounding is far from zero.
