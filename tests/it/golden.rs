@@ -44,20 +44,20 @@ fn golden_quick_figures_have_the_committed_hashes() {
 /// The long figures, shortened to t = 300: a digest of what is asked, found and drawn. A picture
 /// that changes on purpose gets its new line here; the test prints it.
 const SHORTENED: [(&str, &str); 6] = [
-    ("fig7-printed-shortened", "4856497802936cd4d81bd028029f3ce916791ddf8588123123822863c6d5d9bf"),
+    ("fig7-printed-shortened", "a578dc8b09b0790e1699d8e36980c7382b32585d871f71dc45fe7ff106f11072"),
     (
         "fig7-reconstructed-shortened",
-        "b7fa8dce0cc319534aa3eb5d0f42ba8006c2b51bd6029d8388ad9b6bde1a8cae",
+        "4bdb254454c5181db2e46106b794a5e66a6b7349d555e496ac9a2783628aa823",
     ),
-    ("fig8-printed-shortened", "45b85d2f9cf8c0866357ef5a6c57916379dd818f9aa4440a55b8cc9553aee666"),
+    ("fig8-printed-shortened", "52f182f65953bfedf4350e9f42d341c789687888463faf0bfa5b1d94721c96e4"),
     (
         "fig8-reconstructed-shortened",
-        "44f73bf7f78d662ce1f55df912e88f1b55924ac1b18aa65ab2b2e551e17355f2",
+        "3726e980509cf145a323e2c67c1ae38bac0671518734254b6aec7b1e320d1ff0",
     ),
-    ("fig9-printed-shortened", "538b20e481e7bc0a1ea1d56465592b3b5b39e8825768ef70a3926382b61631fe"),
+    ("fig9-printed-shortened", "a00c3455b94fdc1f0be4f1b51cb085ea41a54a9d5a27c38ded500acf6e90d5e3"),
     (
         "fig9-reconstructed-shortened",
-        "acca9d8a80063eb9fbc6a64f2736eb3574762b68e6ac3dc1d5a7da8a18b553d5",
+        "8e10278280b9fd29d5a33e2063b556bb7650dc6d46ddc517af05b60798f07b41",
     ),
 ];
 
