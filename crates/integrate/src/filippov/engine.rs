@@ -1679,7 +1679,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             for _ in 0..MOST_TOUCHES {
                 let Some(Zero::Touch(theta)) = zero else { break };
                 let from = theta + BEHIND_TOUCH * (1.0 - theta);
-                if !(margin(from) > 0.0) {
+                if margin(from).is_nan() || margin(from) <= 0.0 {
                     break;
                 }
                 zero = first_zero_after(from, &margin);
