@@ -967,7 +967,7 @@ impl<'a> Follower<'a> {
         for watched in 0..follower.watch_side.len() {
             follower.begin_watching(watched, false, false);
         }
-        // What is zero at the start fires when it is next met.
+        // An expression that is zero at the start fires when it is next met.
         follower.touches.fill(false);
         follower.rest_on_stops()?;
         follower.new_conditions(model.definition());

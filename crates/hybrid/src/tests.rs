@@ -4704,8 +4704,8 @@ fn a_size_by_a_maximum_is_no_new_surface() {
     near(period("v - 0.2", "max(0.2 - v, v - 0.2)"), want, 1e-9);
 }
 
-/// Derivatives by a start on a surface: of one that moves along it at first, also by what gives it a
-/// speed; of surfaces that depend on each other none, in words.
+/// Derivatives by a start on a surface: of one that moves along it at first, also by what gives it
+/// a speed; of surfaces that depend on each other none, in words.
 #[test]
 fn starts_on_surfaces_have_derivatives_of_one_side_only() {
     let options = Options { t_end: 2.0, ..Options::default() };
@@ -4720,8 +4720,8 @@ fn starts_on_surfaces_have_derivatives_of_one_side_only() {
     assert!(error.contains("surfaces that depend on each other"), "{error}");
 }
 
-/// Sticking zones that are a thousandth and a millionth of the box are curves, and points of a curve
-/// that was found are no rests of their own.
+/// Sticking zones that are a thousandth and a millionth of the box are curves, and points of a
+/// curve that was found are no rests of their own.
 #[test]
 fn curves_of_rests_are_found_at_any_length() {
     use crate::rests::rests;
@@ -4803,6 +4803,29 @@ fn events_of_other_modes_are_not_met() {
         ends(spring, 2.5, 1, 2.5_f64.sin() - 0.7);
         ends(spring, 5.0, 1, 5.0_f64.sin() + 0.7);
         ends(spring, 30.0, 1, 30.0_f64.sin() + 0.7);
+    }
+}
+
+/// Events of the clock turn a mode on in which a level is met that the mode before has left: a
+/// current that is switched off at it.
+#[test]
+fn events_that_were_not_asked_are_met_where_they_are() {
+    let text = "states = ['i']\nstart = [0]\n[modes.on]\nf = ['1']\n[modes.off]\nf = ['-1']\n\
+        [[event]]\nwhen = 'i - 0.8'\ndirection = 'up'\nfrom = 'on'\nmode = 'off'\n[[event]]\n\
+        every = 1\nmode = 'on'";
+    for method in Method::ALL {
+        let options = Options { t_end: 40.5, method, ..Options::default() };
+        let mut met = 0;
+        follow(&model(text), &options, &mut |point| {
+            if point.event == Some("event 1") {
+                near(point.x[0], 0.8, 1e-9);
+                met += 1;
+            }
+            true
+        })
+        .unwrap();
+        // Once a period from the first on; rows of both modes.
+        assert!(met >= 40, "{method:?} {met}");
     }
 }
 

@@ -173,7 +173,8 @@ fn section_panels(
     }
     if picture.panels.iter().any(|panel| panel.repeats.is_some()) {
         sheet = sheet.footer(
-            "*n* of *m* runs: the panel's, repeated from starts too near to its own to be told apart",
+            "*n* of *m* runs: the panel's, repeated from starts too near to its own to be told \
+                apart",
         );
     }
     let middle = wording::number(0.5 * picture.panels[0].run.t_end);

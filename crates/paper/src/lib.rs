@@ -75,7 +75,7 @@ pub struct FigurePanel {
     pub run: RunSpec,
     /// The paper's claim about it.
     pub claim: Option<Claim>,
-    /// What makes the claim, as the face says: the paper, or a panel of it that this one varies.
+    /// The claimant, as the face says: the paper, or a panel of it that this one varies.
     pub claimant: String,
     /// Runs that repeat the panel's from starts that a reader could not tell apart.
     pub repeats: Option<Repeats>,

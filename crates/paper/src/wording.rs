@@ -238,7 +238,7 @@ fn together(said: &[String]) -> Vec<String> {
     all
 }
 
-/// What a verdict found as rich text: a time *t* in italics, numbers as [`number`] sets them.
+/// A verdict's finding as rich text: a time *t* in italics, numbers as [`number`] sets them.
 pub fn found(plain: &str) -> String {
     let word = |word: &str| {
         let core = word.trim_end_matches([',', ';', ')', ']']);

@@ -444,7 +444,8 @@ impl Expression {
         }
     }
 
-    /// The same with powers whose exponent is a whole number by `value`, as by a parameter, as such.
+    /// The same, with powers whose exponent is a whole number by `value`, as by a parameter, as
+    /// such.
     #[must_use]
     pub fn with_whole_powers(&self, value: &dyn Fn(&Expression) -> Option<f64>) -> Self {
         let of = |e: &Expression| Box::new(e.with_whole_powers(value));

@@ -452,8 +452,10 @@ impl Follower<'_> {
                 .copied()
                 .filter(|g| is_zero(g) && stays_zero(&self.equation.guards[*g].expression))
                 .collect();
+            // An expression that was not asked has gone where it is.
+            let fresh = |i: &usize| self.fresh_watch[*i] && asked[*i];
             let watched: Vec<usize> = (0..self.watch_side.len())
-                .filter(|i| self.fresh_watch[*i] && stays_zero(&self.equation.watched[*i]))
+                .filter(|i| fresh(i) && stays_zero(&self.equation.watched[*i]))
                 .collect();
             if mode.is_some() || !self.equation.guards.is_empty() {
                 // A body that is laid on its stop lies there, and functions of its place rest.
@@ -1189,8 +1191,8 @@ impl Follower<'_> {
         if moved { x } else { self.x.clone() }
     }
 
-    /// Puts a state that slides where a switching function that is met is zero, too, if the way back
-    /// to the surface has led before that zero: it would be met again and again.
+    /// Puts a state that slides where a switching function that is met is zero, too, if the way
+    /// back to the surface has led before that zero: it would be met again and again.
     pub(super) fn put_where_met(&mut self, met: &[Sought]) {
         let values = self.watched_values();
         let mut places = Vec::new();

@@ -594,7 +594,7 @@ impl Follower<'_> {
             let whole = self.equation.guards[guard].whole;
             let value = if whole { 0.0 } else { self.watched_values()[place] };
             let off = value / slope;
-            // What jumps over zero is not there.
+            // A function that jumps over zero is not there.
             if off.abs() > NEAR * self.size[state] {
                 continue;
             }
@@ -636,7 +636,7 @@ impl Follower<'_> {
         self.add_what_is_zero(&mut zero);
         zero.retain(|guard| !self.guard_held[*guard]);
         self.add_what_follows(&mut zero);
-        // What only others' sides move follows those.
+        // Functions that only others' sides move follow those.
         if !zero.iter().all(|guard| self.equation.guards[*guard].of_sides) {
             zero.retain(|guard| !self.equation.guards[*guard].of_sides);
         }

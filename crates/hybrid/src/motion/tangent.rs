@@ -23,8 +23,8 @@ use twofold_system::Expression;
 /// Local error of a tangent vector, relative to itself.
 const TANGENT_TOLERANCE: f64 = 1e-9;
 
-/// Nodes and coefficients of Gauss' methods of orders 4 and 6 (Hairer, Norsett & Wanner 1993, tables
-/// II.7.3 and II.7.4). The weights are twice the diagonal.
+/// Nodes and coefficients of Gauss' methods of orders 4 and 6 (Hairer, Norsett & Wanner 1993,
+/// tables II.7.3 and II.7.4). The weights are twice the diagonal.
 const GAUSS_2: ([f64; 2], [[f64; 2]; 2]) = {
     let d = 0.288_675_134_594_812_9; // sqrt(3)/6
     ([0.5 - d, 0.5 + d], [[0.25, 0.25 - d], [0.25 + d, 0.25]])

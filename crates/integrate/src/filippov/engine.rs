@@ -246,7 +246,7 @@ enum Tangency {
 }
 
 impl Tangency {
-    /// How a motion leaves with the field, if it does.
+    /// The start of a motion that leaves with the field, if it does.
     fn left(self) -> Option<FlightStart> {
         match self {
             Self::Fold(second) => (second > 0.0).then_some(FlightStart::Tangent(second)),
@@ -531,8 +531,8 @@ struct Limits {
     /// A field runs along the surface if it does so at these distances before and behind, as shares
     /// of the states.
     along: [f64; 3],
-    /// Distances ahead, as shares of the states, at which it is seen to which side a field leads that
-    /// is tangent to the surface.
+    /// Distances ahead, as shares of the states, at which it is seen to which side a field leads
+    /// that is tangent to the surface.
     ahead: [f64; 6],
     /// Distances from a corner of h, as shares of the states, at which its two sides are looked at.
     corner: [f64; 2],
@@ -1122,7 +1122,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         }
     }
 
-    /// What the field of `side`, which is tangent to the surface here, does ahead.
+    /// The tangency of the field of `side` to the surface here, by the field ahead.
     fn tangency(&self, l: &Lie, side: Side) -> Tangency {
         let sided = self.sided();
         let (own, velocity) = match side {
