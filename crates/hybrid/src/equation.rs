@@ -1406,12 +1406,33 @@ impl Writer<'_> {
     /// what is never negative, as |x|, and of x where a condition says that it is positive.
     fn of_root(&mut self, e: &Expression) -> Recorded {
         let value = self.number(e);
-        let is_found = asks(e) && self.equation.is_never_negative(e);
-        if !self.at.slid.is_empty() && (is_found || self.positive.contains(e)) {
+        let is_positive = || self.equation.is_never_negative(e) || self.positive.contains(e);
+        if self.is_zero_of_sliding(e) && is_positive() {
             (value + value * value.sign()).scale(0.5)
         } else {
             value
         }
+    }
+
+    /// Whether a function whose zero is slid upon is an expression, or decides in it.
+    fn is_zero_of_sliding(&self, e: &Expression) -> bool {
+        let slides = |e: &Expression| {
+            self.equation.switching(e).is_some_and(|guard| self.at.slid.contains(&guard))
+        };
+        if self.at.slid.is_empty() {
+            return false;
+        }
+        let decides = match e {
+            Expression::Call(Function::Abs, a) => slides(a),
+            Expression::Apply(General::Min | General::Max | General::Clip, list) => {
+                list[1..].iter().any(|other| slides(&difference(other, &list[0])))
+            }
+            Expression::Name(name) => {
+                self.equation.term(name).is_some_and(|term| self.is_zero_of_sliding(term))
+            }
+            _ => false,
+        };
+        decides || slides(e) || e.parts().into_iter().any(|part| self.is_zero_of_sliding(part))
     }
 
     fn number(&mut self, e: &Expression) -> Recorded {

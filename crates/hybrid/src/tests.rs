@@ -4829,6 +4829,23 @@ fn events_that_were_not_asked_are_met_where_they_are() {
     }
 }
 
+/// A block that rocks from corner to corner, by two modes: its impacts accumulate in the middle.
+/// Each leaves 0.9 of the speed, and the times of flight are a geometric series.
+#[test]
+fn impacts_that_change_modes_accumulate() {
+    let text = "states = ['th', 'w']\nstart = [0.1, 0]\n[modes.R]\nf = ['w', '-1']\n[modes.L]\n\
+        f = ['w', '1']\n[[event]]\nwhen = 'th'\ndirection = 'down'\nfrom = 'R'\nmode = 'L'\n\
+        set = { w = '0.9*w' }\n[[event]]\nwhen = 'th'\ndirection = 'up'\nfrom = 'L'\n\
+        mode = 'R'\nset = { w = '0.9*w' }";
+    let fall = 0.2_f64.sqrt();
+    for method in Method::ALL {
+        let options = Options { t_end: 20.0, method, ..Options::default() };
+        let outcome = follow(&model(text), &options, &mut |_| true).unwrap();
+        assert!(matches!(outcome.ending, Ending::Zeno { .. }), "{method:?} {:?}", outcome.ending);
+        near(outcome.t, fall + 2.0 * fall * 0.9 / 0.1, 1e-6);
+    }
+}
+
 /// Newton's cradle: equal pendula that touch hand on their speeds, and as many swing to the other
 /// side as were lifted.
 #[test]

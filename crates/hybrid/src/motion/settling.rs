@@ -1938,7 +1938,13 @@ impl Follower<'_> {
                 && values[place].abs() <= DRIFT * self.magnitude(e)
                 && speeds[place].abs() <= DRIFT * terms.max(self.speeds(&field, place))
         };
-        (0..self.watch_side.len()).map(kept).collect()
+        let mut all: Vec<bool> = (0..self.watch_side.len()).map(kept).collect();
+        // An expression at zero without a speed, as near an accumulation, need not stay there.
+        for i in 0..all.len() {
+            let small = DRIFT * self.magnitude(&self.equation.watched[i]);
+            all[i] &= self.watched_ahead(active + i).iter().all(|ahead| ahead.abs() <= small);
+        }
+        all
     }
 
     /// Finds the side of a watched expression that a mode which has ended kept at zero: its value,
