@@ -195,7 +195,8 @@ impl GeneralOutcome {
                         let question = attractor::Question { lyapunov, ..question };
                         (evidence, middle) = judged(&section, &question, least);
                         let regular = !has_sign(0) && (driven || !has_sign(1));
-                        if !is_borne_out(&evidence, regular) {
+                        let open = matches!(evidence.verdict, Verdict::Undecided { .. });
+                        if open || !is_borne_out(&evidence, regular) {
                             let parts = growth.first().is_some_and(|g| g.is_clear() && g.parts());
                             evidence.verdict = if parts && keeps_its_size(&section, shown_from) {
                                 Verdict::Chaotic { lyapunov, bands: 1 }
@@ -301,9 +302,10 @@ fn is_borne_out(evidence: &Evidence, regular: bool) -> bool {
     }
 }
 
-/// Whether the later half of a run's points from `from` on reaches no further than the earlier one.
+/// Whether the later half of a run's points from `from` on reaches not twice as far as the earlier
+/// one: what grows without end by such an exponent reaches far more.
 fn keeps_its_size(section: &[SectionPoint], from: f64) -> bool {
-    const FURTHER: f64 = 1.1;
+    const FURTHER: f64 = 2.0;
     let late: Vec<SectionPoint> = section.iter().filter(|p| p.t >= from).copied().collect();
     let (earlier, last) = late.split_at(late.len() / 2);
     Late::of(last, from).swing <= FURTHER * Late::of(earlier, from).swing
