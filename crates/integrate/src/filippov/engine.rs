@@ -1122,13 +1122,18 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         }
     }
 
+    /// The field of `side` here.
+    fn velocity(&self, side: Side) -> SVector<f64, N> {
+        match side {
+            Side::Plus => self.sided().plus(&self.x),
+            Side::Minus => self.sided().minus(&self.x),
+        }
+    }
+
     /// The tangency of the field of `side` to the surface here, by the field ahead.
     fn tangency(&self, l: &Lie, side: Side) -> Tangency {
-        let sided = self.sided();
-        let (own, velocity) = match side {
-            Side::Plus => (l.pp, sided.plus(&self.x)),
-            Side::Minus => (-l.mm, sided.minus(&self.x)),
-        };
+        let own = if side == Side::Plus { l.pp } else { -l.mm };
+        let velocity = self.velocity(side);
         let per_speed = self.reach() / velocity.norm();
         // The rounding of h for states of the run's size: what changes it by more is seen.
         let least = LIMITS.blurred * gradient(self.system, &self.x).abs().dot(&self.size);
@@ -1155,24 +1160,15 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         if !is_low || self.t + duration >= self.t_end {
             return false;
         }
-        let sided = self.sided();
-        let velocity = match side {
-            Side::Plus => sided.plus(&self.x),
-            Side::Minus => sided.minus(&self.x),
-        };
         let (system, from) = (self.system, self.x);
-        let straight = Straight { system, from, to: from + velocity * duration };
+        let straight = Straight { system, from, to: from + self.velocity(side) * duration };
         self.take(side.into(), self.t + duration, straight.at(1.0), &straight);
         true
     }
 
     /// Whether the field of `side` is tangent to the surface here and all along its way there.
     fn runs_along(&self, side: Side) -> bool {
-        let sided = self.sided();
-        let velocity = match side {
-            Side::Plus => sided.plus(&self.x),
-            Side::Minus => sided.minus(&self.x),
-        };
+        let velocity = self.velocity(side);
         let per_speed = self.reach() / velocity.norm();
         let on_the_way = LIMITS.along.iter().flat_map(|share| [-share, *share]);
         let points = on_the_way
