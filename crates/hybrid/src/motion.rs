@@ -612,6 +612,37 @@ fn follow_once(
     follower.run_whole(observe).map(|(outcome, _)| outcome)
 }
 
+/// How much of its time a run makes.
+#[derive(Default)]
+struct Pace {
+    looks: u32,
+    /// Where the present stretch began.
+    since: f64,
+    /// What the last one made.
+    made: f64,
+    /// Stretches in a row that made less than the one before.
+    slower: u32,
+}
+
+impl Pace {
+    /// A look at time `t`. Whether the run has become slower for a while.
+    fn look(&mut self, t: f64) -> bool {
+        self.looks += 1;
+        if !self.looks.is_multiple_of(LOOKS_OF_A_PACE) {
+            return false;
+        }
+        let made = t - std::mem::replace(&mut self.since, t);
+        self.slower = if made < SLOWER * self.made { self.slower + 1 } else { 0 };
+        self.made = made;
+        self.slower >= 3
+    }
+
+    /// Steps a unit of time in the last stretch.
+    fn steps_a_time(&self) -> f64 {
+        (u64::from(LOOKS_OF_A_PACE) * STEPS_BETWEEN_LOOKS) as f64 / self.made
+    }
+}
+
 /// By how much integration and rounding may have moved the time `t` at which a run accumulates, by
 /// runs of another method with a tolerance near rounding or, where that does not come so far, of
 /// the same one with ten times the tolerance. None if nothing accumulates then; infinite if nothing
@@ -713,6 +744,10 @@ const STEPS_BETWEEN_LOOKS: u64 = 16384;
 const NO_TIME: f64 = 1e-12;
 /// Taylor series that move a run by so small a part of the time it has come would not end, either.
 const LITTLE_TIME: f64 = 1e-6;
+/// The pace of a run is that of so many such looks. Three in a row of which each is slower than the
+/// one before by this factor tell chatter that decays.
+const LOOKS_OF_A_PACE: u32 = 16;
+const SLOWER: f64 = 0.9;
 
 /// Scale of each state's error in a step.
 fn scale_now(follower: &Follower, step: &Step, out: &mut Vec<f64>) {
@@ -999,6 +1034,7 @@ impl<'a> Follower<'a> {
         let mut quiet = 0;
         let mut last_met = f64::NEG_INFINITY;
         let mut looked_at = (self.outcome.steps, self.t);
+        let mut pace = Pace { since: self.t, ..Pace::default() };
         if !matches!(self.options.record, Record::Section(_)) {
             if !self.emit(self.t, None, observe) {
                 return Ok(Ending::Interrupted);
@@ -1047,6 +1083,19 @@ impl<'a> Follower<'a> {
                         "steps, events or switches follow each other without end in no time: \
                         describe by one [[event]] what happens there, or give another --method"
                             .into();
+                    return Err(HybridError::Stuck { t: self.t, x: self.x.clone(), why });
+                }
+                let steps_left = self.options.max_steps.saturating_sub(self.outcome.steps);
+                if pace.look(self.t)
+                    && (self.options.t_end - self.t) * pace.steps_a_time() > steps_left as f64
+                {
+                    let why = format!(
+                        "switches or events follow each other ever faster ({:.1e} a unit of time, \
+                        and the run would need more steps than --max-steps allows): in the limit \
+                        the motion stays where they meet. End the run before (--t-end), or write \
+                        a smooth function for the switch, as tanh(u/1e-3) for sign(u)",
+                        pace.steps_a_time()
+                    );
                     return Err(HybridError::Stuck { t: self.t, x: self.x.clone(), why });
                 }
             }

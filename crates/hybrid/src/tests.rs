@@ -745,6 +745,18 @@ fn contacts_open_where_a_force_jumps() {
     }
 }
 
+/// A relay behind a lag: z = 0 is crossed ever more often, exp(t) times, and never for the last.
+#[test]
+fn chatter_that_decays_is_told() {
+    let text = "states = ['x', 'z']\nstart = [0.2, 0]\nf = ['-sign(z) + 0.2*sin(t)', \
+        '(x - z)/0.3']";
+    for method in Method::ALL {
+        let options = Options { t_end: 15.0, method, ..Options::default() };
+        let error = follow(&model(text), &options, &mut |_| true).unwrap_err().to_string();
+        assert!(error.contains("ever faster"), "{method:?} {error}");
+    }
+}
+
 #[test]
 fn a_tank_runs_empty() {
     let follow_by = |text: &str, t_end, method| {
