@@ -177,7 +177,7 @@ fn the_commands_and_tests_behind_the_numbers_exist() {
             .unwrap();
         String::from_utf8(output.stdout).unwrap()
     };
-    let makefile = text("Makefile");
+    let makefile = text("Makefile") + &text("papers/jeffrey-2013/sweeps.mk");
     for Number { quotes, command, test } in numbers().number {
         assert!(!quotes.is_empty());
         let words: Vec<&str> = command.split_whitespace().collect();
