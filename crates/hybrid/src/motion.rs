@@ -612,34 +612,33 @@ fn follow_once(
     follower.run_whole(observe).map(|(outcome, _)| outcome)
 }
 
-/// How much of its time a run makes.
+/// How much time a run makes while its steps double.
 #[derive(Default)]
 struct Pace {
-    looks: u32,
-    /// Where the present stretch began.
-    since: f64,
-    /// What the last one made.
+    /// Steps and time of the last look.
+    since: (u64, f64),
+    /// The time made before it.
     made: f64,
-    /// Stretches in a row that made less than the one before.
+    /// Doublings in a row that made hardly more time than the one before.
     slower: u32,
 }
 
 impl Pace {
-    /// A look at time `t`. Whether the run has become slower for a while.
-    fn look(&mut self, t: f64) -> bool {
-        self.looks += 1;
-        if !self.looks.is_multiple_of(LOOKS_OF_A_PACE) {
+    /// Looks at a run that came to time `t` by so many steps. Whether its time goes with the
+    /// logarithm of its steps.
+    fn look(&mut self, steps: u64, t: f64) -> bool {
+        if steps < (2 * self.since.0).max(STEPS_OF_A_PACE) {
             return false;
         }
-        let made = t - std::mem::replace(&mut self.since, t);
-        self.slower = if made < SLOWER * self.made { self.slower + 1 } else { 0 };
-        self.made = made;
+        let made = t - self.since.1;
+        self.slower = if made < NO_LONGER * self.made { self.slower + 1 } else { 0 };
+        (self.since, self.made) = ((steps, t), made);
         self.slower >= 3
     }
 
-    /// Steps a unit of time in the last stretch.
-    fn steps_a_time(&self) -> f64 {
-        (u64::from(LOOKS_OF_A_PACE) * STEPS_BETWEEN_LOOKS) as f64 / self.made
+    /// The time that it comes to by `most` steps, if so.
+    fn reach(&self, steps: u64, t: f64, most: u64) -> f64 {
+        t + self.made * f64::from((most / steps).checked_ilog2().unwrap_or(0) + 1)
     }
 }
 
@@ -744,10 +743,10 @@ const STEPS_BETWEEN_LOOKS: u64 = 16384;
 const NO_TIME: f64 = 1e-12;
 /// Taylor series that move a run by so small a part of the time it has come would not end, either.
 const LITTLE_TIME: f64 = 1e-6;
-/// The pace of a run is that of so many such looks. Three in a row of which each is slower than the
-/// one before by this factor tell chatter that decays.
-const LOOKS_OF_A_PACE: u32 = 16;
-const SLOWER: f64 = 0.9;
+/// A run is looked at each time its steps have doubled, from so many on. If twice the steps make
+/// less than this times the time for three doublings on end, its time goes with their logarithm.
+const STEPS_OF_A_PACE: u64 = 1 << 14;
+const NO_LONGER: f64 = 1.5;
 
 /// Scale of each state's error in a step.
 fn scale_now(follower: &Follower, step: &Step, out: &mut Vec<f64>) {
@@ -1034,7 +1033,7 @@ impl<'a> Follower<'a> {
         let mut quiet = 0;
         let mut last_met = f64::NEG_INFINITY;
         let mut looked_at = (self.outcome.steps, self.t);
-        let mut pace = Pace { since: self.t, ..Pace::default() };
+        let mut pace = Pace { since: (0, self.t), ..Pace::default() };
         if !matches!(self.options.record, Record::Section(_)) {
             if !self.emit(self.t, None, observe) {
                 return Ok(Ending::Interrupted);
@@ -1085,16 +1084,16 @@ impl<'a> Follower<'a> {
                             .into();
                     return Err(HybridError::Stuck { t: self.t, x: self.x.clone(), why });
                 }
-                let steps_left = self.options.max_steps.saturating_sub(self.outcome.steps);
-                if pace.look(self.t)
-                    && (self.options.t_end - self.t) * pace.steps_a_time() > steps_left as f64
+                let Outcome { steps, switches, events, .. } = self.outcome;
+                if pace.look(steps, self.t)
+                    && switches + events > steps / 100
+                    && pace.reach(steps, self.t, self.options.max_steps) < self.options.t_end
                 {
                     let why = format!(
-                        "switches or events follow each other ever faster ({:.1e} a unit of time, \
-                        and the run would need more steps than --max-steps allows): in the limit \
-                        the motion stays where they meet. End the run before (--t-end), or write \
-                        a smooth function for the switch, as tanh(u/1e-3) for sign(u)",
-                        pace.steps_a_time()
+                        "switches or events follow each other ever faster ({steps} steps so far, \
+                        and the end would take more than --max-steps allows): in the limit the \
+                        motion stays where they meet. End the run before (--t-end), or write a \
+                        smooth function for the switch, as tanh(u/1e-3) for sign(u)"
                     );
                     return Err(HybridError::Stuck { t: self.t, x: self.x.clone(), why });
                 }

@@ -751,7 +751,7 @@ fn chatter_that_decays_is_told() {
     let text = "states = ['x', 'z']\nstart = [0.2, 0]\nf = ['-sign(z) + 0.2*sin(t)', \
         '(x - z)/0.3']";
     for method in Method::ALL {
-        let options = Options { t_end: 15.0, method, ..Options::default() };
+        let options = Options { t_end: 40.0, method, ..Options::default() };
         let error = follow(&model(text), &options, &mut |_| true).unwrap_err().to_string();
         assert!(error.contains("ever faster"), "{method:?} {error}");
     }
