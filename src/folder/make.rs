@@ -54,7 +54,7 @@ pub struct Finding {
     /// Its comparison with the expectation.
     #[serde(flatten)]
     pub state: State,
-    /// Whether it is a claim whose rule was changed when its data were already known.
+    /// Whether it is a claim whose rule was written or changed when its data were already known.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub rule_after_data: bool,
     /// The same of a claim's words.
@@ -67,14 +67,14 @@ impl Finding {
     pub fn line(&self) -> String {
         let name = &self.name;
         let known = match (self.rule_after_data, self.words_after_data) {
-            (true, _) => "; its rule was changed when the data were known",
+            (true, _) => "; its rule was written or changed when the data were known",
             (_, true) => "; its words were changed when the data were known",
             _ => "",
         };
         match &self.state {
             State::Same => format!("{name}: same{known}"),
             State::Differs { what } => format!("{name}: DIFFERS in its {what}"),
-            State::New => format!("{name}: NEW: expected/ has nothing of it yet"),
+            State::New => format!("{name}: NEW: expected/ has nothing of it yet{known}"),
             State::Failed { why } => format!("{name}: FAILED: {why}"),
             State::Gone => {
                 format!("{name}: GONE: it is expected, and the folder has no such picture or claim")
@@ -123,22 +123,19 @@ impl Folder {
             .iter()
             .map(|claim| {
                 let verdict = claim.judge(self, executor).map(|mut found| {
-                    // The data were known: was it by this rule that they were first judged?
-                    let mut judged: Vec<&Verdict> =
-                        known.verdicts.iter().filter(|v| v.has_data_of(&found)).collect();
-                    if known.verdicts.iter().any(|v| v.claim == claim.id) {
-                        judged.retain(|v| v.claim == claim.id);
-                    } else {
-                        // A claim that is renamed leaves its old name without one.
-                        judged.retain(|v| self.claims.iter().all(|c| c.id != v.claim));
+                    // Was it by this rule that the claim was first judged? A claim that is new is
+                    // judged by what was known of its data under other names.
+                    let of_claim = |v: &&Verdict| v.claim == claim.id;
+                    let mut judged: Vec<&Verdict> = known.verdicts.iter().filter(of_claim).collect();
+                    if judged.is_empty() {
+                        let of_data = |v: &&Verdict| v.has_data_of(&found);
+                        judged = known.verdicts.iter().filter(of_data).collect();
                     }
-                    found.rule_after_data = match judged.iter().find(|v| v.rule == found.rule) {
-                        Some(same) => same.rule_after_data,
-                        None => !judged.is_empty(),
-                    };
-                    found.words_after_data = judged
-                        .iter()
-                        .any(|v| v.words_after_data || v.words.is_some() && v.words != found.words);
+                    let same = judged.iter().find(|v| v.rule == found.rule);
+                    found.rule_after_data = same.map_or(!judged.is_empty(), |v| v.rule_after_data);
+                    found.words_after_data = same.or(judged.first()).is_some_and(|v| {
+                        v.words_after_data || v.words.is_some() && v.words != found.words
+                    });
                     executor.progress().line(&format!("scored {}", claim.id));
                     found
                 });
@@ -349,16 +346,14 @@ impl Folder {
         Ok(Some(Manifest::parse(&read_text(&path)?, &path.display().to_string())?))
     }
 
-    /// The outcomes that are expected, and those that were made last of claims without one.
+    /// The outcomes that are expected, and those that were made last.
     fn known(&self) -> Result<Outcomes, CliError> {
         let mut known = self.outcomes()?;
         let path = self.out().join("claims.json");
         // Another version's cannot be read.
         let made = if path.exists() { serde_json::from_str(&read_text(&path)?).ok() } else { None };
         let made: Outcomes = made.unwrap_or_default();
-        let expected = known.verdicts.clone();
-        let is_new = |v: &Verdict| expected.iter().all(|e| e.claim != v.claim);
-        known.verdicts.extend(made.verdicts.into_iter().filter(is_new));
+        known.verdicts.extend(made.verdicts);
         Ok(known)
     }
 

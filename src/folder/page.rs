@@ -92,7 +92,7 @@ fn row(scored: &Scored<'_>) -> String {
             (
                 format!("<span class=\"{word}\">{word}</span>: {}", escape(&v.found)),
                 match (v.rule_after_data, v.words_after_data) {
-                    (true, _) => "<br><strong>changed when its data were known</strong>",
+                    (true, _) => "<br><strong>written or changed when its data were known</strong>",
                     (_, true) => "<br><strong>its words changed when its data were known</strong>",
                     _ => "",
                 },

@@ -121,7 +121,7 @@ fn a_rule_that_changes_after_its_data_is_said_to() {
     assert!(page.contains("changed when its data were known"), "{page}");
     let (code, out, _) = paper(&["check", "--quiet"], &root);
     assert!(
-        code == 0 && out.contains("period: same; its rule was changed when the data were known"),
+        code == 0 && out.contains("period: same; its rule was written or changed when"),
         "{out}"
     );
     change(&root, "expected/claims.json", "2.197225 (", "2.297225 (");
@@ -187,7 +187,47 @@ fn a_rule_that_changes_is_seen_by_its_data() {
     assert!(after("time"));
     assert_eq!(paper(&["bless", "--reason", "first", "--quiet"], &root).0, 0);
     let (code, out, _) = paper(&["check", "--quiet"], &root);
-    assert!(code == 0 && out.contains("time: same; its rule was changed"), "{out}");
+    assert!(code == 0 && out.contains("time: same; its rule was written or changed"), "{out}");
+}
+
+/// The mark stays with the rule: neither other data nor a second claim in between take it away.
+#[test]
+fn a_rule_after_its_data_stays_one() {
+    let place = small();
+    let root = place.path().join("p");
+    let made = |claim: &str| {
+        let (code, out, said) = paper(&["make", "--quiet", "--json"], &root);
+        assert_eq!(code, 0, "{said}");
+        let all: serde_json::Value = serde_json::from_str(&out).unwrap();
+        let claims = all["claims"].as_array().unwrap();
+        let found = claims.iter().find(|c| c["claim"] == claim).expect(claim);
+        found["rule_after_data"].as_bool().unwrap()
+    };
+    assert_eq!(paper(&["bless", "--reason", "first", "--quiet"], &root).0, 0);
+    // Other data, made once, and then a rule for them.
+    let system = "systems/relay.toml";
+    change(&root, system, "w = 0.5", "w = 0.6");
+    made("period");
+    change(&root, "claims.toml", "within = 1e-6", "within = 1e-3");
+    assert!(made("period"));
+    // Data that change afterwards.
+    change(&root, system, "w = 0.6", "w = 0.5");
+    assert!(made("period"));
+    // The same rule in a claim of another name, first beside the old one, then alone.
+    let claims = fs::read_to_string(root.join("claims.toml")).unwrap();
+    let from = claims.find("[[claim]]").unwrap();
+    let next = claims[from + 1..].find("[[claim]]").map_or(claims.len(), |i| from + 1 + i);
+    let second = claims[from..next]
+        .replace("id = \"period\"", "id = \"again\"")
+        .replace("within = 1e-3", "within = 1e-2");
+    fs::write(root.join("claims.toml"), format!("{claims}\n{second}")).unwrap();
+    assert!(made("again"));
+    fs::write(
+        root.join("claims.toml"),
+        format!("{}{second}{}", &claims[..from], &claims[next..]),
+    )
+    .unwrap();
+    assert!(made("again"));
 }
 
 /// A wrong value is found to be wrong, and exit codes tell a difference from a failure.
