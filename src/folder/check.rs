@@ -795,7 +795,7 @@ impl Check {
             Check::Value { read, equals, within } => {
                 let found = read.measured(first)?;
                 let off = (found.value - equals).abs();
-                let said = format!("{found} ({equals} in the paper, {} off)", short(off));
+                let said = format!("{found} ({equals} claimed, {} off)", short(off));
                 Ok((is_within(off, found.half, *within, &said)?, said))
             }
             Check::Ratio { read, other, equals, within } => {
@@ -804,7 +804,7 @@ impl Check {
                 let ratio = over.value / under.value;
                 let off = (ratio - equals).abs();
                 let said = format!(
-                    "{over} / {under} = {} ({equals} in the paper, {} off)",
+                    "{over} / {under} = {} ({equals} claimed, {} off)",
                     short(ratio),
                     short(off)
                 );
@@ -887,7 +887,7 @@ impl Check {
                     Some((value, half)) => {
                         let off = (value - at).abs();
                         let said = format!(
-                            "{kind} at {parameter} = {} ({at} in the paper, {} off)",
+                            "{kind} at {parameter} = {} ({at} claimed, {} off)",
                             short(value),
                             short(off)
                         );

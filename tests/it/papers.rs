@@ -237,7 +237,7 @@ fn a_claim_that_does_not_hold_differs() {
     let root = place.path().join("p");
     change(&root, "claims.toml", "equals = 2.1972245773362196", "equals = 2.3");
     let (code, out, _) = paper(&["make", "--quiet"], &root);
-    assert!(code == 0 && out.contains("period: differs: 2.197225 (2.3 in the paper"), "{out}");
+    assert!(code == 0 && out.contains("period: differs: 2.197225 (2.3 claimed"), "{out}");
     change(&root, "claims.toml", "read = \"period\"", "read = \"period/0\"");
     let (code, out, _) = paper(&["make", "--quiet"], &root);
     assert!(code == 3 && out.contains("\"period/0\": there is no \"0\""), "{out}");
@@ -311,7 +311,7 @@ fn a_ratio_is_of_two_measures() {
     change(&root, "claims.toml", ratio, "0.5");
     let (_, out, _) = paper(&["make", "--quiet"], &root);
     assert!(
-        out.contains("narrower-is-faster: differs") && out.contains("0.5 in the paper"),
+        out.contains("narrower-is-faster: differs") && out.contains("0.5 claimed"),
         "{out}"
     );
 }
