@@ -745,6 +745,64 @@ fn contacts_open_where_a_force_jumps() {
     }
 }
 
+/// A timer that runs out and stops at zero, to rounding, has run out once: an order takes its time.
+#[test]
+fn a_timer_that_stops_at_zero_runs_out_once() {
+    let text = |lead: f64| {
+        format!(
+            "states = ['q', 'o', 'c', 'n']\nstart = [4, 0, 0, 0]\nf = ['-1.76*(1 + \
+                0.59*sin(t))', '0', 'if(o > 0, -1, 0)', '0']\n[[event]]\nname = 'order'\nwhen = \
+                'q < 1.1 and o <= 0'\nset = {{ o = '7.75 - q', c = '{lead}' }}\n[[event]]\nname = \
+                'deliver'\nwhen = 'c'\ndirection = 'down'\nset = {{ q = 'q + o', o = '0', n = 'n + \
+                1' }}"
+        )
+    };
+    for k in 0..20 {
+        let model = model(&text(0.3 + 0.0123 * f64::from(k)));
+        let mut found = Vec::new();
+        for method in Method::ALL {
+            let options = Options { t_end: 9.4, method, ..Options::default() };
+            let outcome = follow(&model, &options, &mut |_| true).unwrap();
+            assert_eq!((outcome.x[1], outcome.x[3]), (0.0, 3.0), "{k} {method:?} {outcome:?}");
+            found.push(outcome.x[0]);
+        }
+        found.iter().for_each(|q| near(*q, found[3], 1e-7));
+        let options = Options { t_end: 9.4, ..Options::default() };
+        let found = sensitivity::sensitivities(&model, &options, &[]).unwrap();
+        near(found.by_start[0][0], 1.0, 1e-6);
+    }
+}
+
+/// How functions of one zero depend on each other is seen beside a clock, whose jumps are no part
+/// of it, however long the run is; and a clock may end the sliding on them.
+#[test]
+fn clocks_beside_functions_of_one_zero() {
+    let windup = "states = ['x', 'z']\nstart = [0, 0]\nf = ['-x + clip(u, -1, 1)', 'if(abs(u) > 1 \
+        and e*u > 0, 0, 3*e)']\n[let]\nr = 'if(mod(t, 10) < 5, 0.7, -0.7)'\ne = 'r - x'\nu = 'e + \
+        z'";
+    let at = |t_end| {
+        let mut found = Vec::new();
+        let options =
+            Options { t_end, record: Record::Times { every: 20.0 }, ..Options::default() };
+        follow(&model(windup), &options, &mut |p| {
+            found.push(p.x.to_vec());
+            true
+        })
+        .unwrap();
+        found[1].clone()
+    };
+    for x in [at(20.0), at(2000.0)] {
+        near(x[0], -0.6934128969706657, 1e-8);
+        near(x[1], -0.692043029609678, 1e-8);
+    }
+    let clock = "states = ['x', 'y']\nstart = [0, 0]\nf = ['r - if(abs(x) > 0.02, 2, 0)', 'clip(x, \
+        -0.02, 0.02)']\n[let]\nr = 'if(mod(t, 10) < 5, 1, -1)'";
+    for method in [Method::Dopri5, Method::Radau5, Method::Lsoda] {
+        let options = Options { t_end: 10.0, method, ..Options::default() };
+        near(follow(&model(clock), &options, &mut |_| true).unwrap().x[0], -14.9, 1e-9);
+    }
+}
+
 /// A relay behind a lag: z = 0 is crossed ever more often, exp(t) times, and never for the last.
 #[test]
 fn chatter_that_decays_is_told() {

@@ -586,6 +586,27 @@ mod tests {
         }
     }
 
+    /// Motion that drifts for ever is on no orbit, however far away what it drifts by is rounding.
+    #[test]
+    fn a_drift_is_no_closed_orbit() {
+        let forced = "states = ['x1', 'v1', 'x2', 'v2']\nstart = [0, 0, 0, 0]\nf = ['v1', 'cos(t) - \
+            (x1 - x2) - 0.1*(v1 - v2) + 0.1', 'v2', 'x1 - x2 + 0.1*(v1 - v2) - 0.2*v2']";
+        let driven = "states = ['p', 'q', 'x1', 'v1', 'x2', 'v2']\nstart = [1, 0, 0, 0, 0, 0]\nf = \
+            ['q', '(1 - p^2)*q - p', 'v1', 'p - (x1 - x2) - 0.3*(v1 - v2) - if(v1 > 0, 0.1, \
+            0.5)*v1', 'v2', '-p + (x1 - x2) + 0.3*(v1 - v2) - if(v2 > 0, 0.1, 0.5)*v2']";
+        let period = Return::Period(2.0 * std::f64::consts::PI);
+        let by_section = |text: &str, section: &str| {
+            let mut run = run(text, 1e3);
+            run.options.record = Record::Section(expression(section, &run.model).unwrap());
+            let after = Return::Crossings(1);
+            Executor::quiet().ask(&GeneralOrbit { run, settle: 100.0, after, along: None })
+        };
+        for found in [orbit(forced, 600.0, period), by_section(driven, "p")] {
+            let error = found.map(|answer| format!("{answer:?}")).unwrap_err().to_string();
+            assert!(error.contains("no closed orbit"), "{error}");
+        }
+    }
+
     /// A state that comes back after a time that is no period of the equations is on no orbit.
     #[test]
     fn a_period_is_one_of_the_equations() {

@@ -26,6 +26,13 @@ const TURNS_AWAY: &str = "it may stay, or turn away by infinitely many switches 
 const SEVERAL_VELOCITIES: &str =
     "sliding on all of them, where mixtures of the fields have different velocities";
 
+/// Whether all of these fields move one of the functions the same way, as a clock: no mixture of
+/// them stays on it. `speeds` has a row a field.
+fn some_move_one_way(speeds: &[Vec<f64>]) -> bool {
+    let all = |i: usize, sign: f64| speeds.iter().all(|speeds| sign * speeds[i] > 0.0);
+    (0..speeds[0].len()).any(|i| all(i, 1.0) || all(i, -1.0))
+}
+
 /// A configuration, the places of the guards that are zero, what they do there, and which of them
 /// its equations ask.
 type Vertex = (Configuration, Vec<Option<usize>>, Rates, Vec<bool>);
@@ -349,8 +356,9 @@ impl Follower<'_> {
     /// The values of functions at points drawn around the present one; none of more than are tried
     /// together, of whole parts, and of functions that bend there.
     fn values_around(&self, guards: &[usize]) -> Option<Vec<Vec<f64>>> {
-        /// Distance of the points, relative to the states' sizes, and what a bend makes of it.
-        const AROUND: f64 = 1e-3;
+        /// Distances of the points, relative to the states' sizes, and what a bend makes of them.
+        /// Where another switch is near, as the jump of a clock, nearer points do.
+        const AROUND: [f64; 2] = [1e-3, 1e-6];
         const BEND: f64 = 0.1;
         let whole = |guard: &usize| self.equation.guards[*guard].whole;
         if !(2..=MOST_TOGETHER).contains(&guards.len()) || guards.iter().any(whole) {
@@ -359,7 +367,9 @@ impl Follower<'_> {
         let mut chance = RandomStream::new(0, guards.len() as u64);
         let largest = self.size.iter().fold(0.0_f64, |most, s| most.max(*s));
         let sizes = self.size.iter().map(|size| size.max(1e-3 * largest));
-        let sizes: Vec<f64> = sizes.chain([self.options.t_end - self.options.t_start]).collect();
+        let mut field = vec![0.0; self.n];
+        self.compiled.field.evaluate(&self.variables, &mut field);
+        let sizes: Vec<f64> = sizes.chain([self.whole_time(&field)]).collect();
         let change = |off: &[f64], sign: f64| -> Vec<f64> {
             let x: Vec<f64> = self.x.iter().zip(off).map(|(x, off)| x + sign * off).collect();
             let t = self.t + sign * off[self.n];
@@ -369,18 +379,21 @@ impl Follower<'_> {
             };
             guards.iter().map(of).collect()
         };
-        let mut values = Vec::new();
-        for _ in 0..2 * guards.len() {
-            let off: Vec<f64> =
-                sizes.iter().map(|size| AROUND * (2.0 * chance.uniform() - 1.0) * size).collect();
-            let (ahead, back) = (change(&off, 1.0), change(&off, -1.0));
-            let is_line = |(a, b): (&f64, &f64)| (a + b).abs() <= BEND * a.abs().max(b.abs());
-            if !ahead.iter().zip(&back).all(is_line) {
-                return None;
+        let is_line = |(a, b): (&f64, &f64)| (a + b).abs() <= BEND * a.abs().max(b.abs());
+        let mut at_distance = |around: f64| {
+            let mut values = Vec::new();
+            for _ in 0..2 * guards.len() {
+                let off: Vec<f64> =
+                    sizes.iter().map(|s| around * (2.0 * chance.uniform() - 1.0) * s).collect();
+                let (ahead, back) = (change(&off, 1.0), change(&off, -1.0));
+                if !ahead.iter().zip(&back).all(is_line) {
+                    return None;
+                }
+                values.push(ahead);
             }
-            values.push(ahead);
-        }
-        Some(values)
+            Some(values)
+        };
+        AROUND.into_iter().find_map(&mut at_distance)
     }
 
     /// The cells around a meeting of surfaces, where some of these functions follow from others.
@@ -525,9 +538,7 @@ impl Follower<'_> {
             (0..n).map(|i| low[i] + added(i)).collect()
         };
         let now = field(self.t, &self.x);
-        let moves = now.iter().zip(&self.size).filter(|(f, size)| **f != 0.0 && **size != 0.0);
-        let left = self.options.t_end - self.t;
-        let whole = moves.map(|(f, size)| size / f.abs()).fold(left, f64::min);
+        let whole = self.whole_time(&now);
         let states = parts.map(|part| {
             let brief = part * whole;
             (self.t + brief, a_little_later(&mut field, self.t, &self.x, brief))
@@ -929,7 +940,7 @@ impl Follower<'_> {
                         .iter()
                         .map(|rates| slides.iter().map(|s| rates[*s]).collect())
                         .collect();
-                    if !(cells.depth(&own) > 0.0) {
+                    if some_move_one_way(&own) || !(cells.depth(&own) > 0.0) {
                         return false;
                     }
                     if self.options.intersection == Intersection::Undecided {
@@ -1018,6 +1029,9 @@ impl Follower<'_> {
                         .iter()
                         .map(|rates| slides.iter().map(|s| rates[*s]).collect())
                         .collect();
+                    if some_move_one_way(&own) {
+                        return false;
+                    }
                     let holds = match clear.as_slice() {
                         _ if chosen => 1.0,
                         [a, b, ..] if dependent && m == 2 => {
@@ -1828,7 +1842,7 @@ impl Follower<'_> {
             }
             // Sliding is left without a speed, and to the side that it is left to.
             let left = self.left_watch[i];
-            if met && slope.abs() <= TANGENT * left.abs() {
+            if met && left != 0.0 && slope.abs() <= TANGENT * left.abs() {
                 self.watch_side[i] = left.signum();
                 return;
             }
@@ -1887,9 +1901,14 @@ impl Follower<'_> {
     /// A time in which states that move so do not change by a hundredth of their sizes.
     fn brief(&self, field: &[f64]) -> f64 {
         const BRIEF: f64 = 0.005;
+        BRIEF * self.whole_time(field)
+    }
+
+    /// A time in which states that move so change by their sizes; the time left, if less.
+    fn whole_time(&self, field: &[f64]) -> f64 {
         let moves = field.iter().zip(&self.size).filter(|(f, size)| **f != 0.0 && **size != 0.0);
         let left = self.options.t_end - self.t;
-        BRIEF * moves.map(|(f, size)| size / f.abs()).fold(left, f64::min)
+        moves.map(|(f, size)| size / f.abs()).fold(left, f64::min)
     }
 
     /// A watched value a brief time ahead, and twice that time.

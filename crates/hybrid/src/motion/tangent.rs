@@ -1083,8 +1083,17 @@ pub struct ClosedOrbit {
 /// A way around that is shorter than this part of a search's way is none.
 const POINT: f64 = 1e-3;
 
-/// A gap, in units of the states' largest size, that may be the integration's error.
+/// A gap, in units of the states' largest size, that may be the integration's error, and one at
+/// which Newton's method ends.
 const CLOSED: f64 = 1e-8;
+const WELL_CLOSED: f64 = 1e-11;
+/// Such an orbit's gaps in units of each state's way and of the states' largest size, of which this
+/// many times that of the search's first turn counts.
+const OF_WAY: f64 = 1e-6;
+const OF_SIZE: f64 = 1e-12;
+const OFF: f64 = 100.0;
+/// A search that comes to states so many times as large is given up.
+const FAR_OFF: f64 = 1e8;
 /// A multiplier's distance from 1 that may be.
 const NOT_ISOLATED: f64 = 1e-6;
 /// A multiplier's distance from 1 within which its error is looked at.
@@ -1141,8 +1150,10 @@ pub fn closed_orbit(
         (x, options.mode) = (first.end, first.mode);
     }
     let began = x.clone();
-    let mut best: Option<ClosedOrbit> = None;
-    let gap_of = |best: &Option<ClosedOrbit>| best.as_ref().map_or(f64::INFINITY, |b| b.gap);
+    let mut best: Option<(f64, ClosedOrbit)> = None;
+    // The largest size of a state on the first turn.
+    let mut usual = f64::NAN;
+    let gap_of = |best: &Option<(f64, _)>| best.as_ref().map_or(f64::INFINITY, |best| best.0);
     for iteration in 0..30 {
         let around = turn(model, &options, after, &x, true).map_err(|error| match error {
             // The state that it has come to is none of the motion asked for.
@@ -1164,10 +1175,21 @@ pub fn closed_orbit(
             continue;
         }
         let gap: Vec<f64> = end.iter().zip(&x).map(|(e, x)| e - x).collect();
-        let off = gap.iter().fold(0.0_f64, |a, v| a.max(v.abs())) / size.max(f64::MIN_POSITIVE);
+        let largest = gap.iter().fold(0.0_f64, |most, gap| most.max(gap.abs()));
+        let of_size = largest / size.max(f64::MIN_POSITIVE);
+        // What drifts is not closed because it has come far: each state comes back to a share of
+        // its way, or to rounding of what states were at first.
+        if usual.is_nan() {
+            usual = size;
+        }
+        let rounding = OF_SIZE * size.min(OFF * usual);
+        let misses = gap.iter().zip(&bounds).map(|(gap, [low, high])| {
+            gap.abs() / (OF_WAY * (high - low)).max(rounding).max(f64::MIN_POSITIVE)
+        });
+        let off = of_size.max(WELL_CLOSED * misses.fold(0.0, f64::max));
         if off >= gap_of(&best)
             && gap_of(&best) <= CLOSED
-            && let Some(best) = best
+            && let Some((_, best)) = best
         {
             // As near as rounding lets it come. Where orbits are not isolated the next step may
             // lead anywhere.
@@ -1184,7 +1206,7 @@ pub fn closed_orbit(
                 period: time,
                 multipliers,
                 multiplier_error: 0.0,
-                gap: off,
+                gap: of_size,
                 moved: moved(&began, &x, &bounds),
             };
             // Where a multiplier is 1 within its error, orbits beside are closed, too: a step of
@@ -1206,10 +1228,10 @@ pub fn closed_orbit(
                 }
             }
             let fills = from_one <= found.multiplier_error.max(NOT_ISOLATED);
-            if off <= 1e-11 || fills && off <= CLOSED {
+            if off <= WELL_CLOSED || fills && off <= CLOSED {
                 return Ok(found);
             }
-            best = Some(found);
+            best = Some((off, found));
         }
         let mut system = vec![0.0; n * n];
         for i in 0..n {
@@ -1219,6 +1241,10 @@ pub fn closed_orbit(
         }
         let Some(change) = solve_any(&system, &gap, 0.0) else { break };
         x.iter_mut().zip(&change).for_each(|(x, c)| *x += c);
+        let largest = x.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+        if largest > FAR_OFF * usual {
+            break;
+        }
     }
     Err(HybridError::NoOrbit(format!(
         "Newton's method found no closed orbit (the best return was {:e} off): start nearer \
