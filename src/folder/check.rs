@@ -862,9 +862,10 @@ impl Check {
             Check::Attractors { same, within } => {
                 // Both by crossings in one direction, that of the first.
                 let (a, direction) = section(first, None).map_err(|e| format!("`of`: {e}"))?;
-                let (b, _) = section(answers.last().unwrap_or(first), direction)
-                    .map_err(|e| format!("`and`: {e}"))?;
-                let distance = apart(&a, &b)?;
+                let second = answers.last().unwrap_or(first);
+                let (b, _) = section(second, direction).map_err(|e| format!("`and`: {e}"))?;
+                let both_ways = |answer| later_half(answer, &|_| true);
+                let distance = apart([&a, &b], [&both_ways(first)?, &both_ways(second)?])?;
                 let alike = distance <= *within;
                 let word = if alike { "the same attractor" } else { "different attractors" };
                 Ok((alike == *same, format!("{word}: {} of their extent apart", short(distance))))
@@ -937,6 +938,18 @@ fn section<'a>(
     let table = answer
         .table("section")
         .ok_or("the run has no section; give section, such as section = \"y=0\"")?;
+    let wanted = direction.or(table.words("direction").next());
+    Ok((later_half(answer, &|word| word == wanted)?, wanted))
+}
+
+/// The later half of a section's crossings in directions that are `wanted`, by rows.
+fn later_half(
+    answer: &Answer,
+    wanted: &dyn Fn(Option<&str>) -> bool,
+) -> Result<Vec<Vec<f64>>, String> {
+    let table = answer
+        .table("section")
+        .ok_or("the run has no section; give section, such as section = \"y=0\"")?;
     let t = table.numbers("t");
     let (Some(first), Some(last)) = (t.first(), t.last()) else {
         return Err("the section was never crossed".into());
@@ -944,14 +957,12 @@ fn section<'a>(
     let half = 0.5 * (first + last);
     let columns: Vec<&[f64]> = states(table);
     let directions: Vec<&str> = table.words("direction").collect();
-    let wanted = direction.or(directions.first().copied());
-    let rows = (0..t.len()).filter(|i| t[*i] > half && directions.get(*i).copied() == wanted);
+    let rows = (0..t.len()).filter(|i| t[*i] > half && wanted(directions.get(*i).copied()));
     let found: Vec<Vec<f64>> = rows.map(|i| columns.iter().map(|c| c[i]).collect()).collect();
     if found.is_empty() {
-        Err("the section was never crossed in the later half".into())
-    } else {
-        Ok((found, wanted))
+        return Err("the section was never crossed in the later half".into());
     }
+    Ok(found)
 }
 
 fn states(table: &Table) -> Vec<&[f64]> {
@@ -993,12 +1004,6 @@ impl Extents {
         let span = spans.iter().copied().fold(0.0, f64::max);
         let size = ranges.iter().fold(0.0, |most, (a, b)| f64::max(most, a.abs().max(b.abs())));
         Self { spans, span, size }
-    }
-
-    /// The length by which distances of points are measured.
-    fn length(&self) -> f64 {
-        // One point: its own size.
-        if self.span > ONE_POINT * self.size { self.span } else { self.size.max(f64::MIN_POSITIVE) }
     }
 
     /// Units of the states: 1, but of one that moves little beside the largest, and by more than
@@ -1071,26 +1076,55 @@ fn narrows(answer: &Answer, points: &[Vec<f64>], direction: Option<&str>) -> boo
     })
 }
 
-/// Hausdorff's distance of two sets of points, relative to their extent.
-fn apart(a: &[Vec<f64>], b: &[Vec<f64>]) -> Result<f64, String> {
-    if a[0].len() != b[0].len() {
+/// Hausdorff's distance of two sets of points, relative to their extent: that of the crossings in
+/// `both_ways`, since those in one direction may be one point, with a run's errors for an extent.
+fn apart(sets: [&[Vec<f64>]; 2], both_ways: [&[Vec<f64>]; 2]) -> Result<f64, String> {
+    let n = sets[0][0].len();
+    if sets[1][0].len() != n {
         return Err("the two sections have other states".into());
     }
-    let thin = |points: &[Vec<f64>]| -> Vec<Vec<f64>> {
-        let step = points.len().div_ceil(MOST_COMPARED);
-        points.iter().step_by(step).cloned().collect()
+    let extents = both_ways.map(Extents::of);
+    let most = |of: &dyn Fn(&Extents) -> f64| extents.iter().map(of).fold(0.0, f64::max);
+    let size = most(&|e| e.size).max(f64::MIN_POSITIVE);
+    let span = most(&|e| e.span);
+    let whole = if span > ERRORS * size { span } else { size };
+    // A state that moves little beside the others, and goes on to, is measured by its own extent;
+    // one that does not move, by its size.
+    let own = |i: usize| {
+        let span = most(&|e| e.spans[i]);
+        let size_of = |p: &Vec<f64>| p[i].abs();
+        let all = both_ways.iter().flat_map(|points| points.iter().map(size_of));
+        if span > ONE_POINT * size { span } else { all.fold(0.0, f64::max) }
     };
-    let (a, b) = (thin(a), thin(b));
-    let both: Vec<Vec<f64>> = a.iter().chain(&b).cloned().collect();
-    let extents = Extents::of(&both);
-    let units = extents.units(|own| own / extents.span);
-    let one_way = |from: &[Vec<f64>], to: &[Vec<f64>]| {
+    let goes_on = |i: usize| {
+        both_ways.iter().all(|points| {
+            let (early, late) = points.split_at(points.len() / 2);
+            early.is_empty() || Extents::of(late).spans[i] >= STEADY * Extents::of(early).spans[i]
+        })
+    };
+    let unit = |i: usize| {
+        let own = own(i);
+        let counts = own > ONE_POINT * size && own < LITTLE * whole && goes_on(i);
+        if counts { own } else { whole }
+    };
+    let units: Vec<f64> = (0..n).map(unit).collect();
+    let [a, b] = sets.map(|points| {
+        let step = points.len().div_ceil(MOST_COMPARED);
+        points.iter().step_by(step).collect::<Vec<_>>()
+    });
+    let one_way = |from: &[&Vec<f64>], to: &[&Vec<f64>]| {
         from.iter()
             .map(|p| to.iter().map(|q| distance(p, q, &units)).fold(f64::INFINITY, f64::min))
             .fold(0.0, f64::max)
     };
-    Ok(one_way(&a, &b).max(one_way(&b, &a)) / extents.length())
+    Ok(one_way(&a, &b).max(one_way(&b, &a)))
 }
+
+/// Sets that lie within this part of their size have none but errors of a run for an extent.
+const ERRORS: f64 = 1e-4;
+
+/// A state's extent that shrinks by more is on its way to something else.
+const STEADY: f64 = 0.8;
 
 /// Points of a section that are compared with another one's.
 const MOST_COMPARED: usize = 2000;
@@ -1179,9 +1213,10 @@ mod tests {
     #[test]
     fn sets_are_as_far_apart_as_their_farthest_points() {
         let (a, b) = (circle(2000, 1.0), circle(1500, 0.7));
-        assert!(apart(&a, &b).unwrap() < 0.02);
+        let apart = |a: &[Vec<f64>], b: &[Vec<f64>]| apart([a, b], [a, b]).unwrap();
+        assert!(apart(&a, &b) < 0.02);
         let moved: Vec<Vec<f64>> = b.iter().map(|p| vec![p[0] + 1.0, p[1]]).collect();
-        assert!((apart(&a, &moved).unwrap() - 1.0 / 3.0).abs() < 0.02);
+        assert!((apart(&a, &moved) - 0.5).abs() < 0.02);
     }
 
     /// A state that moves little beside another one counts as much; one that moves by errors not.
@@ -1190,9 +1225,13 @@ mod tests {
         let points = |z: &dyn Fn(f64) -> f64| -> Vec<Vec<f64>> {
             (0..64).map(|i| vec![1000.0 * f64::from(i % 2), z(f64::from(i))]).collect()
         };
-        assert_eq!(apart(&points(&|_| 1.0), &points(&|_| 2.0)), Ok(1.0));
+        let apart = |a: &[Vec<f64>], b: &[Vec<f64>]| apart([a, b], [a, b]).unwrap();
+        assert_eq!(apart(&points(&|_| 1.0), &points(&|_| 2.0)), 0.5);
         let noisy = |i: f64| 1.0 + 1e-4 * (i * i).sin();
-        assert!(apart(&points(&|_| 1.0), &points(&noisy)).unwrap() < 1e-6);
+        assert!(apart(&points(&|_| 1.0), &points(&noisy)) < 1e-3);
+        // What shrinks is on its way, and its extent no measure.
+        let on_its_way = |way: f64| points(&|i| way * (-0.05 * i).exp() * i.cos());
+        assert!(apart(&on_its_way(10.0), &on_its_way(4.0)) < 0.01);
         assert_eq!(period(&points(&|_| 1.0), 1e-6), Some(2));
         assert_eq!(period(&points(&noisy), 1e-6), Some(2));
         assert_eq!(period(&points(&|i| 0.01 * (i % 4.0)), 1e-3), Some(4));
@@ -1244,7 +1283,14 @@ mod tests {
         };
         let errors = points(&|i| 1e-8 * (i * i).sin());
         assert_eq!(period(&errors, 1e-3), Some(1));
-        assert!(apart(&errors, &points(&|i| 1e-8 * (3.0 * i * i).cos())).unwrap() < 1e-6);
+        let others = points(&|i| 1e-8 * (3.0 * i * i).cos());
+        assert!(apart([&errors, &others], [&errors, &others]).unwrap() < 1e-6);
+        // Also of a run with larger ones, and beside the crossings on the way back.
+        let [a, b] = [1.0, 3.0].map(|k| points(&|i| 1e-5 * (k * i * i).sin()));
+        assert!(apart([&a, &b], [&a, &b]).unwrap() < 1e-3);
+        let both = |points: &[Vec<f64>]| [points, &[vec![-1.0, -0.3]]].concat();
+        let [a, b] = [1.0, 3.0].map(|k| points(&|i| 1e-3 * (k * i * i).sin()));
+        assert!(apart([&a, &b], [&both(&a), &both(&b)]).unwrap() < 0.01);
         // Rounding that repeats is none, a small orbit that repeats is one.
         assert_eq!(period(&points(&|i| 1e-16 * (i % 2.0)), 1e-3), Some(1));
         assert_eq!(period(&points(&|i| 1e-7 * (i % 2.0)), 1e-3), Some(2));

@@ -126,7 +126,8 @@ impl Folder {
                     // Was it by this rule that the claim was first judged? A claim that is new is
                     // judged by what was known of its data under other names.
                     let of_claim = |v: &&Verdict| v.claim == claim.id;
-                    let mut judged: Vec<&Verdict> = known.verdicts.iter().filter(of_claim).collect();
+                    let mut judged: Vec<&Verdict> =
+                        known.verdicts.iter().filter(of_claim).collect();
                     if judged.is_empty() {
                         let of_data = |v: &&Verdict| v.has_data_of(&found);
                         judged = known.verdicts.iter().filter(of_data).collect();
