@@ -222,11 +222,8 @@ fn a_rule_after_its_data_stays_one() {
         .replace("within = 1e-3", "within = 1e-2");
     fs::write(root.join("claims.toml"), format!("{claims}\n{second}")).unwrap();
     assert!(made("again"));
-    fs::write(
-        root.join("claims.toml"),
-        format!("{}{second}{}", &claims[..from], &claims[next..]),
-    )
-    .unwrap();
+    fs::write(root.join("claims.toml"), format!("{}{second}{}", &claims[..from], &claims[next..]))
+        .unwrap();
     assert!(made("again"));
 }
 
@@ -310,10 +307,7 @@ fn a_ratio_is_of_two_measures() {
     assert!(code == 0 && out.contains("2 of 2 claims agree"), "{out}{said}");
     change(&root, "claims.toml", ratio, "0.5");
     let (_, out, _) = paper(&["make", "--quiet"], &root);
-    assert!(
-        out.contains("narrower-is-faster: differs") && out.contains("0.5 claimed"),
-        "{out}"
-    );
+    assert!(out.contains("narrower-is-faster: differs") && out.contains("0.5 claimed"), "{out}");
 }
 
 /// The share of starts in which a check holds.
