@@ -35,13 +35,15 @@ papers: ## make and check every paper under papers/
 		$(RUN) --bin twofold -- paper report --quiet "$$(dirname "$$p")" && $(RUN) --bin twofold -- paper check --quiet "$$(dirname "$$p")" || exit 1; \
 	done
 
-# In the debug profile, where an overflow is an error.
+# With the programs of `make figures`: only the tests are compiled.
 test: ## the tests of the whole program: figures and their hashes, commands, files, papers
-	@$(CARGO) test --locked --test it
+	@$(CARGO) test --release --locked --test it
 
-test-all: test ## also the tests of every crate by itself and of the documentation
+# In the debug profile, where an overflow is an error and every byte is the same.
+test-all: test ## also the tests of every crate by itself and of the documentation, and the figures' hashes, all unoptimised
 	@$(CARGO) test --locked --lib --bins --examples
 	@$(CARGO) test --locked --doc
+	@$(CARGO) test --locked --test it -- golden::
 
 rigor-test: ## millions of interval operations against exact integer arithmetic (minutes)
 	@$(CARGO) test --release --locked --test it rigor_interval:: -- --ignored
@@ -131,7 +133,7 @@ sbom: ## what the program links, with versions, licences and checksums (CycloneD
 
 .PHONY: prose reference schemas
 reference: ## write the generated pages of docs/ anew: flags, columns, keys, exit codes, messages
-	@TWOFOLD_UPDATE=1 $(CARGO) test --locked --quiet --test it -- reference:: paper_format::
+	@TWOFOLD_UPDATE=1 $(CARGO) test --release --locked --quiet --test it -- reference:: paper_format::
 
 schemas: ## papers' folders and the report against their schemas by a full validator (downloads one)
 	@sh scripts/schemas.sh
