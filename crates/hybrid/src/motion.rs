@@ -612,7 +612,7 @@ fn follow_once(
     follower.run_whole(observe).map(|(outcome, _)| outcome)
 }
 
-/// How much time a run makes while its steps double.
+/// Time that a run makes while its steps double.
 #[derive(Default)]
 struct Pace {
     /// Steps and time of the last look.

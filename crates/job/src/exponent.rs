@@ -7,7 +7,6 @@ use serde_json::Value;
 use super::answer::{Answer, Stop};
 use super::question::{Ask, JobError, Question};
 use super::spec::SwitchSpec;
-use super::spec::switching;
 use twofold_analyse::lyapunov::{self, Estimate, Exponent};
 use twofold_analyse::tangent::Tangent;
 use twofold_instances_switched::{self as switched, Late};
@@ -214,14 +213,10 @@ impl LargestExponent {
     {
         let tangent = tangent.bind::<M>().map_err(|e| e.to_string())?;
         let x = SVector::<f64, N>::from_fn(|i, _| {
-            self.start.get(i).copied().unwrap_or_else(|| self.phi())
+            let phi = || SwitchSpec::phi_at(&self.system, &self.start);
+            self.start.get(i).copied().unwrap_or_else(phi)
         });
         tangent.growth(x, self.start.len(), &self.settings, monitor).map_err(|e| e.to_string())
-    }
-
-    /// phi at the start: within its relaxation time of the side that h says.
-    fn phi(&self) -> f64 {
-        if switching(&self.system, &self.start) > 0.0 { 1.0 } else { 0.0 }
     }
 }
 

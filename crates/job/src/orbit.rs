@@ -407,7 +407,7 @@ impl ClosedOrbit {
         if let SwitchSpec::Hysteretic { .. } = switch {
             let mut h = [f64::NAN];
             Program::new(&system.tape().select([0])).evaluate(&point, &mut h);
-            point.push(if h[0] > 0.0 { 1.0 } else { 0.0 });
+            point.push(if h[0] < 0.0 { 0.0 } else { 1.0 });
         }
         Ok(Guess::Loop { point, returns: returns.unwrap_or(1) })
     }
@@ -1092,7 +1092,7 @@ mod tests {
     /// Without settling: the start, moved onto the plane, with phi on its side of h = 0.
     #[test]
     fn a_hysteretic_guess_has_phi() {
-        for (x, phi) in [(0.5, 1.0), (-0.5, 0.0), (0.0, 0.0)] {
+        for (x, phi) in [(0.5, 1.0), (-0.5, 0.0), (0.0, 1.0)] {
             let mut question = question(circle(3), switches()[1], 1);
             (question.start, question.plane.value) = (vec![x, 7.0, 8.0], 2.0);
             let guess = Guess::Loop { point: vec![x, 2.0, 8.0, phi], returns: 1 };
