@@ -35,9 +35,11 @@ papers: ## make and check every paper under papers/
 		$(RUN) --bin twofold -- paper report --quiet "$$(dirname "$$p")" && $(RUN) --bin twofold -- paper check --quiet "$$(dirname "$$p")" || exit 1; \
 	done
 
-# With the programs of `make figures`: only the tests are compiled.
+# With the programs of `make figures`; of the tests themselves most of the time is the compiler's, so they are not optimised.
+UNOPTIMISED := -C opt-level=0 -C codegen-units=16
 test: ## the tests of the whole program: figures and their hashes, commands, files, papers
-	@$(CARGO) test --release --locked --test it
+	@it=$$($(CARGO) rustc --release --locked --test it --message-format json-render-diagnostics -- $(UNOPTIMISED) \
+	| sed -n 's|.*"executable":"\([^"]*/it-[^"]*\)".*|\1|p'); [ -n "$$it" ] && "$$it" $(TESTS)
 
 # In the debug profile, where an overflow is an error and every byte is the same.
 test-all: test ## also the tests of every crate by itself and of the documentation, and the figures' hashes, all unoptimised

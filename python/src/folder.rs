@@ -4,9 +4,12 @@ use std::path::Path;
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use serde_json::json;
+use serde_json::{Map, Value, json};
 use twofold::folder::{Folder, FolderError};
 use twofold::job::{Executor, JobError, Store};
+use twofold::paper::View;
+use twofold::paper::pipeline::questions;
+use twofold::paper::verdict::judge;
 
 use crate::answers::{handed, pool};
 use crate::errors;
@@ -47,9 +50,28 @@ pub fn paper(folder: &str) -> PyResult<String> {
             "journal": about.journal, "doi": about.doi,
         "arxiv": about.arxiv, "summary": about.summary, "open": about.open, "figures": figures,
             "claims": claims,
-        "sources": folder.sources.keys().collect::<Vec<_>>(),
+        "sources": folder.sources.keys().collect::<Vec<_>>(), "points": points(&folder),
     })
     .to_string())
+}
+
+/// Numbers of the paper that panels are drawn with, by panel.
+fn points(folder: &Folder) -> Map<String, Value> {
+    let mut all = Map::new();
+    for figure in &folder.figures {
+        for picture in &figure.pictures {
+            let View::Plots(plots) = &picture.view else { continue };
+            for plot in &plots.plots {
+                let Some(points) = &plot.points else { continue };
+                let axis = |i: usize| points.points.iter().map(|p| p[i]).collect::<Vec<_>>();
+                all.insert(
+                    format!("{}/{}", figure.id, plot.label),
+                    json!({ "x": axis(0), "y": axis(1) }),
+                );
+            }
+        }
+    }
+    all
 }
 
 /// The answer to a panel or measure: tables as arrays, facts as JSON.
@@ -96,8 +118,44 @@ pub fn paper_claims(
                 asked.extend(claim.questions(&folder).map_err(|e| JobError::Other(e.to_string()))?);
             }
             executor.gather(&asked);
-            let verdicts = folder.claims.iter().map(|claim| claim.judge(&folder, &executor));
-            Ok(json!(verdicts.collect::<Result<Vec<_>, _>>()?).to_string())
+            let scored = folder.claims.iter().map(|claim| match claim.judge(&folder, &executor) {
+                Ok(verdict) => Ok(json!(verdict)),
+                Err(JobError::Interrupted) => Err(JobError::Interrupted),
+                Err(why) => {
+                    Ok(json!({ "claim": claim.id, "agrees": null, "found": why.to_string() }))
+                }
+            });
+            Ok(json!(scored.collect::<Result<Vec<_>, _>>()?).to_string())
+        })
+    })
+}
+
+/// What panels say of themselves, as a JSON list.
+#[pyfunction]
+#[pyo3(signature = (folder, threads, keep, show=None))]
+pub fn paper_verdicts(
+    py: Python<'_>,
+    folder: &str,
+    threads: usize,
+    keep: bool,
+    show: Option<&Bound<'_, PyAny>>,
+) -> PyResult<String> {
+    let folder = read(folder)?;
+    supervise(py, show, move |work| {
+        let executor = executor(&folder, keep, work);
+        pool(threads)?.install(|| {
+            executor.gather(&questions(folder.figures.iter().flat_map(|f| &f.pictures)));
+            let mut found = Vec::new();
+            for figure in &folder.figures {
+                for picture in &figure.pictures {
+                    let verdicts = judge(picture, &executor)?;
+                    found.extend(verdicts.into_iter().map(|v| {
+                        json!({ "figure": figure.id, "panel": v.panel, "reading": v.reading,
+                            "claim": v.claim_text, "found": v.found, "agrees": v.agrees })
+                    }));
+                }
+            }
+            Ok(json!(found).to_string())
         })
     })
 }

@@ -24,7 +24,7 @@ mod _native {
     #[pymodule_export]
     use super::answers::{ask, classify, fates, run, sweep, written};
     #[pymodule_export]
-    use super::folder::{paper, paper_answer, paper_claims};
+    use super::folder::{paper, paper_answer, paper_claims, paper_verdicts};
     #[pymodule_export]
     use super::paper::{panels, verdict_table};
     #[pymodule_export]

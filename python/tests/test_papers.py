@@ -34,6 +34,27 @@ def test_claims_are_the_commands(program, folder):
     ]
 
 
+def test_what_cannot_be_scored_is_said(folder):
+    file = folder / "claims.toml"
+    file.write_text(file.read_text().replace('read = "period"', 'read = "period/0"', 1))
+    claims = twofold.Paper(folder, keep=False).claims()
+    assert claims[0].agrees is None and "there is no" in claims[0].found
+    assert claims[1].agrees is True
+
+
+def test_panels_say_what_they_show_and_have_the_papers_numbers(folder):
+    (folder / "data").mkdir()
+    (folder / "data" / "read.csv").write_text("t,x\n0,0.5\n12,-0.25\n")
+    figure = folder / "figures" / "fig1.toml"
+    panel = 'title = "w = 0.1"\n'
+    points = 'points = { name = "read off", file = "data/read.csv" }\n'
+    figure.write_text(figure.read_text().replace(panel, panel + points))
+    paper = twofold.Paper(folder, keep=False)
+    assert list(paper.points) == ["fig1/b"]
+    assert paper.points["fig1/b"]["y"].tolist() == [0.5, -0.25]
+    assert paper.verdicts() == []
+
+
 def test_answers_are_arrays(folder):
     paper = twofold.Paper(folder, keep=False)
     assert [figure.id for figure in paper.figures] == ["fig1"] and "cycle" in paper.names

@@ -8,7 +8,10 @@ import os
 from dataclasses import dataclass
 from typing import Any, Dict, List, Optional, Tuple, Union
 
+import numpy as np
+
 from . import _native
+from ._paper import Verdict
 from ._progress import Shown
 from ._runs import Progress, Table
 
@@ -41,10 +44,10 @@ class Claim:
     """The kind of check."""
     decided: str
     """The day on which the rule was fixed."""
-    agrees: bool
-    """Whether it holds."""
+    agrees: Optional[bool]
+    """Whether it holds; None if it cannot be scored."""
     found: str
-    """What was found."""
+    """What was found, or why it cannot be scored."""
     odds: Optional[Tuple[int, int]]
     """Repeated runs in which it holds, and all of them; None if nothing is repeated."""
 
@@ -91,6 +94,11 @@ class Paper:
         self.figures: List[Figure] = [Figure(**figure) for figure in said["figures"]]
         self.names: List[str] = said["sources"]
         """Panels ("fig3/a", in a reading "fig3/a@printed") and measures, for :meth:`answer`."""
+        self.points: Dict[str, Table] = {
+            panel: Table({axis: np.array(values) for axis, values in columns.items()})
+            for panel, columns in said["points"].items()
+        }
+        """Numbers of the paper (``data/*.csv``) that panels are drawn with, by panel: x and y."""
         self._claims: Dict[str, Dict[str, Any]] = {claim["id"]: claim for claim in said["claims"]}
 
     def answer(self, name: str, progress: Progress = False) -> Answer:
@@ -105,7 +113,7 @@ class Paper:
         """Every claim of claims.toml with its outcome, in the file's order; ``threads`` = 0 is one
         per core and changes no byte.
 
-        What panels say of themselves (``says``) is scored by ``twofold paper`` alone.
+        What panels say of themselves (``says``) is in :meth:`verdicts`.
         """
         with Shown(progress) as show:
             verdicts = json.loads(_native.paper_claims(self._folder, threads, self._keep, show))
@@ -120,6 +128,12 @@ class Paper:
                 )  # fmt: skip
             )
         return found
+
+    def verdicts(self, threads: int = 0, progress: Progress = False) -> List[Verdict]:
+        """What panels say of themselves (``says``), in the figures' order, with its outcome."""
+        with Shown(progress) as show:
+            found = json.loads(_native.paper_verdicts(self._folder, threads, self._keep, show))
+        return [Verdict(**verdict) for verdict in found]
 
     def __repr__(self) -> str:
         return (f"<twofold.Paper: {', '.join(self.authors)} ({self.year}), {len(self.figures)} "

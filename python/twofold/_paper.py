@@ -20,8 +20,8 @@ class Verdict:
     """"fig7"."""
     panel: str
     """"iii"."""
-    reading: str
-    """"printed" or "reconstructed": how the paper's parameters are read."""
+    reading: Optional[str]
+    """"printed" or "reconstructed": how the paper's parameters are read; None without readings."""
     claim: str
     """What the paper says."""
     found: str
