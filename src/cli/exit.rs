@@ -77,8 +77,8 @@ pub enum CliError {
     /// A run or a drawing of a figure failed.
     #[error(transparent)]
     Pipeline(#[from] PipelineError),
-    /// A manifest could not be used.
-    #[error(transparent)]
+    /// A figure's manifest could not be used.
+    #[error("{0}; restore it, or make it anew: twofold bless --reason \"...\"")]
     Manifest(#[from] ManifestError),
     /// A file could not be read or written.
     #[error("{source}{}", advice(source))]

@@ -344,7 +344,17 @@ impl Folder {
         if !path.exists() {
             return Ok(None);
         }
-        Ok(Some(Manifest::parse(&read_text(&path)?, &path.display().to_string())?))
+        let text = read_text(&path)?;
+        Ok(Some(Manifest::parse(&text, &path.display().to_string()).map_err(|e| self.anew(e))?))
+    }
+
+    /// A file of `expected/` that cannot be used, and what to do.
+    fn anew(&self, why: impl std::fmt::Display) -> CliError {
+        CliError::Usage(format!(
+            "{why}; restore it, or remove it and keep what is made: twofold paper bless {} \
+                --reason \"...\"",
+            self.root.display()
+        ))
     }
 
     /// The outcomes that are expected, and those that were made last.
@@ -364,9 +374,7 @@ impl Folder {
         if !path.exists() {
             return Ok(Outcomes::default());
         }
-        let wrong = |why: String| {
-            CliError::Usage(format!("{}: {why}; bless the paper anew", path.display()))
-        };
+        let wrong = |why: String| self.anew(format!("{}: {why}", path.display()));
         let outcomes: Outcomes =
             serde_json::from_str(&read_text(&path)?).map_err(|e| wrong(e.to_string()))?;
         let mut claims = std::collections::BTreeSet::new();

@@ -136,6 +136,33 @@ fn a_rule_that_changes_after_its_data_is_said_to() {
     assert!(code == 2 && said.contains("two outcomes of claim period"), "{said}");
 }
 
+/// Advice about a file of `expected/` that cannot be read helps.
+#[test]
+fn advice_about_a_broken_expectation_works() {
+    let place = small();
+    let root = place.path().join("p");
+    let bless = || paper(&["bless", "--reason", "first", "--quiet"], &root);
+    assert_eq!(bless().0, 0);
+    let advice =
+        format!("or remove it and keep what is made: twofold paper bless {}", root.display());
+    for (file, text) in [
+        ("claims.json", "{"),
+        ("claims.json", "{ \"version\": 7, \"verdicts\": [] }"),
+        ("fig1.json", "{"),
+        ("fig1.json", "{ \"version\": 7 }"),
+    ] {
+        let path = root.join("expected").join(file);
+        fs::write(&path, text).unwrap();
+        let (code, _, said) = paper(&["check", "--quiet"], &root);
+        let wanted = [path.to_str().unwrap(), advice.as_str()];
+        assert!(code == 2 && wanted.iter().all(|w| said.contains(w)), "{file}: {said}");
+        fs::remove_file(&path).unwrap();
+        let (code, _, said) = bless();
+        assert_eq!(code, 0, "{said}");
+        assert_eq!(paper(&["check", "--quiet"], &root).0, 0, "{file}");
+    }
+}
+
 /// So are the words of a claim, which say what its rule is a measure of.
 #[test]
 fn words_that_change_after_their_data_are_said_to() {

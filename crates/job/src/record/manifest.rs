@@ -117,7 +117,7 @@ impl Layer {
 #[derive(Debug, thiserror::Error)]
 pub enum ManifestError {
     /// Not JSON, or not of this shape.
-    #[error("{name} is not a manifest: {source}; make one with `twofold bless`")]
+    #[error("{name} is not a manifest: {source}")]
     Syntax {
         /// Origin of the manifest, such as its path.
         name: String,
@@ -125,10 +125,7 @@ pub enum ManifestError {
         source: serde_json::Error,
     },
     /// Another format version.
-    #[error(
-        "{name} is a manifest of version {found}, this program reads version {VERSION}; make it \
-            anew with `twofold bless`, or use the release that made it"
-    )]
+    #[error("{name} is a manifest of version {found}, this program reads version {VERSION}")]
     Version {
         /// Origin of the manifest, such as its path.
         name: String,
@@ -147,7 +144,7 @@ pub enum ManifestError {
         bad: String,
     },
     /// Two entries for one picture.
-    #[error("{name} lists {picture} twice; make it anew with `twofold bless`")]
+    #[error("{name} lists {picture} twice")]
     Twice {
         /// Origin of the manifest, such as its path.
         name: String,
