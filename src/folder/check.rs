@@ -351,10 +351,7 @@ impl Claim {
                     return Err(missing("`and`, the panel or measure that it is divided by"));
                 }
                 let read = reading(origin, &place, &c)?;
-                let other = match &c.and_read {
-                    Some(path) => Read::Fact { path: path.get_ref().clone(), modulus: false },
-                    None => read.clone(),
-                };
+                let other = read.of_the_other(c.and_read.as_ref());
                 Check::Ratio {
                     read,
                     other,
@@ -374,10 +371,7 @@ impl Claim {
                 };
                 let read = reading(origin, &place, &c)?;
                 let other = match (&c.and, &c.and_read, &c.than) {
-                    (Some(_), Some(path), None) => {
-                        Some(Read::Fact { path: path.get_ref().clone(), modulus: false })
-                    }
-                    (Some(_), None, None) => Some(read.clone()),
+                    (Some(_), path, None) => Some(read.of_the_other(path.as_ref())),
                     (None, None, Some(_)) => None,
                     (Some(_), _, Some(than)) => {
                         let why = "`than` and `and` are both given";
@@ -682,6 +676,16 @@ fn reading(origin: &Origin, place: &Range<usize>, c: &ClaimFile) -> Result<Read,
 }
 
 impl Read {
+    /// The number of the second source: the fact that is named for it (`and-read`), taken as the
+    /// first one's, or else the same.
+    fn of_the_other(&self, path: Option<&Name>) -> Self {
+        let modulus = matches!(self, Read::Fact { modulus: true, .. });
+        path.map_or_else(
+            || self.clone(),
+            |path| Read::Fact { path: path.get_ref().clone(), modulus },
+        )
+    }
+
     fn of(&self, answer: &Answer) -> Result<f64, String> {
         match self {
             Read::Fact { path, modulus } => {
@@ -854,10 +858,11 @@ impl Check {
             }
             Check::Chaos => {
                 let (value, half) = largest_exponent(first)?;
-                Ok((
-                    value - half > 0.0,
-                    format!("largest exponent {} ± {}", short(value), short(half)),
-                ))
+                let said = format!("largest exponent {} ± {}", short(value), short(half));
+                match (value - half > 0.0, value + half < 0.0) {
+                    (false, false) => Err(undecided(&said)),
+                    (above, _) => Ok((above, said)),
+                }
             }
             Check::Attractors { same, within } => {
                 // Both by crossings in one direction, that of the first.
@@ -1323,6 +1328,39 @@ mod tests {
         let ratio = |i, equals| Check::Ratio { read: read(0), other: read(i), equals, within: 0.2 };
         assert!(judged(ratio(1, 1.0), 0.9).is_err() && judged(ratio(0, 1.2), 0.9).is_err());
         assert!(judged(ratio(0, 1.0), 0.9).unwrap().0 && !judged(ratio(0, 2.0), 0.9).unwrap().0);
+    }
+
+    #[test]
+    fn an_exponent_whose_interval_holds_zero_is_no_verdict() {
+        let judged = |value: f64, half_width| {
+            let rates = [MeanRate { value: Some(value), half_width }];
+            let answer = Answer::of_tables(Vec::new()).with_fact("exponents", &rates);
+            Check::Chaos.of(&[Arc::new(answer)]).map(|(agrees, _)| agrees)
+        };
+        assert_eq!((judged(0.5, 0.1), judged(-0.5, 0.1)), (Ok(true), Ok(false)));
+        for value in [0.0031, -0.0031, 0.0] {
+            let why = judged(value, 0.3).unwrap_err();
+            assert!(why.contains("the interval does not decide it"), "{why}");
+        }
+        assert!(judged(0.1, 0.1).is_err());
+    }
+
+    /// `take = "modulus"` of a complex number and of the one that it is compared with.
+    #[test]
+    fn a_modulus_is_taken_of_both_numbers() {
+        let answer = |pair: [f64; 2]| {
+            Arc::new(
+                Answer::of_tables(Vec::new())
+                    .with_fact("multipliers", &[pair, pair.map(|x| 2.0 * x)]),
+            )
+        };
+        let read = Read::Fact { path: "multipliers/0".into(), modulus: true };
+        let path = toml::Spanned::new(0..0, "multipliers/1".to_owned());
+        let other = read.of_the_other(Some(&path));
+        let check = Check::Ratio { read: read.clone(), other, equals: 0.25, within: 1e-12 };
+        let answers = [answer([3.0, 4.0]), answer([6.0, 8.0])];
+        assert_eq!(check.of(&answers).map(|(agrees, _)| agrees), Ok(true));
+        assert_eq!(read.of_the_other(None), read);
     }
 
     #[test]
