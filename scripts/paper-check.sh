@@ -16,7 +16,7 @@ if [ -z "$twofold" ]; then
     twofold=${CARGO_TARGET_DIR:-$here/target}/release/twofold
 fi
 # The report is wanted most when something differs.
-"$twofold" paper check "$1" --quiet
+"$twofold" paper check --quiet -- "$1"
 code=$?
-"$twofold" paper report "$1" --quiet >/dev/null || [ $code -ne 0 ] || code=$?
+"$twofold" paper report --quiet -- "$1" >/dev/null || [ $code -ne 0 ] || code=$?
 exit $code

@@ -21,6 +21,7 @@ mod page;
 pub mod words;
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::io::ErrorKind::{NotADirectory, NotFound};
 use std::ops::Range;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
@@ -376,12 +377,18 @@ impl Files {
         match self {
             Files::Disk(root) => {
                 let file = root.join(path);
-                let (Ok(whole), Ok(found)) = (root.canonicalize(), file.canonicalize()) else {
-                    if file.is_symlink() {
+                let (whole, found) = match (root.canonicalize(), file.canonicalize()) {
+                    (Ok(whole), Ok(found)) => (whole, found),
+                    (Err(source), _) | (_, Err(source))
+                        if !matches!(source.kind(), NotFound | NotADirectory) =>
+                    {
+                        return Err(FileError { action: "read", path: file, source }.into());
+                    }
+                    _ if file.is_symlink() => {
                         let why = format!("{}: a link that leads nowhere", file.display());
                         return Err(FolderError::Missing(why));
                     }
-                    return Ok(None);
+                    _ => return Ok(None),
                 };
                 if !found.starts_with(whole) {
                     return Err(FolderError::Missing(format!(
@@ -402,10 +409,11 @@ impl Files {
             Files::Disk(root) => {
                 let folder = root.join(part);
                 let ours = |name: &String| name.ends_with(".toml") && !name.starts_with('.');
-                let found: Vec<String> = record::names(&folder).into_iter().filter(ours).collect();
+                let no_folder = folder.exists() && !folder.is_dir();
+                let mut found = if no_folder { Vec::new() } else { record::names(&folder)? };
+                found.retain(ours);
                 let special = found.iter().map(|name| folder.join(name)).find(|f| !f.is_file());
-                let no_folder = (folder.exists() && !folder.is_dir()).then_some(folder);
-                if let Some(path) = special.or(no_folder) {
+                if let Some(path) = special.or(no_folder.then_some(folder)) {
                     let why = format!("{}: neither a file nor a folder of files", path.display());
                     return Err(FolderError::Missing(why));
                 }
@@ -440,7 +448,7 @@ impl Files {
     /// Refuses files of a part of the folder whose names differ in case alone.
     fn has_no_twins(&self, part: &str) -> Result<(), FolderError> {
         let Files::Disk(root) = self else { return Ok(()) };
-        let mut names = record::names(&root.join(part));
+        let mut names = record::names(&root.join(part))?;
         names.sort_by_key(|name| name.to_ascii_lowercase());
         let twins = names.windows(2).find(|pair| pair[0].eq_ignore_ascii_case(&pair[1]));
         let Some([one, other]) = twins else { return Ok(()) };

@@ -893,6 +893,69 @@ fn pipes_and_links_to_nothing_are_refused() {
     }
 }
 
+/// A folder that cannot be listed or read is not taken for an empty one. (Root reads all.)
+#[cfg(unix)]
+#[test]
+fn a_part_that_cannot_be_read_is_said() {
+    use std::os::unix::fs::PermissionsExt;
+    for (part, mode) in [("figures", 0), ("systems", 0), ("", 0o600)] {
+        let place = small();
+        let root = place.path().join("p");
+        let folder = root.join(part);
+        let allow = |mode| fs::set_permissions(&folder, fs::Permissions::from_mode(mode)).unwrap();
+        allow(mode);
+        let closed = fs::metadata(folder.join("x"))
+            .is_err_and(|e| e.kind() == std::io::ErrorKind::PermissionDenied);
+        let (code, _, said) = paper(&["check", "--quiet"], &root);
+        allow(0o700);
+        assert!(
+            !closed || code == 2 && said.contains("Permission denied"),
+            "{part}: {code} {said}"
+        );
+    }
+}
+
+/// The plain script takes a folder for one, whatever its name begins with.
+#[cfg(unix)]
+#[test]
+fn the_script_takes_a_folder_that_begins_with_a_dash() {
+    let place = small();
+    fs::rename(place.path().join("p"), place.path().join("-h")).unwrap();
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts/paper-check.sh");
+    let check = |folder: &str| {
+        let run = std::process::Command::new("sh")
+            .args([script.as_os_str(), folder.as_ref()])
+            .env("TWOFOLD", env!("CARGO_BIN_EXE_twofold"))
+            .current_dir(place.path())
+            .output()
+            .unwrap();
+        (run.status.code(), String::from_utf8(run.stdout).unwrap())
+    };
+    let (code, out) = check("-h");
+    assert!(code == Some(1) && out.contains("fig1: NEW"), "{out}");
+    assert!(place.path().join("-h/out/report.html").is_file());
+    assert_eq!(check("-x").0, Some(2));
+}
+
+/// The action's step that installs a toolchain: with the program on the path it needs none.
+#[cfg(unix)]
+#[test]
+fn the_action_installs_no_toolchain_where_the_program_is() {
+    let action =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join(".github/actions/paper-check/action.yml");
+    let text = fs::read_to_string(action).unwrap();
+    let step = text.lines().find_map(|line| line.trim().strip_prefix("run: ")).unwrap();
+    assert!(step.ends_with("rustup toolchain install"), "{step}");
+    let runs = |path: &Path| {
+        let run =
+            std::process::Command::new("/bin/sh").args(["-c", step]).env("PATH", path).output();
+        run.unwrap().status.success()
+    };
+    let nothing = tempfile::tempdir().unwrap();
+    let program = Path::new(env!("CARGO_BIN_EXE_twofold")).parent().unwrap();
+    assert!(runs(program) && !runs(nothing.path()));
+}
+
 /// Expectations are not changed if the reason cannot be kept.
 #[test]
 fn nothing_is_blessed_without_a_record() {

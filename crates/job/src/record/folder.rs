@@ -55,14 +55,23 @@ pub fn read_tree(folder: &Path, wanted: &dyn Fn(&str) -> bool) -> Result<Tree, F
     Ok(Tree { files, dangling })
 }
 
-/// Names of what is in a folder, sorted; none if it cannot be listed. Names that are not Unicode
-/// are passed over.
-pub fn names(folder: &Path) -> Vec<String> {
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut names: Vec<String> =
-        entries.filter_map(|entry| entry.file_name().into_string().ok()).collect();
+/// Names of what is in a folder, sorted; none if it does not exist. Names that are not Unicode are
+/// passed over.
+///
+/// # Errors
+/// If it cannot be listed.
+pub fn names(folder: &Path) -> Result<Vec<String>, FileError> {
+    let list = |source| FileError { action: "list", path: folder.to_path_buf(), source };
+    let entries = match fs::read_dir(folder) {
+        Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+        entries => entries.map_err(list)?,
+    };
+    let mut names = Vec::new();
+    for entry in entries {
+        names.extend(entry.map_err(list)?.file_name().into_string().ok());
+    }
     names.sort();
-    names
+    Ok(names)
 }
 
 /// The first thing in `folder`, at any depth, or itself, that is neither a file nor a folder: a
