@@ -283,11 +283,10 @@ impl Claim {
         let facts = [(&c.read, of), (&c.read, and.unwrap_or(of)), (&c.and_read, and.unwrap_or(of))];
         for (path, source) in facts {
             let Some(path) = path else { continue };
-            let name = path.get_ref().split('/').next().unwrap_or_default();
-            let facts = source.ask.facts();
-            if !facts.contains(&name) {
-                let why = format!("no answer has a fact `{name}`");
-                return Err(wrong(path.span(), why, one_of(name, facts)));
+            let modulus = c.take.as_ref().is_some_and(|take| take.get_ref() == "modulus");
+            if !source.ask.has_number(path.get_ref(), modulus) {
+                let (why, help) = no_number(source.ask, path.get_ref(), modulus);
+                return Err(wrong(path.span(), why, help));
             }
         }
         if c.decided.date.is_none() || c.decided.time.is_some() {
@@ -307,6 +306,7 @@ impl Claim {
                 }
                 _ => continue,
             };
+            let is_run = fits && source.ask == Ask::Run;
             if !fits {
                 let why = format!(
                     "`{}` asks for {}, of which there is no check of {kind}",
@@ -314,6 +314,20 @@ impl Claim {
                     source.ask.asked()
                 );
                 return Err(wrong(name.span(), why, format!("name one with {needs}")));
+            }
+            if is_run && !source.said.gives("section") {
+                let why = format!("`{}` records no crossings", name.get_ref());
+                return Err(wrong(name.span(), why, format!("give it {needs}")));
+            }
+            let states = source.question.json()["start"].as_array().map(Vec::len);
+            if is_run && states == Some(1) && !source.said.has_section_in_time() {
+                let why = format!(
+                    "`{}` is a section of a system with one state: one point, which says nothing \
+                        of its motion",
+                    name.get_ref()
+                );
+                let help = "read an orbit's period, or a column".to_owned();
+                return Err(wrong(name.span(), why, help));
             }
         }
         let asks = |source: &Source| (source.ask, source.question.json());
@@ -528,17 +542,6 @@ impl Claim {
         let own: Vec<AnyQuestion> =
             self.reads().map(|name| folder.sources[name].question.clone()).collect();
         let answers = ask(&own)?;
-        if let Check::Period { .. } | Check::Attractors { .. } = self.check {
-            for (name, answer) in self.reads().zip(&answers) {
-                let one = answer.table("section").is_some_and(|table| states(table).len() == 1);
-                if one && !folder.sources[name].said.has_section_in_time() {
-                    return Err(JobError::Other(format!(
-                        "{name}: a section of a system with one state is one point and says \
-                            nothing of its motion; read an orbit's period, or a column"
-                    )));
-                }
-            }
-        }
         let (mut agrees, mut found) = self.check.of(&answers).map_err(JobError::Other)?;
         let mut hashes: Vec<String> =
             answers.iter().map(|a| a.hash().as_str().to_owned()).collect();
@@ -611,6 +614,30 @@ fn one_of(word: &str, known: &[&str]) -> String {
         || format!("there are {}", known.join(", ")),
         |near| format!("did you mean `{near}`?"),
     )
+}
+
+/// The fault of a fact's path that leads to no number, and advice.
+fn no_number(ask: Ask, path: &str, modulus: bool) -> (String, String) {
+    fn head(path: &str) -> &str {
+        path.split('/').next().unwrap_or_default()
+    }
+    let (name, all) = (head(path), ask.numbers());
+    let mut heads: Vec<&str> = all.iter().map(|known| head(known)).collect();
+    heads.dedup();
+    if !heads.contains(&name) {
+        return (format!("no answer has a number `{name}`"), one_of(name, &heads));
+    }
+    let of_name = all.iter().filter(|known| head(known) == name);
+    let known: Vec<String> = of_name
+        .filter_map(|known| if modulus { known.strip_suffix("/0") } else { Some(known) })
+        .map(|known| known.replace('*', "N"))
+        .collect();
+    let kind = if modulus { "complex number" } else { "number" };
+    let help = match known.as_slice() {
+        [] => "leave out take".to_owned(),
+        known => format!("give {}", known.join(" or ")),
+    };
+    (format!("`{path}` is no {kind} of an answer"), help)
 }
 
 /// The number that a claim reads of its first source.

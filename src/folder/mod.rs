@@ -34,14 +34,16 @@ use crate::cli::flags::Use;
 use crate::job::spec::RunSpec;
 use crate::job::{Answer, AnyQuestion};
 use crate::paper::code::{self, Code};
-use crate::paper::draw::plot::{self, Look, PictureKind};
+use crate::paper::draw::plot::{self, Look, PictureKind, PlotError};
+use crate::paper::drawing::draft;
 use crate::paper::plots::{self, Columns, Drawing, Plot, Plots, Points, Recorded};
-use crate::paper::verdict::Claim as PanelClaim;
+use crate::paper::verdict::{Claim as PanelClaim, SectionClaim};
 use crate::paper::{Camera, Figure, FigurePanel, ParameterReading, Picture, Repeats, View};
 use crate::record::FileError;
 use crate::record::files::read_text;
 use crate::record::manifest::is_plain_name;
 use crate::record::{self, first_special};
+use crate::render::{RenderError, markup};
 use crate::system::Diagnostic;
 use crate::system::diagnostic::nearest;
 
@@ -187,7 +189,7 @@ struct ReadingFile {
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 struct FigureFile {
     /// Heading.
-    title: String,
+    title: Spanned<String>,
     /// Caption, in our words.
     caption: String,
     /// The part of the paper that it shows: "fig. 3".
@@ -215,8 +217,7 @@ struct PanelFile {
     /// "a", "i" ...
     label: Spanned<String>,
     /// A few words.
-    #[serde(default)]
-    title: String,
+    title: Option<Spanned<String>>,
     /// Kind of drawing, as for the figure [default: the figure's].
     draw: Option<Spanned<Draw>>,
     /// The run that it shows; of `draw = "columns"` nothing.
@@ -281,7 +282,60 @@ impl Draw {
     }
 }
 
+impl FigureFile {
+    /// The place of the text that cannot be set, or of the last panel if there are too many.
+    fn place_of(&self, error: &RenderError) -> Range<usize> {
+        let panels = || self.panel.iter().map(Spanned::get_ref);
+        let RenderError::Text(fault) = error else {
+            return self.panel.last().map_or(0..0, Spanned::span);
+        };
+        let is_set = |text: &str| [text, &markup::literal(text)].contains(&fault.text());
+        let names = panels().filter_map(|p| p.names.as_ref());
+        let labels = panels().filter_map(|p| p.labels.as_ref());
+        let points = panels().filter_map(|p| p.points.as_ref());
+        let mut texts = std::iter::once(&self.title)
+            .chain(panels().filter_map(|p| p.title.as_ref()))
+            .map(|text| (std::slice::from_ref(text.get_ref()), text.span()))
+            .chain(names.map(|names| (names.get_ref().as_slice(), names.span())))
+            .chain(labels.map(|labels| (labels.get_ref().as_slice(), labels.span())))
+            .chain(points.map(|p| (std::slice::from_ref(&p.get_ref().name), p.span())));
+        let found = texts.find(|(texts, _)| texts.iter().any(|text| is_set(text)));
+        found.map_or_else(|| self.title.span(), |(_, place)| place)
+    }
+}
+
 impl PanelFile {
+    fn title(&self) -> String {
+        self.title.as_ref().map(|title| title.get_ref().clone()).unwrap_or_default()
+    }
+
+    /// Refuses a claim that nothing can be compared with.
+    fn refuse_idle_claim(
+        &self,
+        origin: &Origin,
+        draw: Draw,
+        is_last: bool,
+    ) -> Result<(), FolderError> {
+        let Some(says) = &self.says else { return Ok(()) };
+        let (why, help) = match says.get_ref() {
+            PanelClaim::Section(SectionClaim::Period(0)) => {
+                ("a period is one crossing or more", "give period = 1 or more")
+            }
+            PanelClaim::Section(_) if draw != Draw::Halves => {
+                ("a claim of a section has no effect on a path", "draw it as halves")
+            }
+            PanelClaim::Section(_) => return Ok(()),
+            _ if draw != Draw::Surface => {
+                ("a claim of a path has no effect on a section", "draw it as surface")
+            }
+            _ if is_last => {
+                ("`says` has no effect on the last panel: there is no next one", "leave it out")
+            }
+            _ => return Ok(()),
+        };
+        Err(FolderError::at(origin, says.span(), why, Some(help.to_owned())))
+    }
+
     /// Refuses keys that do nothing in a panel drawn so.
     fn refuse_idle_keys(&self, origin: &Origin, draw: Draw) -> Result<(), FolderError> {
         fn at<T>(value: Option<&Spanned<T>>) -> Option<Range<usize>> {
@@ -616,14 +670,23 @@ impl Folder {
                 shown = none.iter().collect();
             }
         }
+        for name in figure.panel.iter().flat_map(|panel| panel.get_ref().r#in.keys()) {
+            known(&origin, name, readings)?;
+            if !shown.iter().any(|r| r.name == *name.get_ref()) {
+                let why =
+                    format!("`in.{}` has no effect: no picture has this reading", name.get_ref());
+                let help = "leave it out, or add it to `readings`".to_owned();
+                return Err(FolderError::at(&origin, name.span(), why, Some(help)));
+            }
+        }
         let mut pictures = Vec::new();
         for reading in shown {
-            let picture = self.picture(&origin, id, &figure, columns, (reading, readings))?;
+            let picture = self.picture(&origin, id, &figure, columns, reading)?;
             pictures.push(picture);
         }
         self.figures.push(Figure {
             id: id.to_owned().into(),
-            title: figure.title.into(),
+            title: figure.title.into_inner().into(),
             pictures,
         });
         self.shows.push(figure.shows);
@@ -637,7 +700,7 @@ impl Folder {
         id: &str,
         figure: &FigureFile,
         columns: usize,
-        (reading, readings): (&Given, &[Given]),
+        reading: &Given,
     ) -> Result<Picture, FolderError> {
         let at = if reading.name.is_empty() { String::new() } else { format!("@{}", reading.name) };
         let suffix = at.replace('@', "-");
@@ -653,7 +716,6 @@ impl Folder {
             }
             let others = figure.panel.iter().map(|p| p.get_ref().label.get_ref());
             one_file(origin, label, "panel", others)?;
-            panel.r#in.keys().try_for_each(|name| known(origin, name, readings))?;
             let Some(draw) = panel.draw.as_ref().or(figure.draw.as_ref()) else {
                 let help = "give draw, such as \"series\", in the panel or for the whole figure"
                     .to_owned();
@@ -665,6 +727,8 @@ impl Folder {
                 ));
             };
             panel.refuse_idle_keys(origin, *draw.get_ref())?;
+            let is_last = labels.len() == figure.panel.len();
+            panel.refuse_idle_claim(origin, *draw.get_ref(), is_last)?;
             let drawn = Drawn {
                 draw,
                 axes: panel.axes.as_ref().or(figure.axes.as_ref()),
@@ -684,7 +748,7 @@ impl Folder {
             let said = said.transpose()?;
             let question = if let Draw::Halves | Draw::Surface = draw.get_ref() {
                 let (spec, view) = self.spec_and_view(origin, place, said.as_ref(), &drawn)?;
-                let mut shown = FigurePanel::new(label.get_ref(), panel.title.clone(), spec);
+                let mut shown = FigurePanel::new(label.get_ref(), panel.title(), spec);
                 shown.claim = panel.says.as_ref().map(|c| *c.get_ref());
                 shown.repeats = panel
                     .repeats
@@ -740,15 +804,18 @@ impl Folder {
                 first.clone()
             }
         };
-        Ok(Picture {
+        let picture = Picture {
             name: format!("{id}{suffix}"),
             reading: if panels.is_empty() { None } else { reading.shown() },
-            title: figure.title.clone().into(),
+            title: figure.title.get_ref().clone().into(),
             caption,
             view,
             panels,
             alterations: Vec::new(),
-        })
+        };
+        draft(&picture)
+            .map_err(|e| FolderError::at(origin, figure.place_of(&e), e.to_string(), None))?;
+        Ok(picture)
     }
 
     /// A run with h, plus and minus, and the way in which a figure of such runs is drawn.
@@ -778,8 +845,10 @@ impl Folder {
         } else {
             PictureKind::Space
         };
-        let axes = plot::axes(&frame, kind, &given)
-            .map_err(|e| wrong(drawn.draw.span(), e.to_string()))?;
+        let axes = plot::axes(&frame, kind, &given).map_err(|e| match e {
+            PlotError::PathNeeded => said.complain_of("section", e.to_string()),
+            _ => wrong(drawn.draw.span(), e.to_string()),
+        })?;
         let view = match (kind, axes.as_slice(), drawn.camera) {
             (PictureKind::Section, _, Some(camera)) => {
                 return Err(wrong(camera.span(), "`camera` has no effect on a section".to_owned()));
@@ -867,7 +936,7 @@ impl Folder {
             };
             return Ok(Plot {
                 label: panel.label.get_ref().clone(),
-                title: panel.title.clone(),
+                title: panel.title(),
                 question,
                 drawing: Drawing::Columns(columns),
                 points,
@@ -901,11 +970,13 @@ impl Folder {
             }
         };
         let look = Look { kind, axes, camera, title: None };
-        plot::axes(&frame, kind, &look.axes)
-            .map_err(|e| wrong(drawn.draw.span(), e.to_string(), ""))?;
+        plot::axes(&frame, kind, &look.axes).map_err(|e| match e {
+            PlotError::PathNeeded => said.complain_of("section", e.to_string()),
+            _ => wrong(drawn.draw.span(), e.to_string(), ""),
+        })?;
         Ok(Plot {
             label: panel.label.get_ref().clone(),
-            title: panel.title.clone(),
+            title: panel.title(),
             question: recorded.question(),
             drawing: Drawing::Run(recorded.into(), look),
             points,

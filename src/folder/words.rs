@@ -71,45 +71,71 @@ impl Ask {
         }
     }
 
-    /// The facts that an answer may have, of either form of a system.
-    pub fn facts(self) -> &'static [&'static str] {
+    /// Paths of the numbers among the facts that an answer may have, of either form of a system;
+    /// `*` stands for an index. Pairs that end in 0 and 1 are complex numbers.
+    pub fn numbers(self) -> &'static [&'static str] {
         match self {
             Ask::Run => &[
                 "t",
-                "state",
-                "x",
-                "signs",
+                "state/*",
+                "x/*",
                 "steps",
                 "switches",
                 "events",
-                "stopped_by",
-                "zeno",
-                "begins",
-                "inside",
-                "history",
+                "zeno/t",
+                "zeno/error",
                 "most_steps_in_segment",
             ],
             Ask::Orbit => &[
-                "states",
-                "point",
+                "point/*",
                 "period",
-                "multipliers",
+                "multipliers/*/0",
+                "multipliers/*/1",
                 "gap",
-                "end",
+                "moved",
                 "residual",
                 "iterations",
                 "returns",
                 "rate",
-                "stability",
                 "largest_modulus",
                 "multiplier_error",
-                "rest",
+                "rest/state/*",
+                "rest/eigenvalues/*/0",
+                "rest/eigenvalues/*/1",
             ],
-            Ask::Lyapunov => {
-                &["exponent", "half_width", "sign", "exponents", "from", "to", "failure"]
-            }
-            Ask::Rests => &["rests", "states"],
+            Ask::Lyapunov => &[
+                "exponent/value",
+                "exponent/standard_error",
+                "exponent/duration",
+                "half_width",
+                "exponents/*/value",
+                "exponents/*/half_width",
+                "from",
+                "to",
+            ],
+            Ask::Rests => &[
+                "rests/*/state/*",
+                "rests/*/eigenvalues/*/0",
+                "rests/*/eigenvalues/*/1",
+                "rests/*/place/surface/weight",
+                "rests/*/place/intersection/weights/*",
+                "rests/*/family/dimension",
+                "rests/*/family/ends/*/*",
+            ],
         }
+    }
+
+    /// Whether a path may lead to a number; with `modulus` to a complex one.
+    pub fn has_number(self, path: &str, modulus: bool) -> bool {
+        let path = if modulus { format!("{path}/0") } else { path.to_owned() };
+        let leads = |known: &&str| {
+            let (known, path) = (known.split('/'), path.split('/'));
+            let is = |(known, part): (&str, &str)| {
+                if known == "*" { part.parse::<usize>().is_ok() } else { known == part }
+            };
+            known.clone().count() == path.clone().count() && known.zip(path).all(is)
+        };
+        self.numbers().iter().filter(|known| !modulus || known.ends_with("/0")).any(leads)
     }
 }
 
@@ -372,6 +398,11 @@ impl Said {
     /// An error that points at this question.
     pub fn complain(&self, why: impl Into<String>) -> FolderError {
         self.wrong(None, why, None)
+    }
+
+    /// An error that points at one of its flags.
+    pub fn complain_of(&self, flag: &str, why: impl Into<String>) -> FolderError {
+        self.wrong(Some(flag), why, None)
     }
 }
 

@@ -10,8 +10,9 @@ use twofold_job::JobError;
 use twofold_job::record::Hash;
 use twofold_job::recording::{Data, Future, Recording};
 use twofold_job::spec::Observation;
+use twofold_render::RenderError;
 use twofold_render::sheet::{
-    Anchor, Axis, ColumnWidth, DotStyle, LegendEntry, LegendKey, LineStyle, MarkerShape,
+    Anchor, Axis, ColumnWidth, Content, DotStyle, LegendEntry, LegendKey, LineStyle, MarkerShape,
     MarkerStyle, PlanePanel, Sheet, SpacePanel, range_of,
 };
 use twofold_render::style;
@@ -72,6 +73,35 @@ pub fn sheet(
 /// The drawing of a study: its own sheet, with the picture's heading and provenance.
 pub fn study_sheet(picture: &Picture, sheet: Sheet, spec: &Hash, data: &Hash) -> Sheet {
     dress(sheet, picture, spec, data)
+}
+
+/// Whether a picture can be drawn, as far as that is known before anything is computed: its texts,
+/// and the room that its panels take.
+///
+/// # Errors
+///
+/// As [`twofold_render::check`].
+pub fn draft(picture: &Picture) -> Result<(), RenderError> {
+    let nothing = Hash::of(b"");
+    if let View::Plots(plots) = &picture.view {
+        let sheet = plots.draft().map_err(RenderError::Drawing)?;
+        return twofold_render::check(&study_sheet(picture, sheet, &nothing, &nothing));
+    }
+    let axis = || Axis::linear("", 0.0, 1.0);
+    let plane = || Content::from(PlanePanel::new(axis(), axis()));
+    let sheet = Sheet::new(ColumnWidth::Wide, columns(picture), "");
+    let mut sheet = dress(sheet, picture, &nothing, &nothing);
+    for panel in &picture.panels {
+        let content = match &picture.view {
+            View::Space { .. } => SpacePanel::new(axis(), axis(), axis()).into(),
+            _ => plane(),
+        };
+        sheet = sheet.panel(label(picture, panel), panel.title.as_str(), content);
+    }
+    if let View::Section { .. } = picture.view {
+        sheet = picture.panels.iter().fold(sheet, |sheet, _| sheet.panel("", "", plane()));
+    }
+    twofold_render::check(&sheet)
 }
 
 /// Heading, description, warnings and provenance: what every picture has.

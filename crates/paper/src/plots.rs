@@ -1,6 +1,7 @@
 //! Pictures whose panels are drawn from answers of any kind, of systems of any dimension: the
 //! figures of a paper's folder.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use serde_json::json;
@@ -10,7 +11,7 @@ use twofold_job::general::GeneralRun;
 use twofold_job::record::Hash;
 use twofold_job::spec::RunSpec;
 use twofold_job::table::Cells;
-use twofold_job::{Answer, AnyQuestion, Run, Table};
+use twofold_job::{Answer, AnyQuestion, Column, Entry, Run, Table};
 use twofold_render::markup;
 use twofold_render::sheet::{
     Axis, ColumnWidth, Content, DotStyle, LegendEntry, LegendKey, LineStyle, MarkerShape,
@@ -151,14 +152,29 @@ impl Plots {
     /// # Errors
     /// The panel, and why it cannot be drawn.
     pub fn sheet(&self, answers: &[Arc<Answer>]) -> Result<Sheet, (String, String)> {
+        self.laid_out(self.plots.iter().zip(answers).map(|(plot, a)| (plot, plot.sheet(a))))
+    }
+
+    /// The drawing without data: its texts and panels, before anything is computed.
+    ///
+    /// # Errors
+    /// Why a panel cannot be drawn.
+    pub fn draft(&self) -> Result<Sheet, String> {
+        self.laid_out(self.plots.iter().map(|p| (p, p.draft()))).map_err(|(_, why)| why)
+    }
+
+    fn laid_out<'a>(
+        &self,
+        parts: impl Iterator<Item = (&'a Plot, Result<Sheet, String>)>,
+    ) -> Result<Sheet, (String, String)> {
         let width = if self.columns == 1 && self.plots.len() == 1 {
             ColumnWidth::Single
         } else {
             ColumnWidth::Wide
         };
         let mut whole = Sheet::new(width, self.columns, "");
-        for (plot, answer) in self.plots.iter().zip(answers) {
-            let part = plot.sheet(answer).map_err(|why| (plot.label.clone(), why))?;
+        for (plot, part) in parts {
+            let part = part.map_err(|why| (plot.label.clone(), why))?;
             let time = match part.panels.last().map(|p| &p.content) {
                 Some(Content::Plane(plane)) => plane.x.title.clone(),
                 _ => String::new(),
@@ -243,13 +259,44 @@ impl Plot {
     }
 
     fn sheet(&self, answer: &Answer) -> Result<Sheet, String> {
-        let mut sheet = match &self.drawing {
+        let sheet = match &self.drawing {
             Drawing::Run(recorded, look) => {
                 let frame = recorded.frame();
                 plot::sheet(&frame, answer, look, Vec::new()).map_err(|e| e.to_string())?
             }
             Drawing::Columns(columns) => columns.sheet(answer)?,
         };
+        Ok(self.with_points(sheet))
+    }
+
+    /// Its drawing of a table of two rows, without the surface h = 0.
+    fn draft(&self) -> Result<Sheet, String> {
+        let two_rows = |name: &str, columns: BTreeSet<&str>| {
+            let mut table = Table::new(name, columns.iter().map(|c| Column::numbers(c)));
+            for x in [0.0, 1.0] {
+                table.push(columns.iter().map(|_| Entry::Number(x)));
+            }
+            Answer::of_tables(vec![table])
+        };
+        let sheet = match &self.drawing {
+            Drawing::Run(recorded, look) => {
+                let frame = Frame { system: None, ..recorded.frame() };
+                let table = if frame.section.is_some() { "section" } else { "path" };
+                let states = frame.states.iter().map(|s| s.name.as_str());
+                let answer = two_rows(table, states.chain(["t"]).collect());
+                plot::sheet(&frame, &answer, look, Vec::new()).map_err(|e| e.to_string())?
+            }
+            Drawing::Columns(columns) => {
+                let names = columns.y.iter().chain([&columns.x]).map(String::as_str);
+                let table = columns.table.as_deref().unwrap_or_default();
+                columns.sheet(&two_rows(table, names.collect()))?
+            }
+        };
+        Ok(self.with_points(sheet))
+    }
+
+    /// The drawing with the paper's numbers over it.
+    fn with_points(&self, mut sheet: Sheet) -> Sheet {
         if let (Some(points), Some(Content::Plane(plane))) =
             (&self.points, sheet.panels.first_mut().map(|p| &mut p.content))
         {
@@ -266,7 +313,7 @@ impl Plot {
                 markup::literal(&points.name),
             ));
         }
-        Ok(sheet)
+        sheet
     }
 }
 
@@ -366,7 +413,7 @@ const READ_OFF: MarkerStyle =
 mod tests {
     use super::*;
     use twofold_hybrid::{Definition, Options};
-    use twofold_job::{Column, Entry, Executor};
+    use twofold_job::Executor;
 
     fn ball() -> Recorded {
         let text = "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-2']\n[[event]]\nwhen = \

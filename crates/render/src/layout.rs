@@ -32,12 +32,26 @@ struct SheetLayout {
     footer: Vec<(String, i32)>,
 }
 
+impl SheetLayout {
+    fn height_px(&self) -> u32 {
+        (self.canvas_height as u32).div_ceil(UNITS_PER_PIXEL as u32)
+    }
+}
+
+fn width_units(sheet: &Sheet) -> i32 {
+    width_px(sheet.width) as i32 * UNITS_PER_PIXEL
+}
+
+/// The height of a sheet's picture.
+pub fn height_px(sheet: &Sheet) -> u32 {
+    plan(sheet, width_units(sheet)).height_px()
+}
+
 /// Draws a sheet.
 pub fn draw(sheet: &Sheet) -> Result<Scene, RenderError> {
-    let width = width_px(sheet.width) as i32 * UNITS_PER_PIXEL;
+    let width = width_units(sheet);
     let plan = plan(sheet, width);
-    let height_px = (plan.canvas_height as u32).div_ceil(UNITS_PER_PIXEL as u32);
-    let mut scene = Scene::new(width_px(sheet.width), height_px);
+    let mut scene = Scene::new(width_px(sheet.width), plan.height_px());
     let canvas = Canvas::new(SceneBackend::new(&mut scene));
     let margin = units(style::MARGIN_PT);
     for (text, size, bold, baseline) in &plan.heading {

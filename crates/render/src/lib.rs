@@ -147,10 +147,6 @@ pub struct Rendered {
 pub fn render(sheet: &Sheet) -> Result<Rendered, RenderError> {
     check(sheet)?;
     let scene = layout::draw(sheet)?;
-    // Beyond this the rasteriser would leave out anti-aliasing.
-    if scene.height_px > 8_000 {
-        return Err(RenderError::TooLarge);
-    }
     let pixels = raster::rasterise(&scene).ok_or(RenderError::TooLarge)?;
     let title = match &sheet.title {
         Some(title) => rich_text::set(title, font::FontFace::Regular)?.plain,
@@ -188,7 +184,12 @@ fn left_out(sheet: &Sheet) -> usize {
     sheet.panels.iter().map(count).sum()
 }
 
-fn check(sheet: &Sheet) -> Result<(), RenderError> {
+/// Whether a sheet can be drawn, without drawing it.
+///
+/// # Errors
+///
+/// As [`render`].
+pub fn check(sheet: &Sheet) -> Result<(), RenderError> {
     layout::check_texts(sheet)?;
     let number = |panel: usize, what: &'static str, value: f64, good: bool| {
         if good && value.is_finite() {
@@ -241,6 +242,10 @@ fn check(sheet: &Sheet) -> Result<(), RenderError> {
             }
             sheet::Content::Blank => {}
         }
+    }
+    // Beyond this the rasteriser would leave out anti-aliasing.
+    if layout::height_px(sheet) > 8_000 {
+        return Err(RenderError::TooLarge);
     }
     Ok(())
 }

@@ -31,6 +31,15 @@ pub enum RichTextError {
     },
 }
 
+impl RichTextError {
+    /// The text.
+    pub fn text(&self) -> &str {
+        match self {
+            Self::Braces { text } | Self::Glyph { text, .. } | Self::Italic { text } => text,
+        }
+    }
+}
+
 /// Size of superscripts and subscripts relative to the text around them.
 const SCRIPT_SIZE: f64 = 0.70;
 /// Height by which a superscript is raised, relative to the size of the text around it.

@@ -171,9 +171,14 @@ pub enum PlotError {
         /// Number of the system's states.
         states: usize,
     },
-    /// A path where passages are needed, or the reverse.
-    #[error("{0}")]
-    Recording(&'static str),
+    /// A path where passages are needed.
+    #[error("a section shows crossings of a plane: record them, such as by --section y=0")]
+    SectionNeeded,
+    /// Passages where a path is needed.
+    #[error(
+        "crossings of a plane were recorded, and this picture needs the path: leave out --section"
+    )]
+    PathNeeded,
     /// The run has no table of points.
     #[error("there is no table of points in this run")]
     NoPoints,
@@ -187,6 +192,13 @@ pub fn axes(run: &Frame, kind: PictureKind, given: &[usize]) -> Result<Vec<usize
     let n = run.states.len();
     let wrong = |wanted| Err(PlotError::Axes { kind: kind.word(), wanted, given: given.len() });
     let few = |wanted| PlotError::States { kind: kind.word(), wanted, states: n };
+    match (kind, run.section) {
+        (PictureKind::Section, None) => return Err(PlotError::SectionNeeded),
+        (PictureKind::Series | PictureKind::Plane | PictureKind::Space, Some(_)) => {
+            return Err(PlotError::PathNeeded);
+        }
+        _ => {}
+    }
     let suggested = run.axes;
     let others: Vec<usize> =
         suggested.iter().copied().chain((0..n).filter(|i| !suggested.contains(i))).collect();
@@ -203,7 +215,7 @@ pub fn axes(run: &Frame, kind: PictureKind, given: &[usize]) -> Result<Vec<usize
         (PictureKind::Space, 0) if n < 3 => Err(few(3)),
         (PictureKind::Space, 0) => Ok(others[..3].to_vec()),
         (PictureKind::Section, 0) => {
-            let flat = match run.section.ok_or(SECTION_NEEDED)? {
+            let flat = match run.section.ok_or(PlotError::SectionNeeded)? {
                 Crossed::Plane(coordinate, _) => Some(coordinate),
                 Crossed::Surface(_) => None,
             };
@@ -219,13 +231,6 @@ pub fn axes(run: &Frame, kind: PictureKind, given: &[usize]) -> Result<Vec<usize
         (PictureKind::Section, _) => wrong("two axes, or one against time"),
     }
 }
-
-const SECTION_NEEDED: PlotError = PlotError::Recording(
-    "a section shows crossings of a plane: record them, such as by --section y=0",
-);
-const PATH_NEEDED: PlotError = PlotError::Recording(
-    "crossings of a plane were recorded, and this picture needs the path: leave out --section",
-);
 
 /// The drawing of a run; `small_print` stands at its foot.
 ///
@@ -301,7 +306,7 @@ impl Line {
 fn lines(answer: &Answer, run: &Frame) -> Result<Vec<Line>, PlotError> {
     let names = run.names();
     if answer.table("section").is_some() {
-        return Err(PATH_NEEDED);
+        return Err(PlotError::PathNeeded);
     }
     let columns = |table: &Table, rows: std::ops::Range<usize>| -> Vec<Vec<f64>> {
         names.iter().map(|n| table.numbers(n).get(rows.clone()).unwrap_or(&[]).to_vec()).collect()
@@ -559,8 +564,8 @@ fn section(
     answer: &Answer,
     shown: &[usize],
 ) -> Result<Sheet, PlotError> {
-    let table = answer.table("section").ok_or(SECTION_NEEDED)?;
-    let crossed = run.section.ok_or(SECTION_NEEDED)?;
+    let table = answer.table("section").ok_or(PlotError::SectionNeeded)?;
+    let crossed = run.section.ok_or(PlotError::SectionNeeded)?;
     let names = run.names();
     let t = table.numbers("t");
     let half = 0.5 * (run.times.0 + run.times.1);
