@@ -169,6 +169,11 @@ impl Folder {
         Ok(path)
     }
 
+    /// Advice about the metadata for archives, if something that they need is missing.
+    pub fn metadata_lack(&self) -> Option<String> {
+        page::crate_lacks(self)
+    }
+
     /// Compares the results with the expectation, pictures first.
     ///
     /// # Errors

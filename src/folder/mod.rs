@@ -29,6 +29,7 @@ use std::sync::Arc;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use toml::Spanned;
+use toml::value::Datetime;
 
 use crate::cli::flags::Use;
 use crate::job::spec::RunSpec;
@@ -152,8 +153,9 @@ pub struct About {
     /// Its subject, in our words, and the text from which the equations were taken.
     pub summary: String,
     /// The day on which the folder was published, for archives.
-    pub published: Option<toml::value::Datetime>,
-    /// The folder's licence for archives, by its SPDX name: "CC-BY-4.0".
+    pub published: Option<Spanned<Datetime>>,
+    /// The folder's licence for archives, by its SPDX name, "CC-BY-4.0", or several to choose from:
+    /// "MIT OR Apache-2.0".
     #[serde(default)]
     pub license: String,
     /// Questions that it leaves open.
@@ -574,6 +576,7 @@ impl Folder {
                 Some("write format = 1".into()),
             ));
         }
+        about.published.iter().try_for_each(|given| day(&origin, "published", given))?;
         let readings = readings(&origin, &about)?;
         let code = about.code.as_ref().map(|name| {
             code::named(name.get_ref()).ok_or_else(|| {
@@ -1200,6 +1203,17 @@ fn known(origin: &Origin, name: &Spanned<String>, readings: &[Given]) -> Result<
         format!("there is no reading `{}`", name.get_ref()),
         help,
     ))
+}
+
+/// Refuses a date with a time, and a time alone.
+fn day(origin: &Origin, key: &str, given: &Spanned<Datetime>) -> Result<(), FolderError> {
+    let date = given.get_ref();
+    if date.date.is_some() && date.time.is_none() {
+        return Ok(());
+    }
+    let why = format!("`{key}` is a day, and this is {date}");
+    let help = format!("give a date of TOML: {key} = 2026-11-27");
+    Err(FolderError::at(origin, given.span(), why, Some(help)))
 }
 
 /// A name that files, pages and addresses can carry as it is.

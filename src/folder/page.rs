@@ -210,10 +210,41 @@ pub fn codecheck(folder: &Folder, made: &Made<'_>) -> String {
     out
 }
 
+/// Files about the whole paper: name, what each is, format.
+const OWN: [(&str, &str, &str); 3] = [
+    ("report.html", "report", "text/html"),
+    ("claims.json", "outcomes of the claims", "application/json"),
+    ("codecheck.yml", "fields of a CODECHECK certificate", "text/yaml"),
+];
+
+/// Parts of the metadata that RO-Crate 1.1 asks for and that are missing, with the keys of
+/// `paper.toml` that give them.
+pub fn crate_lacks(folder: &Folder) -> Option<String> {
+    let about = &folder.about;
+    let lacks = [
+        about.published.is_none().then_some("datePublished (published)"),
+        about.license.is_empty().then_some("license (license)"),
+    ];
+    let lacks: Vec<&str> = lacks.into_iter().flatten().collect();
+    (!lacks.is_empty()).then(|| {
+        format!(
+            "RO-Crate 1.1 asks for {}: give it in paper.toml before an archive takes the folder",
+            lacks.join(" and ")
+        )
+    })
+}
+
 /// RO-Crate 1.1 metadata.
 pub fn crate_metadata(folder: &Folder, made: &Made<'_>) -> Vec<u8> {
     let about = &folder.about;
-    let files = files(folder, made);
+    let mut files = files(folder, made);
+    let mut pictures = made.pictures.iter();
+    for figure in &folder.figures {
+        files.extend(pictures.by_ref().take(figure.pictures.len()).map(|picture| {
+            let file = format!("{}/{}.json", figure.id, picture.hashes.name);
+            (file, Hash::of(&picture.to_json()), format!("hashes of {}", picture.title))
+        }));
+    }
     let authors: Vec<(String, &String)> = about
         .authors
         .iter()
@@ -232,9 +263,9 @@ pub fn crate_metadata(folder: &Folder, made: &Made<'_>) -> Vec<u8> {
                 recomputed", about.title),
             "description": about.summary, "citation": { "@id": "#article" },
                 "mainEntity": { "@id": "report.html" },
-            "hasPart": files.iter().map(|(file,
-                ..)| json!({ "@id": file })).chain([json!({ "@id": "report.html" }),
-                    json!({ "@id": "claims.json" })]).collect::<Vec<_>>(),
+            "hasPart": files.iter().map(|(file, ..)| file.as_str())
+                .chain(OWN.map(|(file, ..)| file))
+                .map(|file| json!({ "@id": file })).collect::<Vec<_>>(),
         }),
         json!({
             "@id": "#article", "@type": "ScholarlyArticle", "name": about.title,
@@ -246,23 +277,27 @@ pub fn crate_metadata(folder: &Folder, made: &Made<'_>) -> Vec<u8> {
             "softwareVersion": env!("CARGO_PKG_VERSION") }),
         json!({ "@id": "#computation", "@type": "CreateAction",
             "instrument": { "@id": "#software" }, "result": { "@id": "./" } }),
-        json!({ "@id": "report.html", "@type": "File", "name": "report",
-            "encodingFormat": "text/html" }),
-        json!({ "@id": "claims.json", "@type": "File", "name": "outcomes of the \
-            claims", "encodingFormat": "application/json" }),
     ];
+    graph.extend(OWN.map(|(file, name, format)| {
+        json!({ "@id": file, "@type": "File", "name": name, "encodingFormat": format })
+    }));
     graph.extend(
         authors.iter().map(|(id, name)| json!({ "@id": id, "@type": "Person", "name": name })),
     );
     // RO-Crate asks for both; they are the publisher's to give.
     if let Some(day) = &about.published {
-        graph[1]["datePublished"] = day.to_string().into();
+        graph[1]["datePublished"] = day.get_ref().to_string().into();
     }
-    if !about.license.is_empty() {
-        let id = format!("https://spdx.org/licenses/{}", about.license);
-        graph[1]["license"] = json!({ "@id": id });
-        graph.push(json!({ "@id": id, "@type": "CreativeWork", "name": about.license }));
+    let licences: Vec<&str> = about.license.split(" OR ").filter(|name| !name.is_empty()).collect();
+    let id = |name: &str| format!("https://spdx.org/licenses/{name}");
+    if !licences.is_empty() {
+        graph[1]["license"] = licences.iter().map(|name| json!({ "@id": id(name) })).collect();
     }
+    graph.extend(
+        licences
+            .iter()
+            .map(|name| json!({ "@id": id(name), "@type": "CreativeWork", "name": name })),
+    );
     graph.extend(files.iter().map(|(file, hash, title)| {
         json!({ "@id": file, "@type": "File", "name": title,
                 "sha256": hash.as_str() })

@@ -53,8 +53,8 @@ fn a_new_paper_is_made_blessed_checked_and_reported() {
     assert!(code == 0 && out.contains("fig1 (new)"), "{out}");
     let (code, out, _) = paper(&["check", "--quiet", "--fresh"], &root);
     assert!(code == 0 && out.contains("2 of 2 claims agree; all the same"), "{out}");
-    let (code, _, _) = paper(&["report", "--quiet"], &root);
-    assert_eq!(code, 0);
+    let (code, out, _) = paper(&["report", "--quiet"], &root);
+    assert!(code == 0 && out.contains("asks for datePublished (published) and license"), "{out}");
     let page = fs::read_to_string(root.join("out/report.html")).unwrap();
     assert!(page.contains("2 of 2 claims agree") && page.contains("fig1/fig1.png"), "{page}");
     let codecheck = fs::read_to_string(root.join("out/codecheck.yml")).unwrap();
@@ -62,7 +62,13 @@ fn a_new_paper_is_made_blessed_checked_and_reported() {
     let metadata: serde_json::Value =
         serde_json::from_slice(&fs::read(root.join("out/ro-crate-metadata.json")).unwrap())
             .unwrap();
-    assert!(metadata["@graph"].as_array().unwrap().iter().any(|e| e["@id"] == "fig1/fig1.svg"));
+    let graph = metadata["@graph"].as_array().unwrap();
+    for file in ["fig1/fig1.svg", "fig1/fig1.json", "codecheck.yml", "claims.json", "report.html"] {
+        assert!(graph.iter().any(|e| e["@id"] == file && e["@type"] == "File"), "{file}");
+        let parts = graph[1]["hasPart"].as_array().unwrap();
+        assert!(parts.iter().any(|part| part["@id"] == file), "{file}");
+        assert!(root.join("out").join(file).is_file(), "{file}");
+    }
     // Blessed again, nothing is written.
     let before = fs::read(root.join("expected/CHANGES.md")).unwrap();
     let (_, out, _) = paper(&["bless", "--reason", "again", "--quiet"], &root);
@@ -71,6 +77,28 @@ fn a_new_paper_is_made_blessed_checked_and_reported() {
             && fs::read(root.join("expected/CHANGES.md")).unwrap() == before,
         "{out}"
     );
+}
+
+/// Archives are told the folder's day and licences.
+#[test]
+fn metadata_have_the_day_and_the_licences() {
+    let place = small();
+    let root = place.path().join("p");
+    let given = "published = 2026-11-27\nlicense = \"MIT OR Apache-2.0\"\nauthors";
+    change(&root, "paper.toml", "authors", given);
+    let (code, out, said) = paper(&["report", "--quiet"], &root);
+    assert!(code == 0 && !out.contains("asks for"), "{out}{said}");
+    let bytes = fs::read(root.join("out/ro-crate-metadata.json")).unwrap();
+    let metadata: serde_json::Value = serde_json::from_slice(&bytes).unwrap();
+    let graph = metadata["@graph"].as_array().unwrap();
+    assert_eq!(graph[1]["datePublished"], "2026-11-27");
+    let licences: Vec<_> = graph[1]["license"].as_array().unwrap().iter().collect();
+    let wanted = ["MIT", "Apache-2.0"].map(|name| format!("https://spdx.org/licenses/{name}"));
+    assert!(licences.iter().map(|l| l["@id"].as_str().unwrap()).eq(wanted.iter()));
+    assert!(licences.iter().all(|l| graph.iter().any(|e| e["@id"] == l["@id"])));
+    change(&root, "paper.toml", "2026-11-27", "2026-11-27T10:00:00");
+    let (code, _, said) = paper(&["report", "--quiet"], &root);
+    assert!(code == 2 && said.contains("`published` is a day"), "{said}");
 }
 
 /// A paper's bytes depend neither on its place nor on the number of threads or a store.
@@ -454,7 +482,7 @@ fn what_is_wrong_in_a_folder_is_said_with_its_place() {
             "paper.toml",
             "rtol = 1e-9",
             "rtoll = 1e-9",
-            &["unknown key `rtoll`", "paper.toml:13:1", "did you mean `rtol`?"],
+            &["unknown key `rtoll`", "paper.toml:16:1", "did you mean `rtol`?"],
         ),
         ("paper.toml", "format = 1", "format = 2", &["format 2 is not known", "paper.toml:2:10"]),
         ("paper.toml", "title =", "titel =", &["unknown field `titel`", "paper.toml:3:1"]),

@@ -151,6 +151,9 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
             } else {
                 lines().try_for_each(|line| print(&line))?;
                 let page = page.map_or(String::new(), |page| format!("; {}", page.display()));
+                if let (What::Report, Some(lack)) = (what, folder.metadata_lack()) {
+                    print(&lack)?;
+                }
                 print(&format!("{score}{page}"))?;
             }
             Ok(failed)
