@@ -1,5 +1,6 @@
 //! Making, checking and blessing a paper.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -9,10 +10,10 @@ pub use super::made::{Made, Scored, outcome};
 use super::{Folder, FolderError, page};
 use crate::cli::{CliError, make};
 use crate::job::{AnyQuestion, Executor, JobError};
-use crate::paper::pipeline::questions;
-use crate::record::files::{read_text, try_folder};
-use crate::record::manifest::VERSION;
-use crate::record::{self, Manifest};
+use crate::paper::pipeline::{PictureRecord, questions};
+use crate::record::files::{digest as digest_of, read_text, try_folder};
+use crate::record::manifest::{VERSION, is_plain_name};
+use crate::record::{self, Hash, Manifest};
 
 /// The outcomes of claims, as they are kept in `expected/claims.json`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -117,7 +118,9 @@ impl Folder {
                 read.check(&answer)?;
             }
         }
+        let before = self.written()?;
         let pictures = make(&self.figures, &self.out(), executor)?;
+        self.tidy(&before, &pictures, executor)?;
         let claims = self
             .claims
             .iter()
@@ -152,6 +155,64 @@ impl Folder {
         json.push(b'\n');
         record::write(&self.out().join("claims.json"), &json)?;
         Ok(made)
+    }
+
+    /// The records of pictures in `out`, with the folders in which they stand.
+    fn written(&self) -> Result<Vec<(String, PictureRecord)>, CliError> {
+        let mut found = Vec::new();
+        for folder in record::names(&self.out())?.into_iter().filter(|name| is_plain_name(name)) {
+            let place = self.out().join(&folder);
+            let files = if place.is_dir() { record::names(&place)? } else { Vec::new() };
+            for name in files.iter().filter_map(|file| file.strip_suffix(".json")) {
+                // Another file was not written by this program.
+                let record = read_text(&place.join(format!("{name}.json")))
+                    .ok()
+                    .and_then(|text| serde_json::from_str::<PictureRecord>(&text).ok())
+                    .filter(|record| record.hashes.name == name);
+                found.extend(record.map(|record| (folder.clone(), record)));
+            }
+        }
+        Ok(found)
+    }
+
+    /// Removes the files for which records of an earlier time vouch, and which are no longer made:
+    /// those of a figure, reading or panel that is gone. Any other file stays.
+    fn tidy(
+        &self,
+        before: &[(String, PictureRecord)],
+        made: &[PictureRecord],
+        executor: &Executor<'_>,
+    ) -> Result<(), CliError> {
+        let record_of = |record: &PictureRecord| format!("{}.json", record.hashes.name);
+        // Where names that differ in case alone are one file, it is kept.
+        let place = |folder: &str, file: &str| format!("{folder}/{file}").to_ascii_lowercase();
+        let mut made = made.iter();
+        let mut kept = BTreeSet::new();
+        for figure in &self.figures {
+            for record in made.by_ref().take(figure.pictures.len()) {
+                let files = record.files().into_iter().map(|(file, _)| file);
+                kept.extend(files.chain([record_of(record)]).map(|f| place(&figure.id, &f)));
+            }
+        }
+        let of_code = self.code.map_or(Vec::new(), |code| (code.figures)());
+        let theirs = |folder: &String| of_code.iter().any(|figure| figure.id == *folder);
+        for (folder, record) in before.iter().filter(|(folder, _)| !theirs(folder)) {
+            let own = record_of(record);
+            let digest = Hash::of(&record.to_json());
+            let files = record.files().into_iter().chain([(own, &digest)]);
+            for (file, hash) in files.filter(|(file, _)| !kept.contains(&place(folder, file))) {
+                let path = self.out().join(folder).join(&file);
+                let is_ours = is_plain_name(&file)
+                    && path.symlink_metadata().is_ok_and(|m| m.is_file())
+                    && digest_of(&path).is_ok_and(|(found, _)| found == *hash);
+                if is_ours {
+                    record::files::remove(&path)?;
+                    executor.progress().line(&format!("no longer made: {}", path.display()));
+                }
+            }
+            record::files::remove_if_empty(&self.out().join(folder))?;
+        }
+        Ok(())
     }
 
     /// Writes the page about what was made, and what archives and CODECHECK take.
@@ -382,7 +443,7 @@ impl Folder {
         let wrong = |why: String| self.anew(format!("{}: {why}", path.display()));
         let outcomes: Outcomes =
             serde_json::from_str(&read_text(&path)?).map_err(|e| wrong(e.to_string()))?;
-        let mut claims = std::collections::BTreeSet::new();
+        let mut claims = BTreeSet::new();
         let twice = outcomes.verdicts.iter().find(|v| !claims.insert(&v.claim));
         match twice {
             _ if outcomes.version != 1 => {

@@ -927,6 +927,52 @@ fn what_is_expected_and_gone_is_missed_and_links_are_refused() {
     }
 }
 
+/// Files that the program wrote of a figure or panel that is gone go from `out`, and no others.
+#[test]
+fn pictures_of_figures_that_are_gone_are_removed() {
+    let place = small();
+    let root = place.path().join("p");
+    let out = |file: &str| root.join("out").join(file);
+    let make = || {
+        let (code, _, said) = paper(&["make", "--quiet"], &root);
+        assert_eq!(code, 0, "{said}");
+    };
+    fs::copy(root.join("figures/fig1.toml"), root.join("figures/fig2.toml")).unwrap();
+    fs::copy(root.join("figures/fig1.toml"), root.join("figures/fig3.toml")).unwrap();
+    make();
+    for figure in ["fig2", "fig3"] {
+        fs::remove_file(root.join(format!("figures/{figure}.toml"))).unwrap();
+    }
+    // Files of others, one of them in the place of one of ours.
+    fs::write(out("fig2/fig2.svg"), "mine").unwrap();
+    fs::write(out("fig2/notes.json"), "{}").unwrap();
+    fs::write(out("notes.txt"), "mine").unwrap();
+    let mut files = fs::read_dir(out("fig1")).unwrap().count();
+    make();
+    assert!(!out("fig3").exists());
+    let mut left: Vec<_> =
+        fs::read_dir(out("fig2")).unwrap().map(|e| e.unwrap().file_name()).collect();
+    left.sort();
+    assert_eq!(left, ["fig2.svg", "notes.json"]);
+    assert_eq!(fs::read_to_string(out("notes.txt")).unwrap(), "mine");
+    assert_eq!(fs::read_dir(out("fig1")).unwrap().count(), files);
+    // A panel of a figure that stays.
+    let text = fs::read_to_string(root.join("figures/fig1.toml")).unwrap();
+    let (first, _) = text.rsplit_once("[[panel]]").unwrap();
+    fs::write(root.join("figures/fig1.toml"), first).unwrap();
+    assert!(out("fig1/fig1-b.csv").is_file());
+    files -= fs::read_dir(out("fig1"))
+        .unwrap()
+        .filter(|e| {
+            let name = e.as_ref().unwrap().file_name().into_string().unwrap();
+            name.starts_with("fig1-b")
+        })
+        .count();
+    make();
+    assert_eq!(fs::read_dir(out("fig1")).unwrap().count(), files);
+    assert!(!out("fig1/fig1-b.csv").exists() && out("fig1/fig1-a.csv").is_file());
+}
+
 /// Titles and captions are parts of a picture: with another one it is another picture, which is
 /// said until it is blessed, with a reason.
 #[test]

@@ -423,6 +423,19 @@ pub fn remove(path: &Path) -> Result<(), FileError> {
     }
 }
 
+/// Removes a folder if nothing is in it; one that is not empty stays.
+///
+/// # Errors
+///
+/// If it is empty and cannot be removed.
+pub fn remove_if_empty(folder: &Path) -> Result<(), FileError> {
+    let keeps = [io::ErrorKind::NotFound, io::ErrorKind::DirectoryNotEmpty];
+    match fs::remove_dir(folder) {
+        Err(e) if !keeps.contains(&e.kind()) => Err(FileError::new("remove", folder)(e)),
+        _ => Ok(()),
+    }
+}
+
 /// The largest file that [`read`] reads: the largest table of a full-length figure has some 20 MB.
 pub const LARGEST: u64 = 512 << 20;
 
