@@ -115,7 +115,9 @@ pub fn paper_claims(
         pool(threads)?.install(|| {
             let mut asked = Vec::new();
             for claim in &folder.claims {
-                asked.extend(claim.questions(&folder).map_err(|e| JobError::Other(e.to_string()))?);
+                let questions = claim.questions(&folder);
+                let questions = questions.map_err(|e| JobError::Other(e.to_string()))?;
+                asked.extend(questions.into_iter().map(|(_, question)| question));
             }
             executor.gather(&asked);
             let scored = folder.claims.iter().map(|claim| match claim.judge(&folder, &executor) {

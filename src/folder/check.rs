@@ -494,15 +494,18 @@ impl Claim {
         }
     }
 
-    /// Everything that scoring it asks.
+    /// Everything that scoring it asks, and for what: a panel, a measure, or a repetition.
     ///
     /// # Errors
     /// If a repeated run cannot be asked for.
-    pub fn questions(&self, folder: &Folder) -> Result<Vec<AnyQuestion>, FolderError> {
-        let mut all: Vec<AnyQuestion> =
-            self.reads().map(|name| folder.sources[name].question.clone()).collect();
-        for repeated in self.repeated(folder)? {
-            all.extend(repeated);
+    pub fn questions(&self, folder: &Folder) -> Result<Vec<(String, AnyQuestion)>, FolderError> {
+        let own = |name: &str| (name.to_owned(), folder.sources[name].question.clone());
+        let mut all: Vec<_> = self.reads().map(own).collect();
+        let repeated = self.repeated(folder)?;
+        let runs = repeated.len();
+        for (i, questions) in repeated.into_iter().enumerate() {
+            let purpose = format!("odds of {}, run {} of {runs}", self.id, i + 1);
+            all.extend(questions.into_iter().map(|question| (purpose.clone(), question)));
         }
         Ok(all)
     }

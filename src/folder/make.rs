@@ -11,6 +11,7 @@ use super::{Folder, FolderError, page};
 use crate::cli::{CliError, make};
 use crate::job::{AnyQuestion, Executor, JobError};
 use crate::paper::pipeline::{PictureRecord, questions};
+use crate::paper::verdict;
 use crate::record::files::{digest as digest_of, read_text, try_folder};
 use crate::record::manifest::{VERSION, is_plain_name};
 use crate::record::{self, Hash, Manifest};
@@ -107,9 +108,23 @@ impl Folder {
     pub fn make(&self, executor: &Executor<'_>) -> Result<Made<'_>, CliError> {
         try_folder(&self.out())?;
         let known = self.known()?;
+        for (name, source) in &self.sources {
+            executor.asked_for(&*source.question, name.as_str());
+        }
         let mut asked: Vec<AnyQuestion> = questions(self.figures.iter().flat_map(|f| &f.pictures));
         for claim in &self.claims {
-            asked.extend(claim.questions(self)?);
+            for (purpose, question) in claim.questions(self)? {
+                executor.asked_for(&*question, purpose);
+                asked.push(question);
+            }
+        }
+        for picture in self.figures.iter().flat_map(|f| &f.pictures) {
+            for (i, panel) in picture.panels.iter().enumerate() {
+                for question in verdict::questions(picture, i) {
+                    let purpose = format!("verdict of {} ({})", picture.name, panel.label);
+                    executor.asked_for(&*question, purpose);
+                }
+            }
         }
         executor.gather(&asked);
         for read in &self.columns {

@@ -409,8 +409,14 @@ fn a_check_has_odds_from_other_starts() {
     fs::write(root.join("measures.toml"), text).unwrap();
     fs::write(root.join("systems/decay.toml"), "states = [\"x\"]\nstart = [0.1]\nf = [\"-x\"]\n")
         .unwrap();
-    let (code, out, said) = paper(&["make", "--quiet", "--json"], &root);
+    let (code, out, said) = paper(&["make", "--json"], &root);
     assert_eq!(code, 0, "{said}");
+    // Progress says for what it computes.
+    let odds = ["odds of above, run 1 of 40: ", "odds of above, run 40 of 40: "];
+    for purpose in ["fig1/a: ", "cycle: ", "end: "].iter().chain(&odds) {
+        let lines = said.lines().filter(|line| line.starts_with(purpose));
+        assert_eq!(lines.count(), 1, "{purpose}: {said}");
+    }
     let out: serde_json::Value = serde_json::from_str(&out).unwrap();
     let found = out["claims"].as_array().unwrap().iter().find(|c| c["claim"] == "above").unwrap();
     let hits = found["odds"][0].as_u64().unwrap();

@@ -65,6 +65,8 @@ pub struct Executor<'a> {
     store: Option<Store>,
     progress: &'a dyn Progress,
     answers: Mutex<HashMap<Hash, Cell>>,
+    /// For what questions are asked, as progress says it.
+    purposes: Mutex<HashMap<Hash, String>>,
 }
 
 impl Executor<'static> {
@@ -91,7 +93,7 @@ impl Ask for Executor<'_> {
 impl<'a> Executor<'a> {
     /// An executor that keeps answers in `store`, if there is one, and reports to `progress`.
     pub fn new(store: Option<Store>, progress: &'a dyn Progress) -> Self {
-        Self { store, progress, answers: Mutex::default() }
+        Self { store, progress, answers: Mutex::default(), purposes: Mutex::default() }
     }
 
     /// The display.
@@ -102,6 +104,13 @@ impl<'a> Executor<'a> {
     /// The store, if answers are kept.
     pub fn store(&self) -> Option<&Store> {
         self.store.as_ref()
+    }
+
+    /// Says for what a question is asked: a figure's panel, a claim. Progress shows the first that
+    /// was said before its label.
+    pub fn asked_for(&self, question: &dyn Question, purpose: impl Into<String>) {
+        let mut purposes = self.purposes.lock().unwrap_or_else(PoisonError::into_inner);
+        purposes.entry(key(question)).or_insert_with(|| purpose.into());
     }
 
     /// The answer to a question.
@@ -142,7 +151,10 @@ impl<'a> Executor<'a> {
                 Kept::Damaged(why) => self.progress.line(&format!("{why}; computing it again")),
             }
         }
-        let monitor = self.progress.begin(&question.label(), question.extent());
+        let purpose =
+            self.purposes.lock().unwrap_or_else(PoisonError::into_inner).get(key).cloned();
+        let label = purpose.into_iter().chain([question.label()]).collect::<Vec<_>>().join(": ");
+        let monitor = self.progress.begin(&label, question.extent());
         let answer = question.compute(self, &*monitor);
         match &answer {
             Ok(answer) => monitor.done(&said(answer)),
