@@ -34,7 +34,7 @@ pub struct ClaimFile {
     #[serde(default)]
     quote: String,
     /// The day on which the rule was fixed, as a date of TOML: 2026-11-27, without quotes.
-    decided: Datetime,
+    decided: Spanned<Datetime>,
     /// Remarks beside the outcome: what was tried, what the paper leaves open.
     #[serde(default)]
     note: String,
@@ -174,15 +174,15 @@ enum Check {
     Bifurcation { kind: String, at: f64, within: f64 },
 }
 
-/// Kinds of checks, and the keys that each takes beside `of`.
-const KINDS: [(&str, &[&str]); 7] = [
-    ("value", &["read", "column", "table", "take", "equals", "within"]),
-    ("ratio", &["read", "column", "table", "take", "equals", "within", "and", "and-read"]),
-    ("order", &["read", "column", "table", "take", "relation", "than", "and", "and-read"]),
-    ("period", &["is", "within"]),
-    ("chaos", &[]),
-    ("attractors", &["and", "same", "within"]),
-    ("bifurcation", &["kind", "at", "within"]),
+/// Kinds of checks, the keys that each needs beside `of`, and those that it may have.
+const KINDS: [(&str, &[&str], &[&str]); 7] = [
+    ("value", &["equals", "within"], &["read", "column", "table", "take"]),
+    ("ratio", &["equals", "within", "and"], &["read", "column", "table", "take", "and-read"]),
+    ("order", &["relation"], &["read", "column", "table", "take", "than", "and", "and-read"]),
+    ("period", &["is"], &["within"]),
+    ("chaos", &[], &[]),
+    ("attractors", &["and", "same"], &["within"]),
+    ("bifurcation", &["kind", "at", "within"], &[]),
 ];
 
 /// Distances in a section are compared with its extent.
@@ -247,8 +247,9 @@ impl Claim {
         let wrong = |at: Range<usize>, why: String, help: String| {
             FolderError::at(origin, at, why, (!help.is_empty()).then_some(help))
         };
-        let Some((kind, takes)) = KINDS.iter().find(|(kind, _)| kind == c.check.get_ref()) else {
-            let kinds = KINDS.map(|(kind, _)| kind);
+        let kinds = KINDS.map(|(kind, ..)| kind);
+        let Some((kind, needs, may)) = KINDS.iter().find(|(kind, ..)| kind == c.check.get_ref())
+        else {
             let given = c.check.get_ref();
             let why = format!("there is no check `{given}`");
             return Err(wrong(c.check.span(), why, one_of(given, &kinds)));
@@ -269,14 +270,21 @@ impl Claim {
             ("at", c.at.as_ref().map(Spanned::span)),
             ("and", c.and.as_ref().map(Spanned::span)),
         ];
-        if let Some((key, Some(at))) =
-            given.iter().find(|(key, at)| at.is_some() && !takes.contains(key))
+        if let Some((key, Some(at))) = given
+            .iter()
+            .find(|(key, at)| at.is_some() && ![needs, may].iter().any(|l| l.contains(key)))
         {
             return Err(wrong(
                 at.clone(),
                 format!("`{key}` has no effect on a check of {kind}"),
                 "leave it out".into(),
             ));
+        }
+        let missing = |what: &str| {
+            wrong(place.clone(), format!("a check of {kind} needs {what}"), String::new())
+        };
+        if let Some((key, _)) = given.iter().find(|(key, at)| at.is_none() && needs.contains(key)) {
+            return Err(missing(&format!("`{key}`")));
         }
         let of = known(&c.of)?;
         let and = c.and.as_ref().map(known).transpose()?;
@@ -289,13 +297,7 @@ impl Claim {
                 return Err(wrong(path.span(), why, help));
             }
         }
-        if c.decided.date.is_none() || c.decided.time.is_some() {
-            let why = format!("`decided` is a day, and this is {}", c.decided);
-            return Err(wrong(place, why, "give a date of TOML: decided = 2026-11-27".into()));
-        }
-        let missing = |what: &str| {
-            wrong(place.clone(), format!("a check of {kind} needs {what}"), String::new())
-        };
+        super::day(origin, "decided", &c.decided)?;
         let reads = [(Some(&c.of), Some(of)), (c.and.as_ref(), and)];
         for (name, source) in reads.iter().filter_map(|(name, source)| Some(((*name)?, (*source)?)))
         {
@@ -352,7 +354,7 @@ impl Claim {
                 Err(wrong(v.span(), "`within` is a finite number, 0 or more".into(), String::new()))
             }
             (None, Some(default)) => Ok(default),
-            (None, None) => Err(missing("`within`, the largest difference that still agrees")),
+            (None, None) => Err(missing("`within`")),
         };
         let check = match *kind {
             "value" => Check::Value {
@@ -361,9 +363,6 @@ impl Claim {
                 within: tolerance(None)?,
             },
             "ratio" => {
-                if c.and.is_none() {
-                    return Err(missing("`and`, the panel or measure that it is divided by"));
-                }
                 let read = reading(origin, &place, &c)?;
                 let other = read.of_the_other(c.and_read.as_ref());
                 Check::Ratio {
@@ -381,7 +380,7 @@ impl Claim {
                         let why = format!("there is no relation `{other}`");
                         return Err(wrong(at, why, "give less or greater".into()));
                     }
-                    None => return Err(missing("`relation`, less or greater")),
+                    None => return Err(missing("`relation`")),
                 };
                 let read = reading(origin, &place, &c)?;
                 let other = match (&c.and, &c.and_read, &c.than) {
@@ -410,21 +409,17 @@ impl Claim {
                             String::new(),
                         ));
                     }
-                    None => return Err(missing("`is`, the number of crossings")),
+                    None => return Err(missing("`is`")),
                 },
                 within: tolerance(Some(REPEATS))?,
             },
             "chaos" => Check::Chaos,
             "attractors" => {
-                if c.and.is_none() {
-                    return Err(missing("`and`, the other panel or measure"));
-                }
-                let same = c.same.as_ref().ok_or_else(|| missing("`same`, true or false"))?;
+                let same = c.same.as_ref().ok_or_else(|| missing("`same`"))?;
                 Check::Attractors { same: *same.get_ref(), within: tolerance(Some(ALIKE))? }
             }
             _ => {
-                let kind =
-                    c.kind.as_ref().ok_or_else(|| missing("`kind`, such as period-doubling"))?;
+                let kind = c.kind.as_ref().ok_or_else(|| missing("`kind`"))?;
                 let kinds = Change::ALL.map(Change::word);
                 if !kinds.contains(&kind.get_ref().as_str()) {
                     let why = format!("there is no bifurcation `{}`", kind.get_ref());
@@ -465,7 +460,7 @@ impl Claim {
             place: c.place,
             says: c.says,
             quote: c.quote,
-            decided: c.decided.to_string(),
+            decided: c.decided.get_ref().to_string(),
             note: c.note,
             rule,
             words,

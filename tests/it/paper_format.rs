@@ -8,6 +8,8 @@ use std::path::Path;
 use clap::{Arg, ArgAction};
 use serde_json::{Map, Value, json};
 
+use twofold::analyse::branch::Change;
+
 use super::common::schema;
 use super::reference::{Key, hold, keys, keys_tables, meaning, root, run_flags, source};
 
@@ -31,18 +33,19 @@ fn of(name: &str) -> Vec<Key> {
     keys
 }
 
-/// The kinds of checks with the keys that each takes, from the table that the reader uses.
-fn checks() -> Vec<(String, Vec<String>)> {
+/// The kinds of checks with the keys that each needs and those that it may have, from the reader's
+/// table.
+fn checks() -> Vec<[Vec<String>; 3]> {
     let text = source("src/folder/check.rs");
     let (_, body) = text.split_once("const KINDS:").unwrap();
     let (body, _) = body.split_once("\n];").unwrap();
     let quoted =
-        |line: &str| line.split('"').skip(1).step_by(2).map(str::to_owned).collect::<Vec<_>>();
+        |part: &str| part.split('"').skip(1).step_by(2).map(str::to_owned).collect::<Vec<_>>();
     let lines = body.lines().filter(|l| l.trim().starts_with("(\""));
     lines
-        .map(|l| {
-            let mut words = quoted(l);
-            (words.remove(0), words)
+        .map(|line| {
+            let parts: Vec<_> = line.split("&[").map(quoted).collect();
+            parts.try_into().expect("a kind, what it needs, what it may have")
         })
         .collect()
 }
@@ -66,10 +69,11 @@ fn keys_of_a_paper_are_as_the_page_says() {
             .replace("`and_read`", "`and-read`")
             .replace("`at_least`", "`at-least`");
     }
-    block += "### Kinds of checks\n\n| check | agrees if | takes |\n|---|---|---|\n";
-    for (kind, takes) in checks() {
-        let takes = takes.iter().map(|t| format!("`{t}`")).collect::<Vec<_>>().join(", ");
-        block += &format!("| `{kind}` | {} | {takes} |\n", about_check(&kind));
+    block += "### Kinds of checks\n\n| check | agrees if | needs | may have |\n|---|---|---|---|\n";
+    for [kind, needs, may] in checks() {
+        let [needs, may] = [needs, may]
+            .map(|keys| keys.iter().map(|key| format!("`{key}`")).collect::<Vec<_>>().join(", "));
+        block += &format!("| `{0}` | {1} | {needs} | {may} |\n", kind[0], about_check(&kind[0]));
     }
     hold("docs/paper-keys.md", &[block]);
 }
@@ -122,9 +126,11 @@ fn typed(key: &Key) -> Value {
     }
     let mut value = match inner {
         "String" => json!({ "type": "string" }),
-        "Datetime" => json!({}),
+        // A day of TOML is a text in JSON.
+        "Datetime" => json!({ "type": "string", "pattern": "^[0-9]{4}-[0-9]{2}-[0-9]{2}$" }),
         "f64" => json!({ "type": "number" }),
-        "u64" | "u32" | "u16" | "usize" => json!({ "type": "integer", "minimum": 0 }),
+        "u16" => json!({ "type": "integer", "minimum": 0, "maximum": u16::MAX }),
+        "u64" | "u32" | "usize" => json!({ "type": "integer", "minimum": 0 }),
         "bool" => json!({ "type": "boolean" }),
         "Vec<String>" | "Vec<Spanned<String>>" => {
             json!({ "type": "array", "items": { "type": "string" } })
@@ -146,13 +152,8 @@ fn typed(key: &Key) -> Value {
         "Vec<Spanned<PanelFile>>" => {
             json!({ "type": "array", "minItems": 1, "items": object("PanelFile") })
         }
-        "toml::value::Datetime" => json!({}),
-        "BTreeMap<Spanned<String>, ReadingFile>" => {
-            json!({ "type": "object", "additionalProperties": object("ReadingFile") })
-        }
-        "BTreeMap<Spanned<String>, Spanned<Words>>" => {
-            json!({ "type": "object", "additionalProperties": question("run") })
-        }
+        "BTreeMap<Spanned<String>, ReadingFile>" => named(object("ReadingFile")),
+        "BTreeMap<Spanned<String>, Spanned<Words>>" => named(question("run")),
         "PanelClaim" => json!({ "oneOf": [
             { "enum": ["less-organised-than-next", "differs-from-next"] },
             { "type": "object", "required": ["section"], "additionalProperties": false,
@@ -167,7 +168,17 @@ fn typed(key: &Key) -> Value {
         other => panic!("{}: no schema for {other}", key.name),
     };
     match key.name.as_str() {
-        "check" => value["enum"] = checks().into_iter().map(|(kind, _)| kind).collect(),
+        "check" => value["enum"] = checks().into_iter().map(|[kind, ..]| kind[0].clone()).collect(),
+        "kind" => value["enum"] = json!(Change::ALL.map(Change::word)),
+        "id" | "label" => value["pattern"] = json!(PLAIN),
+        "columns" => (value["minimum"], value["maximum"]) = (json!(1), json!(6)),
+        "within" => value["minimum"] = json!(0),
+        "is" => (value["minimum"], value["maximum"]) = (json!(1), json!(64)),
+        "starts" => (value["minimum"], value["maximum"]) = (json!(1), json!(1_000_000)),
+        "spread" => value["exclusiveMinimum"] = json!(0),
+        "at-least" => {
+            (value["exclusiveMinimum"], value["exclusiveMaximum"]) = (json!(0), json!(1));
+        }
         "relation" => value["enum"] = json!(["less", "<", "greater", ">"]),
         "take" => {
             value["enum"] =
@@ -178,6 +189,54 @@ fn typed(key: &Key) -> Value {
     }
     value["description"] = key.about.clone().into();
     value
+}
+
+/// A name that files, pages and addresses can carry.
+const PLAIN: &str = "^[A-Za-z0-9_-][A-Za-z0-9._-]{0,99}$";
+
+/// Tables under plain names.
+fn named(table: Value) -> Value {
+    json!({ "type": "object", "additionalProperties": table,
+        "propertyNames": { "pattern": PLAIN } })
+}
+
+/// A measure: one question.
+fn measure() -> Value {
+    let mut measure = object("MeasureFile");
+    (measure["minProperties"], measure["maxProperties"]) = (json!(1), json!(1));
+    measure
+}
+
+/// A claim: the keys that its check needs, and none that has no effect on it.
+fn claim() -> Value {
+    let mut claim = object("ClaimFile");
+    let checks = checks();
+    let all: Vec<&String> =
+        checks.iter().flat_map(|[_, needs, may]| needs.iter().chain(may)).collect();
+    let rule = |[kind, needs, may]: &[Vec<String>; 3]| {
+        let idle = all.iter().filter(|key| !needs.contains(key) && !may.contains(key));
+        let idle: Map<String, Value> = idle.map(|key| ((*key).clone(), json!(false))).collect();
+        let mut then = json!({ "required": needs, "properties": idle });
+        if may.iter().any(|key| key == "read") {
+            // A fact, or a quantity of a column.
+            then["oneOf"] = json!([
+                { "required": ["read"], "properties": { "column": false, "table": false,
+                    "take": { "const": "modulus" } } },
+                { "required": ["column", "take"], "properties": { "read": false, "take": { "enum":
+                    ["last", "first", "max", "min", "mean", "span", "count"] } } },
+            ]);
+        }
+        if may.iter().any(|key| key == "than") {
+            then["anyOf"] = json!([
+                { "required": ["than"], "properties": { "and": false, "and-read": false } },
+                { "required": ["and"], "properties": { "than": false } },
+            ]);
+        }
+        json!({ "if": { "properties": { "check": { "const": kind[0] } }, "required": ["check"] },
+            "then": then })
+    };
+    claim["allOf"] = checks.iter().map(rule).collect();
+    claim
 }
 
 fn object(name: &str) -> Value {
@@ -193,10 +252,10 @@ fn schema_of(file: &str) -> Value {
     let mut schema = match file {
         "paper" => object("About"),
         "figure" => object("FigureFile"),
-        "measures" => json!({ "type": "object", "additionalProperties": object("MeasureFile") }),
+        "measures" => named(measure()),
         "claims" => json!({
             "type": "object", "additionalProperties": false,
-            "properties": { "claim": { "type": "array", "items": object("ClaimFile") } },
+            "properties": { "claim": { "type": "array", "items": claim() } },
         }),
         other => panic!("no schema {other}"),
     };
@@ -268,11 +327,49 @@ fn papers_follow_the_schemas() {
     }
 }
 
-/// A schema and its reader refuse the same: unknown keys, keys that are missing, values of another
-/// type.
+/// A schema and its reader refuse the same: unknown keys, keys that are missing or have no effect,
+/// values of another type or out of their range. (A day as a text is the same in JSON.)
 #[test]
 fn a_schema_and_its_reader_refuse_the_same() {
-    let changes: [(&str, &str, &str, &str); 8] = [
+    let changes: [(&str, &str, &str, &str); 31] = [
+        ("paper.toml", "paper", "year = 2026", "year = 70000"),
+        ("paper.toml", "paper", "year = 2026", "year = 2026\npublished = 10:00:00"),
+        ("paper.toml", "paper", "[run]", "[readings.\"a b\"]\nabout = \"\"\n[run]"),
+        ("figures/fig1.toml", "figure", "columns = 1", "columns = 0"),
+        ("figures/fig1.toml", "figure", "columns = 1", "columns = 7"),
+        ("figures/fig1.toml", "figure", "label = \"b\"", "label = \"b c\""),
+        ("figures/fig1.toml", "figure", "label = \"b\"", "label = \".b\""),
+        ("measures.toml", "measures", "[narrow-cycle]", "[\"narrow cycle\"]"),
+        ("measures.toml", "measures", "[cycle]", "[none]\n[cycle]"),
+        ("measures.toml", "measures", "[cycle]", "[cycle]\nrests = {}"),
+        ("claims.toml", "claims", "id = \"period\"", "id = \"a/b\""),
+        ("claims.toml", "claims", "within = 1e-6", "within = -1"),
+        ("claims.toml", "claims", "within = 1e-6", "within = 1e-6\nis = 3"),
+        ("claims.toml", "claims", "within = 1e-6", ""),
+        ("claims.toml", "claims", "decided = 2026-11-26", "decided = 2026-11-26T10:00:00"),
+        ("claims.toml", "claims", "read = \"period\"", ""),
+        ("claims.toml", "claims", "read = \"period\"", "read = \"period\"\ntake = \"last\""),
+        ("claims.toml", "claims", "relation = \"less\"", "relation = \"less\"\nthan = 3"),
+        ("claims.toml", "claims", "and = \"cycle\"", ""),
+        ("claims.toml", "claims", "relation = \"less\"", ""),
+        (
+            "claims.toml",
+            "claims",
+            "within = 1e-6",
+            "within = 1e-6\nodds = { starts = 0, spread = 1 }",
+        ),
+        (
+            "claims.toml",
+            "claims",
+            "within = 1e-6",
+            "within = 1e-6\nodds = { starts = 9, spread = 0 }",
+        ),
+        (
+            "claims.toml",
+            "claims",
+            "within = 1e-6",
+            "within = 1e-6\nodds = { starts = 9, spread = 1, at-least = 1 }",
+        ),
         ("paper.toml", "paper", "year = 2026", "year = \"2026\""),
         ("paper.toml", "paper", "authors =", "author ="),
         ("paper.toml", "paper", "rtol = 1e-9", "rtoll = 1e-9"),

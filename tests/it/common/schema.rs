@@ -54,6 +54,8 @@ fn check(root: &Value, rule: &Value, value: &Value, at: &str, found: &mut Vec<St
             "type" => is_of(limit, value),
             "const" => value == limit,
             "enum" => limit.as_array().unwrap().contains(value),
+            "exclusiveMinimum" => number.is_none_or(|x| x > limit.as_f64().unwrap()),
+            "exclusiveMaximum" => number.is_none_or(|x| x < limit.as_f64().unwrap()),
             "minimum" => number.is_none_or(|x| x >= limit.as_f64().unwrap()),
             "maximum" => number.is_none_or(|x| x <= limit.as_f64().unwrap()),
             "minItems" => count(limit).is_none_or(|(n, least)| n >= least),
@@ -62,6 +64,27 @@ fn check(root: &Value, rule: &Value, value: &Value, at: &str, found: &mut Vec<St
                 let pattern = Regex::new(limit.as_str().unwrap()).unwrap();
                 value.as_str().is_none_or(|text| pattern.is_match(text))
             }
+            "minProperties" => members.is_none_or(|m| m.len() as u64 >= limit.as_u64().unwrap()),
+            "maxProperties" => members.is_none_or(|m| m.len() as u64 <= limit.as_u64().unwrap()),
+            "propertyNames" => {
+                for name in members.into_iter().flat_map(|m| m.keys()) {
+                    check(root, limit, &Value::from(name.as_str()), &format!("{at}/{name}"), found);
+                }
+                true
+            }
+            "allOf" => {
+                for rule in limit.as_array().unwrap() {
+                    check(root, rule, value, at, found);
+                }
+                true
+            }
+            "if" => {
+                if holds(limit) {
+                    check(root, &rule["then"], value, at, found);
+                }
+                true
+            }
+            "then" => keywords.contains_key("if"),
             "anyOf" => limit.as_array().unwrap().iter().any(holds),
             "oneOf" => limit.as_array().unwrap().iter().filter(|rule| holds(rule)).count() == 1,
             "items" => {
