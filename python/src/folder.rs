@@ -132,7 +132,7 @@ pub fn paper_claims(
     })
 }
 
-/// What panels say of themselves, as a JSON list.
+/// Verdicts on what panels say of themselves, as a JSON list.
 #[pyfunction]
 #[pyo3(signature = (folder, threads, keep, show=None))]
 pub fn paper_verdicts(

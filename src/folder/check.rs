@@ -1259,7 +1259,7 @@ mod tests {
         assert_eq!(apart(&points(&|_| 1.0), &points(&|_| 2.0)), 0.5);
         let noisy = |i: f64| 1.0 + 1e-4 * (i * i).sin();
         assert!(apart(&points(&|_| 1.0), &points(&noisy)) < 1e-3);
-        // What shrinks is on its way, and its extent no measure.
+        // A state that shrinks is on its way, and its extent no measure.
         let on_its_way = |way: f64| points(&|i| way * (-0.05 * i).exp() * i.cos());
         assert!(apart(&on_its_way(10.0), &on_its_way(4.0)) < 0.01);
         assert_eq!(period(&points(&|_| 1.0), 1e-6), Some(2));

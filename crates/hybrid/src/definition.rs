@@ -230,8 +230,8 @@ pub struct TableEntry {
     pub time: String,
     /// The name of its column of values.
     pub column: String,
-    /// Interpolation between its rows: `previous` value, `linear` (the default), `cubic` spline (not
-    /// a knot at the ends), or `pchip`, which overshoots nowhere.
+    /// Interpolation between its rows: `previous` value, `linear` (the default), `cubic` spline
+    /// (not a knot at the ends), or `pchip`, which overshoots nowhere.
     #[serde(default)]
     pub interpolation: Interpolation,
 }

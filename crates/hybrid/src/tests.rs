@@ -773,8 +773,8 @@ fn a_timer_that_stops_at_zero_runs_out_once() {
     }
 }
 
-/// How functions of one zero depend on each other is seen beside a clock, whose jumps are no part
-/// of it, however long the run is; and a clock may end the sliding on them.
+/// Functions of one zero are seen to depend on each other beside a clock, whose jumps are no part
+/// of that, however long the run is; and a clock may end the sliding on them.
 #[test]
 fn clocks_beside_functions_of_one_zero() {
     let windup = "states = ['x', 'z']\nstart = [0, 0]\nf = ['-x + clip(u, -1, 1)', 'if(abs(u) > 1 \

@@ -589,8 +589,8 @@ mod tests {
     /// Motion that drifts for ever is on no orbit, however far away what it drifts by is rounding.
     #[test]
     fn a_drift_is_no_closed_orbit() {
-        let forced = "states = ['x1', 'v1', 'x2', 'v2']\nstart = [0, 0, 0, 0]\nf = ['v1', 'cos(t) - \
-            (x1 - x2) - 0.1*(v1 - v2) + 0.1', 'v2', 'x1 - x2 + 0.1*(v1 - v2) - 0.2*v2']";
+        let forced = "states = ['x1', 'v1', 'x2', 'v2']\nstart = [0, 0, 0, 0]\nf = ['v1', 'cos(t) \
+            - (x1 - x2) - 0.1*(v1 - v2) + 0.1', 'v2', 'x1 - x2 + 0.1*(v1 - v2) - 0.2*v2']";
         let driven = "states = ['p', 'q', 'x1', 'v1', 'x2', 'v2']\nstart = [1, 0, 0, 0, 0, 0]\nf = \
             ['q', '(1 - p^2)*q - p', 'v1', 'p - (x1 - x2) - 0.3*(v1 - v2) - if(v1 > 0, 0.1, \
             0.5)*v1', 'v2', '-p + (x1 - x2) + 0.3*(v1 - v2) - if(v2 > 0, 0.1, 0.5)*v2']";

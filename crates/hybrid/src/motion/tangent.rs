@@ -1177,8 +1177,8 @@ pub fn closed_orbit(
         let gap: Vec<f64> = end.iter().zip(&x).map(|(e, x)| e - x).collect();
         let largest = gap.iter().fold(0.0_f64, |most, gap| most.max(gap.abs()));
         let of_size = largest / size.max(f64::MIN_POSITIVE);
-        // What drifts is not closed because it has come far: each state comes back to a share of
-        // its way, or to rounding of what states were at first.
+        // Motion that drifts is not closed because it has come far: each state comes back to a
+        // share of its way, or to rounding of what states were at first.
         if usual.is_nan() {
             usual = size;
         }
