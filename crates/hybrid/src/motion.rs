@@ -732,6 +732,10 @@ pub fn follow_to_rest(
 const FORGET_BELOW: f64 = 1e-3;
 const FORGET_BY: f64 = 0.1;
 
+/// So many meetings on end in which no time passes are rounding in steps that are too short; twice
+/// as many are none.
+const LONG_QUIET: u32 = 20;
+
 /// Steps between two words on the time reached.
 const STEPS_BETWEEN_WORDS: u64 = 64;
 
@@ -1276,7 +1280,9 @@ impl<'a> Follower<'a> {
                 // If switches or events are frequent, a step is about as long as the time between
                 // them.
                 let between = std::mem::replace(&mut last_met, self.t);
-                h_next.max(h).min(1.5 * (self.t - between).max(f64::EPSILON * self.t.abs()))
+                let between = 1.5 * (self.t - between).max(f64::EPSILON * self.t.abs());
+                // Steps in which nothing is told from rounding grow at last.
+                if quiet < LONG_QUIET { h_next.max(h).min(between) } else { h_next.max(h) }
             } else {
                 h_next
             };
@@ -1295,7 +1301,7 @@ impl<'a> Follower<'a> {
                 self.place_contacts();
             }
             quiet = if progress { 0 } else { quiet + 1 };
-            if quiet > 40 {
+            if quiet > 2 * LONG_QUIET {
                 let why = "the same surface is met again and again without time passing: the \
                     motion there is not resolved; smooth the switch, or describe what holds there \
                     by an [[event]]"

@@ -803,6 +803,32 @@ fn clocks_beside_functions_of_one_zero() {
     }
 }
 
+/// A controller that stops its integrator at the limit: sliding on the limit is left without a
+/// speed, and a collocation polynomial's own slope there is none.
+#[test]
+fn sliding_is_left_along_the_limit_of_a_controller() {
+    let text = |kp: f64, ki: f64, um: f64, reference: f64| {
+        format!(
+            "states = ['x', 'y', 'z']\nstart = [0, 0, 0]\nf = ['y', 'clip(u, -{um}, {um}) - y - \
+                0.2*x', 'if(abs(u) > {um} and e*u > 0, 0, {ki}*e)']\n[let]\ne = '{reference} - x'\n\
+                u = '{kp}*e + z'"
+        )
+    };
+    for [kp, ki, um, reference] in [
+        [1.0091501284064197, 2.7072770469927936, 1.0505577989085282, 0.8106713009474],
+        [2.031743419048358, 2.9649133748233862, 0.6686689301569766, 0.8036921194258533],
+        [1.3, 2.0, 0.8, 0.9],
+    ] {
+        let model = model(&text(kp, ki, um, reference));
+        let [d, r, l] = [Method::Dopri5, Method::Radau5, Method::Lsoda].map(|method| {
+            let options = Options { t_end: 25.0, method, ..Options::default() };
+            follow(&model, &options, &mut |_| true).unwrap().x
+        });
+        d.iter().zip(&r).for_each(|(d, r)| near(*d, *r, 1e-7));
+        d.iter().zip(&l).for_each(|(d, l)| near(*d, *l, 1e-7));
+    }
+}
+
 /// A relay behind a lag: z = 0 is crossed ever more often, exp(t) times, and never for the last.
 #[test]
 fn chatter_that_decays_is_told() {

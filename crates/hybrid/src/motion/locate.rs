@@ -170,9 +170,16 @@ impl Follower<'_> {
             return None;
         }
         let place = self.place_of(sought)?;
-        let terms = self.rates(&self.config.clone()).1.terms;
-        let slope = SMALLEST_SLOPE * terms[place].max(self.left(sought));
-        (tangent || change.abs() <= h * slope).then_some(side * (side * change).min(0.0))
+        let rates = self.rates(&self.config.clone()).1;
+        let slope = SMALLEST_SLOPE * rates.terms[place].max(self.left(sought));
+        // A collocation polynomial's slope at its beginning is not the field's.
+        let of_field = fresh
+            && self.options.method == Method::Radau5
+            && self.sliding.is_empty()
+            && self.contacts.is_empty();
+        let leads_away = of_field && rates.first[place] * side > 0.0;
+        let is_error = tangent || leads_away || change.abs() <= h * slope;
+        is_error.then_some(side * (side * change).min(0.0))
     }
 
     /// The place in a step of this length where a flight that rounding hides ends, as its parabola
