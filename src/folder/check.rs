@@ -1117,14 +1117,15 @@ fn apart(sets: [&[Vec<f64>]; 2], both_ways: [&[Vec<f64>]; 2]) -> Result<f64, Str
     let most = |of: &dyn Fn(&Extents) -> f64| extents.iter().map(of).fold(0.0, f64::max);
     let size = most(&|e| e.size).max(f64::MIN_POSITIVE);
     let span = most(&|e| e.span);
-    let whole = if span > ERRORS * size { span } else { size };
+    let moves = span > ERRORS * size;
+    let whole = if moves { span } else { size };
     // A state that moves little beside the others, and goes on to, is measured by its own extent;
     // one that does not move, by its size.
     let own = |i: usize| {
         let span = most(&|e| e.spans[i]);
         let size_of = |p: &Vec<f64>| p[i].abs();
         let all = both_ways.iter().flat_map(|points| points.iter().map(size_of));
-        if span > ONE_POINT * size { span } else { all.fold(0.0, f64::max) }
+        if moves && span > ONE_POINT * size { span } else { all.fold(0.0, f64::max) }
     };
     let goes_on = |i: usize| {
         both_ways.iter().all(|points| {
