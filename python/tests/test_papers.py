@@ -36,7 +36,7 @@ def test_claims_are_the_commands(program, folder):
 
 def test_what_cannot_be_scored_is_said(folder):
     file = folder / "claims.toml"
-    file.write_text(file.read_text().replace('read = "period"', 'read = "period/0"', 1))
+    file.write_text(file.read_text().replace('read = "period"', 'read = "point/7"', 1))
     claims = twofold.Paper(folder, keep=False).claims()
     assert claims[0].agrees is None and "there is no" in claims[0].found
     assert claims[1].agrees is True

@@ -15,6 +15,7 @@ __all__ = [
     "paper",
     "paper_answer",
     "paper_claims",
+    "paper_verdicts",
     "panels",
     "verdict_table",
     "Definition",
