@@ -210,19 +210,22 @@ fn words_that_change_after_their_data_are_said_to() {
     assert!(page.contains("its words changed when its data were known"), "{page}");
 }
 
+/// Whether a claim that is made now has a rule that came after its data.
+fn rule_after_data(root: &Path, claim: &str) -> bool {
+    let (code, out, said) = paper(&["make", "--quiet", "--json"], root);
+    assert_eq!(code, 0, "{said}");
+    let all: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let claims = all["claims"].as_array().unwrap();
+    let found = claims.iter().find(|c| c["claim"] == claim).expect(claim);
+    found["rule_after_data"].as_bool().unwrap()
+}
+
 /// So it is of a claim that is renamed, of other odds, and before anything is expected.
 #[test]
 fn a_rule_that_changes_is_seen_by_its_data() {
     let place = small();
     let root = place.path().join("p");
-    let after = |claim: &str| {
-        let (code, out, said) = paper(&["make", "--quiet", "--json"], &root);
-        assert_eq!(code, 0, "{said}");
-        let all: serde_json::Value = serde_json::from_str(&out).unwrap();
-        let claims = all["claims"].as_array().unwrap();
-        let found = claims.iter().find(|c| c["claim"] == claim).expect(claim);
-        found["rule_after_data"].as_bool().unwrap()
-    };
+    let after = |claim: &str| rule_after_data(&root, claim);
     assert!(!after("period"));
     change(&root, "claims.toml", "within = 1e-6", "within = 1e-3");
     assert!(after("period"));
@@ -250,14 +253,7 @@ fn a_rule_that_changes_is_seen_by_its_data() {
 fn a_rule_after_its_data_stays_one() {
     let place = small();
     let root = place.path().join("p");
-    let made = |claim: &str| {
-        let (code, out, said) = paper(&["make", "--quiet", "--json"], &root);
-        assert_eq!(code, 0, "{said}");
-        let all: serde_json::Value = serde_json::from_str(&out).unwrap();
-        let claims = all["claims"].as_array().unwrap();
-        let found = claims.iter().find(|c| c["claim"] == claim).expect(claim);
-        found["rule_after_data"].as_bool().unwrap()
-    };
+    let made = |claim: &str| rule_after_data(&root, claim);
     assert_eq!(paper(&["bless", "--reason", "first", "--quiet"], &root).0, 0);
     // Other data, made once, and then a rule for them.
     let system = "systems/relay.toml";
