@@ -35,14 +35,14 @@ papers: ## make and check every paper under papers/
 		$(RUN) --bin twofold -- paper report --quiet "$$(dirname "$$p")" && $(RUN) --bin twofold -- paper check --quiet "$$(dirname "$$p")" || exit 1; \
 	done
 
-# With the programs of `make figures`; of the tests themselves most of the time is the compiler's, so they are not optimised.
+# With the programs of `make figures`. Optimised, the tests themselves would take the compiler three minutes and not half of one.
 UNOPTIMISED := -C opt-level=0 -C codegen-units=16
-test: ## the tests of the whole program: figures and their hashes, commands, files, papers
+test: ## the tests of the whole program: figures and their hashes, commands, files, papers; some of them: make test TESTS=papers::
 	@it=$$($(CARGO) rustc --release --locked --test it --message-format json-render-diagnostics -- $(UNOPTIMISED) \
 	| sed -n 's|.*"executable":"\([^"]*/it-[^"]*\)".*|\1|p'); [ -n "$$it" ] && "$$it" $(TESTS)
 
 # In the debug profile, where an overflow is an error and every byte is the same.
-test-all: test ## also the tests of every crate by itself and of the documentation, and the figures' hashes, all unoptimised
+test-all: test ## also the tests of every crate by itself and of the documentation, and the figures' hashes, in the debug profile
 	@$(CARGO) test --locked --lib --bins --examples
 	@$(CARGO) test --locked --doc
 	@$(CARGO) test --locked --test it -- golden::
@@ -135,7 +135,7 @@ sbom: ## what the program links, with versions, licences and checksums (CycloneD
 
 .PHONY: prose reference schemas
 reference: ## write the generated pages of docs/ anew: flags, columns, keys, exit codes, messages
-	@TWOFOLD_UPDATE=1 $(CARGO) test --release --locked --quiet --test it -- reference:: paper_format::
+	@TWOFOLD_UPDATE=1 $(MAKE) --no-print-directory test TESTS="reference:: paper_format::"
 
 schemas: ## papers' folders and the report against their schemas by a full validator (downloads one)
 	@sh scripts/schemas.sh

@@ -1094,10 +1094,10 @@ impl<'a> Follower<'a> {
                     && pace.reach(steps, self.t, self.options.max_steps) < self.options.t_end
                 {
                     let why = format!(
-                        "switches or events follow each other ever faster ({steps} steps so far, \
-                        and the end would take more than --max-steps allows): in the limit the \
-                        motion stays where they meet. End the run before (--t-end), or write a \
-                        smooth function for the switch, as tanh(u/1e-3) for sign(u)"
+                        "switches or events follow each other ever faster, as chatter that decays \
+                        ({steps} steps so far; if it goes on so, the end takes more than \
+                        --max-steps allows). End the run before (--t-end), or write a smooth \
+                        function for the switch, as tanh(u/1e-3) for sign(u)"
                     );
                     return Err(HybridError::Stuck { t: self.t, x: self.x.clone(), why });
                 }

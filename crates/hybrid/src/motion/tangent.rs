@@ -1087,8 +1087,8 @@ const POINT: f64 = 1e-3;
 /// which Newton's method ends.
 const CLOSED: f64 = 1e-8;
 const WELL_CLOSED: f64 = 1e-11;
-/// Such an orbit's gaps in units of each state's way and of the states' largest size, of which this
-/// many times that of the search's first turn counts.
+/// Largest gaps of an orbit that is well closed, of each state's way and of the states' largest
+/// size; a size counts up to `OFF` times that on the search's first turn.
 const OF_WAY: f64 = 1e-6;
 const OF_SIZE: f64 = 1e-12;
 const OFF: f64 = 100.0;
