@@ -6,6 +6,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
+use crate::wheel::Wheel;
 use nalgebra::{SVector, vector};
 use twofold::analyse::divider::Shared;
 use twofold::analyse::{Crossing, Direction};
@@ -26,7 +27,7 @@ use twofold::record::Manifest;
 use twofold::system::filippov::{normal_form_constants, two_fold};
 use twofold::system::{
     Caricature, Hysteretic, PiecewiseSmooth, Relaxation, Reversed, Smoothed, Transition,
-    VectorField, Wheel,
+    VectorField,
 };
 
 /// The quantities that a test measures. Every one of them must have been read when it is dropped.

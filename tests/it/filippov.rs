@@ -5,13 +5,14 @@ use nalgebra::{SVector, vector};
 use std::ops::ControlFlow;
 
 use crate::claims::Reads;
+use crate::wheel::Wheel;
 use twofold::integrate::filippov::two_fold::SlidingAtTwoFold;
 use twofold::integrate::filippov::{
     EventKind, ExitRule, FilippovError, FilippovOptions, FunnelGrid, Mode, Side, SlidingLaw,
     Trajectory, connect, funnel, history, run, run_watched,
 };
 use twofold::integrate::{Monitor, StopReason, Tolerance};
-use twofold::system::{Bound, Caricature, PiecewiseSmooth, System, Wheel};
+use twofold::system::{Bound, Caricature, PiecewiseSmooth, System};
 
 /// A built-in system with these parameters.
 fn builtin<const N: usize>(name: &str, parameters: &[(&str, f64)]) -> Bound<N> {

@@ -1,6 +1,7 @@
 //! Systems as data against the same systems as compiled Rust: bit for bit, in every arithmetic, at
 //! random points and along orbits.
 
+use crate::wheel::Wheel;
 use nalgebra::SVector;
 use proptest::prelude::*;
 use twofold::analyse::tangent::Tangent;
@@ -13,8 +14,8 @@ use twofold::num::series::{Constants, Solution};
 use twofold::num::{Arithmetic, DoubleDouble, Dual, Elementary, Tape};
 use twofold::system::caricature::MinusSign;
 use twofold::system::{
-    Caricature, Compiled, Field, Hysteretic, PiecewiseSmooth, Relaxation, Smoothed, System,
-    Transition, VectorField, Wheel,
+    Caricature, Field, Hysteretic, PiecewiseSmooth, Relaxation, Smoothed, System, Transition,
+    VectorField,
 };
 
 /// All bits of a number; both zeros of a derivative or low part count as one, because a record
@@ -129,7 +130,7 @@ proptest! {
             let record = System::from(c).bind::<3>().unwrap();
             everywhere(x, &mut |check| check(&mut Pieces(&c, &record)));
         }
-        let record = System::from(wheel).bind::<3>().unwrap();
+        let record = wheel.system().bind::<3>().unwrap();
         everywhere(x, &mut |check| check(&mut Pieces(&wheel, &record)));
     }
 
@@ -144,7 +145,7 @@ proptest! {
                 everywhere(x, &mut |check| check(&mut Whole(&compiled, &record)));
             }
             let compiled = Smoothed { system: Wheel::default(), transition, eps: 1e-3 };
-            let record = Field::smoothed(&System::from(Wheel::default()), transition,
+            let record = Field::smoothed(&Wheel::default().system(), transition,
                 1e-3).bind::<3>().unwrap();
             everywhere(x, &mut |check| check(&mut Whole(&compiled, &record)));
         }
@@ -260,8 +261,7 @@ fn whole_orbits_are_the_same() {
     assert_eq!(orbit(&compiled, start, 50.0, extended()), orbit(&record, start, 50.0, extended()));
 
     let wheel = Smoothed { system: Wheel::default(), transition, eps: 1e-3 };
-    let record =
-        Field::smoothed(&System::from(Wheel::default()), transition, 1e-3).bind::<3>().unwrap();
+    let record = Field::smoothed(&Wheel::default().system(), transition, 1e-3).bind::<3>().unwrap();
     let start = [0.69267, 0.0, 0.0];
     assert_eq!(orbit(&wheel, start, 20.0, dopri5()), orbit(&record, start, 20.0, dopri5()));
     assert_eq!(
@@ -305,8 +305,7 @@ fn filippov_motions_are_the_same() {
 fn the_fast_path_is_found_by_equations_not_by_name() {
     let system = System::from(caricature()).with("alpha", 0.25).unwrap();
     let want = Caricature { alpha: 0.25, ..caricature() };
-    assert_eq!(system.compiled(), Some(Compiled::Caricature(want)));
-    assert_eq!(System::from(Wheel::default()).compiled(), Some(Compiled::Wheel(Wheel::default())));
+    assert_eq!(system.compiled(), Some(want));
     assert_eq!(System::builtin("stick-slip").unwrap().compiled(), None);
     // The same equations under another name, and other equations under the same name.
     let renamed = twofold::system::library::text("caricature")

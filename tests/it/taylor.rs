@@ -1,15 +1,14 @@
 //! The project's own ground truth: Taylor series in double-double arithmetic, against crossings
 //! computed in 113-bit arithmetic outside this project (crates/verify/data/crossings-*.csv).
 
+use crate::wheel::Wheel;
 use nalgebra::{SVector, vector};
 use twofold::analyse::Direction;
 use twofold::analyse::digits::{Agreement, agreement};
 use twofold::analyse::reference::{ExtendedCrossing, SectionPlane, reference};
 use twofold::integrate::*;
 use twofold::num::{Arithmetic, DoubleDouble, Scalar};
-use twofold::system::{
-    Caricature, Hysteretic, Relaxation, Smoothed, Transition, VectorField, Wheel,
-};
+use twofold::system::{Caricature, Hysteretic, Relaxation, Smoothed, Transition, VectorField};
 
 struct Row {
     t: f64,

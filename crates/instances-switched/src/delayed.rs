@@ -5,7 +5,7 @@ use twofold_analyse::late_lyapunov::late_estimate;
 use twofold_analyse::lyapunov::{Estimate, LyapunovOptions};
 use twofold_integrate::delay::{DelayError, Delayed, LateSwitch, Own, Sides};
 use twofold_integrate::{Failure, Monitor, Observer, Summary};
-use twofold_system::{BindError, Bound, Caricature, Compiled, PiecewiseSmooth, System};
+use twofold_system::{BindError, Bound, Caricature, PiecewiseSmooth, System};
 
 use twofold_instances::{How, Waiting};
 
@@ -100,7 +100,7 @@ late! {
 /// If it has not three.
 pub fn late(system: &System) -> Result<Box<dyn Late<3>>, BindError> {
     Ok(match system.compiled() {
-        Some(Compiled::Caricature(system)) => Box::new(system),
+        Some(system) => Box::new(system),
         _ => Box::new(system.bind::<3>()?),
     })
 }

@@ -11,7 +11,7 @@ use twofold_integrate::filippov::{
     ExitRule, Faces, FilippovError, FilippovObserver, FilippovOptions, FilippovSummary, Funnel,
     FunnelGrid, funnel, run_two_surfaces, run_watched,
 };
-use twofold_system::{BindError, Bound, Caricature, Compiled, System};
+use twofold_system::{BindError, Bound, Caricature, System};
 
 /// Crossing of the plane behind a visit by the smoothed orbit of a width, if it does, or its
 /// failure.
@@ -183,7 +183,7 @@ two_surfaces!(1, 2, 3, 4);
 /// If it has not three.
 pub fn sliding(system: &System) -> Result<Box<dyn Visited>, BindError> {
     Ok(match system.compiled() {
-        Some(Compiled::Caricature(system)) => Box::new(system),
+        Some(system) => Box::new(system),
         _ => Box::new(system.bind::<3>()?),
     })
 }

@@ -2,7 +2,7 @@
 
 use twofold_analyse::SectionRecorder;
 use twofold_integrate::ensemble::{Common, End, EnsembleRun, InstructionSet, ensemble_in_vectors};
-use twofold_system::{Caricature, Compiled, ParameterBatch, Smoothed, System, Transition};
+use twofold_system::{Caricature, ParameterBatch, Smoothed, System, Transition};
 
 /// The end of a run among others, and its section.
 pub type Section<const N: usize> = End<SectionRecorder<N>, N>;
@@ -53,7 +53,7 @@ pub fn smoothed_in_lanes(
     eps: f64,
 ) -> Option<impl Lanes<3>> {
     match system.compiled() {
-        Some(Compiled::Caricature(system)) => Some(Smoothed { system, transition, eps }),
+        Some(system) => Some(Smoothed { system, transition, eps }),
         _ => None,
     }
 }

@@ -8,8 +8,8 @@ use twofold_integrate::{
     WithStepper, drive, with_extended,
 };
 use twofold_system::{
-    BindError, BoundField, Caricature, Compiled, Field, Hysteretic, Relaxation, Smoothed, System,
-    Transition, VectorField,
+    BindError, BoundField, Caricature, Field, Hysteretic, Relaxation, Smoothed, System, Transition,
+    VectorField,
 };
 
 /// The method of an orbit, and its options.
@@ -147,7 +147,7 @@ pub fn smoothed(
     eps: f64,
 ) -> Result<Box<dyn Visits>, BindError> {
     Ok(match system.compiled() {
-        Some(Compiled::Caricature(system)) => Box::new(Smoothed { system, transition, eps }),
+        Some(system) => Box::new(Smoothed { system, transition, eps }),
         _ => Box::new(Field::smoothed(system, transition, eps).bind::<3>()?),
     })
 }
@@ -163,9 +163,7 @@ pub fn hysteretic(
     relaxation: Relaxation,
 ) -> Result<Box<dyn Orbits<4>>, BindError> {
     Ok(match system.compiled() {
-        Some(Compiled::Caricature(system)) => {
-            Box::new(Hysteretic { system, eps, eps_prime, relaxation })
-        }
+        Some(system) => Box::new(Hysteretic { system, eps, eps_prime, relaxation }),
         _ => Box::new(Field::hysteretic(system, eps, eps_prime, relaxation).bind::<4>()?),
     })
 }

@@ -13,9 +13,7 @@ use twofold_instances_switched::{self as switched, Late};
 use twofold_instances_tangent::{Exponents, Growth};
 use twofold_integrate::Monitor;
 use twofold_integrate::ensemble::InstructionSet;
-use twofold_system::{
-    Bound, BoundField, Compiled, Field, Hysteretic, ParameterBatch, Smoothed, System,
-};
+use twofold_system::{Bound, BoundField, Field, Hysteretic, ParameterBatch, Smoothed, System};
 
 /// The largest Lyapunov exponent of the orbit from `start`. Facts: `exponent` ([`Exponent`]),
 /// `half_width` of its 95 % interval and `sign` ([`Sign`](lyapunov::Sign)) by that interval; or
@@ -105,7 +103,7 @@ impl LargestExponent {
     fn tangent(&self) -> Option<Field> {
         let SwitchSpec::Smoothed { eps, transition } = self.switch else { return None };
         Some(match self.system.compiled() {
-            Some(Compiled::Caricature(system)) => {
+            Some(system) => {
                 let field = Smoothed { system, transition, eps };
                 // Symbolically, so that nothing is computed with derivatives that are zero
                 // everywhere: a third of all instructions.
@@ -125,16 +123,13 @@ impl LargestExponent {
             ));
         }
         let field = match (self.switch, self.system.compiled()) {
-            (SwitchSpec::Smoothed { eps, transition }, Some(Compiled::Caricature(system))) => {
+            (SwitchSpec::Smoothed { eps, transition }, Some(system)) => {
                 let field = Smoothed { system, transition, eps };
                 let x = SVector::from_fn(|i, _| start(i));
                 let tangent = Tangent::<_, 1>(&field);
                 return tangent.growth(x, 3, &self.settings, monitor).map_err(|e| e.to_string());
             }
-            (
-                SwitchSpec::Hysteretic { eps, eps_prime, relaxation, .. },
-                Some(Compiled::Caricature(system)),
-            ) => {
+            (SwitchSpec::Hysteretic { eps, eps_prime, relaxation, .. }, Some(system)) => {
                 let field = Hysteretic { system, eps, eps_prime, relaxation };
                 let x = SVector::from_fn(|i, _| if i < 3 { start(i) } else { self.phi() });
                 let tangent = Tangent::<_, 1>(&field);

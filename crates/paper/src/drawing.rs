@@ -16,7 +16,6 @@ use twofold_render::sheet::{
     MarkerStyle, PlanePanel, Sheet, SpacePanel, range_of,
 };
 use twofold_render::style;
-use twofold_system::Compiled;
 
 /// The drawing of a picture of runs.
 ///
@@ -32,9 +31,6 @@ pub fn sheet(
 ) -> Result<Sheet, JobError> {
     let runs: Vec<_> = picture.panels.iter().map(|p| &p.run).collect();
     let mut sheet = dress(Sheet::new(ColumnWidth::Wide, columns(picture), ""), picture, spec, data);
-    if picture.panels.iter().any(|p| matches!(p.run.system.compiled(), Some(Compiled::Wheel(_)))) {
-        sheet = sheet.subtitle("our reconstruction: the paper gives no coefficients");
-    }
     for line in wording::small_print(picture.reading_name(), &runs) {
         sheet = sheet.footer(line);
     }
@@ -279,7 +275,7 @@ fn space_panels(
     for (((panel, recording), curves), notes) in
         picture.panels.iter().zip(recordings).zip(&curves).zip(notes)
     {
-        let mut patches = surface::patches(&panel.run.system, &ranges, SURFACE_CELLS);
+        let mut patches = surface::patches(&panel.run.system, &ranges);
         for corner in patches.iter_mut().flat_map(|p| p.corners.iter_mut()) {
             *corner = turn(*corner);
         }
@@ -379,7 +375,7 @@ fn passage(
     };
     let mut chart = PlanePanel::new(axis(0), axis(1)).equal();
     chart.aspect = Some(PASSAGE_ASPECT);
-    for patch in surface::patches(&panel.run.system, &window, PASSAGE_CELLS) {
+    for patch in surface::patches(&panel.run.system, &window) {
         let outline = patch.corners.iter().map(|x| axes.map(|i| x[i])).collect();
         chart = chart.area(outline, patch.colour.lighten(0.5));
     }
@@ -394,8 +390,6 @@ fn passage(
 
 /// Height of the nearer view divided by its width.
 const PASSAGE_ASPECT: f64 = 0.62;
-/// Cells of the switching surface along each side of the nearer view.
-const PASSAGE_CELLS: usize = 12;
 /// Width of flights in it: thinner than what lies on the surface.
 const FLIGHT_FROM_ABOVE_PT: f64 = 0.3;
 
@@ -514,8 +508,6 @@ fn exits(data: &Data) -> Vec<[f64; 3]> {
     }
 }
 
-/// Cells of the switching surface along each side.
-const SURFACE_CELLS: usize = 60;
 /// A long path: thinner and lighter than a curve, so that its windings stay apart.
 const PATH: LineStyle = LineStyle::new(style::SOFT_INK, 0.25);
 /// Free flight of a Filippov motion.

@@ -6,7 +6,7 @@ use twofold_integrate::{Kick, StepCap};
 use twofold_job::spec::{MethodSpec, RunSpec, SwitchSpec};
 use twofold_render::markup;
 pub use twofold_render::number::number;
-use twofold_system::{Compiled, Relaxation, System, Transition};
+use twofold_system::{Relaxation, System, Transition};
 
 /// "first reading: *α* = 0.1, *β* = 10^{-5}".
 pub fn reading(reading: &ParameterReading) -> String {
@@ -23,7 +23,7 @@ pub fn parameters(reading: &ParameterReading) -> String {
 /// The same of any numbers; a long list is cut.
 pub fn numbers<'a>(named: impl IntoIterator<Item = (&'a str, f64)>) -> String {
     const MOST: usize = 12;
-    let said = |(name, value)| format!("{} = {}", markup::name(name), number(value));
+    let said = |(name, value)| format!("{} = {}", markup::name(name), angle(value));
     let mut all: Vec<String> = named.into_iter().map(said).collect();
     if all.len() > MOST {
         all.truncate(MOST);
@@ -35,28 +35,12 @@ pub fn numbers<'a>(named: impl IntoIterator<Item = (&'a str, f64)>) -> String {
 /// The system and its parameters.
 pub fn system(system: &System) -> String {
     match system.compiled() {
-        Some(Compiled::Caricature(c)) => format!(
+        Some(c) => format!(
             "*α* = {}, *β* = {}, *v*_{{+}} = {}, *v*_{{−}} = {}",
             number(c.alpha),
             number(c.beta),
             number(c.v_plus),
             number(c.v_minus)
-        ),
-        Some(Compiled::Wheel(w)) => format!(
-            "wheel (reconstruction): *m* = {}, *J* = {}, *d* = {}, *γ* = {}, *k*_{{w}} = {}, \
-                *c*_{{w}} = {}, *c*_{{h}} = {}, \
-             *ω*_{{0}} = {}, *F* = {}, *q* = {}, *V*_{{c}} = {}",
-            number(w.m),
-            number(w.j),
-            number(w.d),
-            angle(w.gamma),
-            number(w.k_w),
-            number(w.c_w),
-            number(w.c_h),
-            number(w.omega0),
-            number(w.side_force),
-            number(w.trail),
-            number(w.v_c)
         ),
         None => {
             let parameters = numbers(system.parameters().map(|(name, v)| (name, v.value())));
@@ -66,11 +50,11 @@ pub fn system(system: &System) -> String {
     }
 }
 
-/// An angle, where it is a plain fraction of π as that.
-fn angle(radians: f64) -> String {
+/// A number, where it is a plain fraction of π as that.
+fn angle(value: f64) -> String {
     let fraction =
-        [2, 3, 4, 6, 8, 12].into_iter().find(|n| radians == std::f64::consts::PI / f64::from(*n));
-    fraction.map_or_else(|| number(radians), |n| format!("π/{n}"))
+        [2, 3, 4, 6, 8, 12].into_iter().find(|n| value == std::f64::consts::PI / f64::from(*n));
+    fraction.map_or_else(|| number(value), |n| format!("π/{n}"))
 }
 
 /// Model of the switch, in words.
@@ -264,11 +248,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn angles() {
+    fn fractions_of_pi_are_said_as_such() {
         assert_eq!(angle(std::f64::consts::FRAC_PI_4), "π/4");
-        assert_eq!(angle(0.7), "0.7");
-        let wheel = twofold_system::Wheel { gamma: 0.7, ..Default::default() };
-        assert!(system(&wheel.into()).contains("*γ* = 0.7,"));
+        let wheel = System::builtin("wheel").unwrap().with("gamma", 0.7).unwrap();
+        assert!(system(&wheel).contains("*γ* = 0.7,"));
     }
 
     #[test]

@@ -9,7 +9,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use super::definition::ParameterDefinition;
 use super::diagnostic::nearest;
 use super::document::Canonical;
-use super::{Caricature, Definition, PiecewiseSmooth, Wheel, caricature::MinusSign, library};
+use super::{Caricature, Definition, PiecewiseSmooth, caricature::MinusSign, library};
 use twofold_num::tape::{Program, Tape};
 use twofold_num::{Decimal, Elementary};
 
@@ -261,39 +261,22 @@ impl System {
         Some([[face(0, false)?, face(0, true)?], [face(1, false)?, face(1, true)?]])
     }
 
-    /// The compiled system that does the same operations, if there is one: a fast path, tested to
+    /// The paper's equation in Rust, if the system has the same operations: a fast path, tested to
     /// give the same bits.
-    pub fn compiled(&self) -> Option<Compiled> {
+    pub fn compiled(&self) -> Option<Caricature> {
         let builtin = library::definitions().iter().find(|d| d.same_equations(&self.definition))?;
-        let value = |name| self.parameter(name);
-        let caricature = |first_component_of_minus| {
-            Some(Compiled::Caricature(Caricature {
-                alpha: value("alpha")?,
-                beta: value("beta")?,
-                v_plus: value("v_plus")?,
-                v_minus: value("v_minus")?,
-                first_component_of_minus,
-            }))
+        let first_component_of_minus = match builtin.name() {
+            "caricature" => MinusSign::Equation4,
+            "caricature-as-printed" => MinusSign::PrintedInEquation5,
+            _ => return None,
         };
-        match builtin.name() {
-            "caricature" => caricature(MinusSign::Equation4),
-            "caricature-as-printed" => caricature(MinusSign::PrintedInEquation5),
-            "wheel" => Some(Compiled::Wheel(Wheel {
-                m: value("m")?,
-                j: value("j")?,
-                d: value("d")?,
-                gamma: value("gamma")?,
-                k_w: value("k_w")?,
-                r0: value("r0")?,
-                c_w: value("c_w")?,
-                c_h: value("c_h")?,
-                omega0: value("omega0")?,
-                side_force: value("side_force")?,
-                trail: value("trail")?,
-                v_c: value("v_c")?,
-            })),
-            _ => None,
-        }
+        Some(Caricature {
+            alpha: self.parameter("alpha")?,
+            beta: self.parameter("beta")?,
+            v_plus: self.parameter("v_plus")?,
+            v_minus: self.parameter("v_minus")?,
+            first_component_of_minus,
+        })
     }
 }
 
@@ -313,15 +296,6 @@ fn checked(parameter: &ParameterDefinition, value: &Decimal) -> Result<(), Param
     }
 }
 
-/// A built-in system that is also compiled.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Compiled {
-    /// The caricature, in either reading of f-.
-    Caricature(Caricature),
-    /// The wheel.
-    Wheel(Wheel),
-}
-
 impl From<Caricature> for System {
     fn from(c: Caricature) -> Self {
         let name = match c.first_component_of_minus {
@@ -331,26 +305,6 @@ impl From<Caricature> for System {
         let values =
             [("alpha", c.alpha), ("beta", c.beta), ("v_plus", c.v_plus), ("v_minus", c.v_minus)];
         library::with_values(name, &values)
-    }
-}
-
-impl From<Wheel> for System {
-    fn from(w: Wheel) -> Self {
-        let values = [
-            ("m", w.m),
-            ("j", w.j),
-            ("d", w.d),
-            ("gamma", w.gamma),
-            ("k_w", w.k_w),
-            ("r0", w.r0),
-            ("c_w", w.c_w),
-            ("c_h", w.c_h),
-            ("omega0", w.omega0),
-            ("side_force", w.side_force),
-            ("trail", w.trail),
-            ("v_c", w.v_c),
-        ];
-        library::with_values("wheel", &values)
     }
 }
 

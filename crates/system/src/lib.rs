@@ -11,9 +11,9 @@
 //! holds the built-in ones. Bound to a dimension ([`System::bind`], [`Field::bind`]) they are
 //! evaluated over any number type.
 //!
-//! The paper's own two, [`Caricature`] and [`Wheel`], exist as Rust too, with [`Smoothed`] and
-//! [`Hysteretic`] on top: fast paths, tested to give the bits of the files. Equations in Rust are
-//! generic over [`Elementary`], so that each is written once.
+//! The paper's own, [`Caricature`], exists as Rust too, with [`Smoothed`] and [`Hysteretic`] on top:
+//! a fast path, tested to give the bits of its file. Equations in Rust are generic over
+//! [`Elementary`], so that each is written once.
 #![forbid(unsafe_code)]
 // tests compare with tolerances, not with hashes
 #![cfg_attr(test, allow(clippy::disallowed_methods))]
@@ -34,7 +34,6 @@ pub mod reversed;
 pub mod singular;
 pub mod smoothed;
 pub mod transition;
-pub mod wheel;
 
 use std::sync::Arc;
 
@@ -51,11 +50,10 @@ pub use document::Canonical;
 pub use expression::Expression;
 pub use field::{BoundField, Field};
 pub use hysteretic::{Hysteretic, Relaxation};
-pub use instance::{BindError, Bound, Compiled, ParameterError, System};
+pub use instance::{BindError, Bound, ParameterError, System};
 pub use reversed::Reversed;
 pub use smoothed::{Blended, Smoothed};
 pub use transition::Transition;
-pub use wheel::Wheel;
 
 /// An autonomous ordinary differential equation x' = f(x) in `N` dimensions.
 ///

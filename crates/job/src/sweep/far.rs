@@ -10,14 +10,14 @@
 
 use crate::spec::{RunSpec, SwitchSpec};
 use twofold_num::elementary::sqrt;
+use twofold_system::Transition;
 use twofold_system::caricature::MinusSign;
-use twofold_system::{Compiled, Transition};
 
 /// The corner c of the largest quadrant y, z >= c that no orbit of the run's system leaves; `None`
 /// if there is none, or the system is another one. Kicks are taken to be too small to throw an
 /// orbit out again.
 pub(super) fn corner(run: &RunSpec) -> Option<f64> {
-    let Some(Compiled::Caricature(c)) = run.system.compiled() else { return None };
+    let Some(c) = run.system.compiled() else { return None };
     if c.first_component_of_minus != MinusSign::Equation4 || !(c.alpha > 0.0 && c.beta > 0.0) {
         return None;
     }

@@ -176,8 +176,17 @@ impl<'a> Level<'a> {
         pieces
     }
 
-    /// The surface h = 0 over the three states shown, as triangles coloured by region.
+    /// The surface h = 0 over the three states shown, coloured by region.
     pub fn patches(&self, ranges: &[(f64, f64); 3]) -> Vec<Patch> {
+        let mut patches = Vec::new();
+        for polygon in self.polygons(ranges) {
+            self.cut(polygon, &mut patches);
+        }
+        patches
+    }
+
+    /// The surface h = 0 over the three states shown, as triangles and quadrangles.
+    pub fn polygons(&self, ranges: &[(f64, f64); 3]) -> Vec<Vec<[f64; 3]>> {
         let knots = ranges.map(|r| lines(r, SPACE_CELLS));
         let at = |c: [usize; 3]| -> [f64; 3] { std::array::from_fn(|k| knots[k][c[k]]) };
         let n: [usize; 3] = std::array::from_fn(|k| knots[k].len());
@@ -190,7 +199,7 @@ impl<'a> Level<'a> {
                 }
             }
         }
-        let mut patches = Vec::new();
+        let mut polygons = Vec::new();
         for i in 0..n[0] - 1 {
             for j in 0..n[1] - 1 {
                 for k in 0..n[2] - 1 {
@@ -202,16 +211,11 @@ impl<'a> Level<'a> {
                         let zero = |a: [usize; 3], b: [usize; 3]| self.zero(at(a), at(b));
                         match (&up[..], &down[..]) {
                             ([one], [a, b, c]) | ([a, b, c], [one]) => {
-                                self.cut(
-                                    [zero(*one, *a), zero(*one, *b), zero(*one, *c)],
-                                    &mut patches,
-                                );
+                                polygons.push([a, b, c].map(|other| zero(*one, *other)).to_vec());
                             }
                             ([a, b], [c, d]) => {
-                                let [p, q, r, s] =
-                                    [zero(*a, *c), zero(*a, *d), zero(*b, *d), zero(*b, *c)];
-                                self.cut([p, q, r], &mut patches);
-                                self.cut([p, r, s], &mut patches);
+                                let around = [(a, c), (a, d), (b, d), (b, c)];
+                                polygons.push(around.map(|(a, b)| zero(*a, *b)).to_vec());
                             }
                             _ => {}
                         }
@@ -219,27 +223,30 @@ impl<'a> Level<'a> {
                 }
             }
         }
-        patches
+        polygons
     }
 
-    /// A triangle in one colour, or its parts on either side of the edges between regions.
-    fn cut(&self, corners: [[f64; 3]; 3], patches: &mut Vec<Patch>) {
-        let [a, b, c] = corners;
-        if a == b || b == c || a == c {
+    /// A polygon in one colour, or its parts on either side of the edges between regions.
+    fn cut(&self, mut corners: Vec<[f64; 3]>, patches: &mut Vec<Patch>) {
+        corners.dedup();
+        if corners.len() > 1 && corners.first() == corners.last() {
+            corners.pop();
+        }
+        if corners.len() < 3 {
             return;
         }
         let Some(lie) = &self.lie else {
-            patches.push(Patch { corners: corners.to_vec(), colour: colour(None) });
+            patches.push(Patch { corners, colour: colour(None) });
             return;
         };
-        let mut parts = vec![corners.to_vec()];
+        let whole = area(&corners);
+        let mut parts = vec![corners];
         for derivative in [0, 1] {
             let positive = |p: &[f64; 3]| lie(&self.full(p))[derivative] > 0.0;
             parts = parts.iter().flat_map(|part| divided(part, positive)).collect();
         }
         // If f+ and f- agree on the surface, their Lie derivatives change sign together but for
         // rounding, and leave slivers.
-        let whole = area(&corners);
         for part in parts.into_iter().filter(|part| area(part) > SLIVER * whole) {
             let n = part.len() as f64;
             let centre: [f64; 3] =
@@ -259,7 +266,7 @@ fn area(corners: &[[f64; 3]]) -> f64 {
     sum.norm_squared()
 }
 
-/// Parts of a triangle below this share of its area, squared, are not drawn.
+/// Parts of a polygon below this share of its area, squared, are not drawn.
 const SLIVER: f64 = 1e-12;
 
 /// Place between two others at which a condition changes, by bisection: nothing need be smooth. The

@@ -1,12 +1,12 @@
-//! Fig. 1: the wheel assembly. A reconstruction: see `twofold::system::wheel`.
+//! Fig. 1: the wheel assembly. A reconstruction: see systems/wheel.toml.
 
 use std::sync::Arc;
 
 use crate::computed::Computed;
 use crate::sketch::assembly;
-use serde_json::json;
+use serde_json::{Map, Value, json};
 use twofold::paper::{Figure, Picture, Study, View};
-use twofold::system::Wheel;
+use twofold::system::System;
 
 /// Position of the wheel on its line.
 const R: f64 = 0.69267;
@@ -31,9 +31,9 @@ pub fn figure() -> Figure {
                 questions: || {
                     vec![Arc::new(Computed {
                         kind: "wheel-assembly",
-                        question: json!({ "wheel": Wheel::default(), "r": R }),
+                        question: json!({ "wheel": parameters(), "r": R }),
                         cost: 1.0,
-                        compute: || Ok(assembly::tables(&Wheel::default(), R)),
+                        compute: || Ok(assembly::tables(&wheel(), R)),
                     })]
                 },
                 draw: |answers| assembly::draw(&Study::tables(answers)),
@@ -42,4 +42,12 @@ pub fn figure() -> Figure {
             alterations: Vec::new(),
         }],
     }
+}
+
+fn wheel() -> System {
+    System::builtin("wheel").expect("it ships")
+}
+
+fn parameters() -> Map<String, Value> {
+    wheel().parameters().map(|(name, value)| (name.into(), json!(value.value()))).collect()
 }

@@ -50,8 +50,6 @@ pub fn camera(figures: &[Figure], figure: &str) -> Option<Camera> {
 
 /// Most points of a view; a longer line is thinned more.
 const MOST_POINTS: usize = 4000;
-/// Cells of the switching surface along each side.
-const CELLS: usize = 14;
 /// Whole numbers along a side of the box.
 const SIDE: f64 = 65535.0;
 
@@ -115,7 +113,7 @@ fn view(
     let (low, high) = (ranges.map(|r| r.0), ranges.map(|r| r.1));
     let mut areas: [(&str, Vec<u16>); 3] =
         ["attracting", "repelling", "crossing"].map(|kind| (kind, Vec::new()));
-    for patch in surface::patches(source.system, ranges, CELLS) {
+    for patch in surface::patches(source.system, ranges) {
         let inside = clip_polygon(&patch.corners, low, high);
         if inside.len() < 3 {
             continue;

@@ -12,7 +12,7 @@ use twofold_render::sheet::{
     Anchor, Axis, ColumnWidth, LineStyle, MarkerShape, MarkerStyle, Patch, PlanePanel, SpacePanel,
 };
 use twofold_render::style;
-use twofold_system::Wheel;
+use twofold_system::System;
 
 /// A line of the drawing: its name decides its look.
 type Line = (String, Vec<[f64; 2]>);
@@ -24,9 +24,11 @@ const DISC: f64 = 1.7;
 const TYRE: [f64; 2] = [0.34, 0.09];
 
 /// Everything that is drawn, with the wheel at `r` on its line.
-pub fn tables(wheel: &Wheel, r: f64) -> Vec<Table> {
-    let centre = [r, wheel.d];
-    let (s, c) = (sin(wheel.gamma), cos(wheel.gamma));
+pub fn tables(wheel: &System, r: f64) -> Vec<Table> {
+    let value = |name| wheel.parameter(name).expect("it has one");
+    let (d, gamma) = (value("d"), value("gamma"));
+    let centre = [r, d];
+    let (s, c) = (sin(gamma), cos(gamma));
     let (rolling, axle) = ([c, -s], [s, c]);
     let at = |a: f64, b: f64| {
         [centre[0] + a * rolling[0] + b * axle[0], centre[1] + a * rolling[1] + b * axle[1]]
@@ -39,19 +41,19 @@ pub fn tables(wheel: &Wheel, r: f64) -> Vec<Table> {
     add("disc-turns", arc([0.0, 0.0], 1.07 * DISC, 205.0, 245.0));
     add("housing-turns", arc([0.0, 0.0], 0.80 * DISC, 290.0, 330.0));
     let reach = 0.93 * DISC;
-    let half = twofold_num::elementary::sqrt((reach * reach - wheel.d * wheel.d).max(0.0));
-    add("track", vec![[-half, wheel.d], [half, wheel.d]]);
-    add("distance", vec![[0.0, 0.0], [0.0, wheel.d]]);
+    let half = twofold_num::elementary::sqrt((reach * reach - d * d).max(0.0));
+    add("track", vec![[-half, d], [half, d]]);
+    add("distance", vec![[0.0, 0.0], [0.0, d]]);
     // Spring with a straight lead at each end, its turns shrinking with r: it is drawn as long as
     // it is.
     let (from, to) = (0.06 * r, r - 0.30);
     let turns = 9;
-    let mut spring = vec![[0.0, wheel.d], [from, wheel.d]];
+    let mut spring = vec![[0.0, d], [from, d]];
     for k in 0..turns {
         let x = from + (to - from) * (f64::from(k) + 0.5) / f64::from(turns);
-        spring.push([x, wheel.d + if k % 2 == 0 { 0.055 } else { -0.055 }]);
+        spring.push([x, d + if k % 2 == 0 { 0.055 } else { -0.055 }]);
     }
-    spring.extend([[to, wheel.d], centre]);
+    spring.extend([[to, d], centre]);
     add("spring", spring);
     let [a, b] = TYRE;
     add("tyre", vec![at(-a, -b), at(a, -b), at(a, b), at(-a, b), at(-a, -b)]);
@@ -60,9 +62,9 @@ pub fn tables(wheel: &Wheel, r: f64) -> Vec<Table> {
     add("slip", vec![at(0.0, 0.42), at(0.0, 0.72)]);
     // The axle makes the angle pi/2 - gamma with the line; gamma is between the rolling direction
     // and the line.
-    let degrees = wheel.gamma * 180.0 / std::f64::consts::PI;
+    let degrees = gamma * 180.0 / std::f64::consts::PI;
     add("angle", arc(centre, 0.55, -degrees, 0.0));
-    add("speed", vec![[r + 0.62, wheel.d], [r + 0.92, wheel.d]]);
+    add("speed", vec![[r + 0.62, d], [r + 0.92, d]]);
     vec![lines_table(["x", "y"], &lines)]
 }
 

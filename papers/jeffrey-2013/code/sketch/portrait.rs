@@ -96,7 +96,7 @@ pub fn draw(tables: &[Table], v: f64, w: f64) -> Sheet {
         .proportions([1.0, 1.0, 0.55]);
     let ranges = [(-HEIGHT, HEIGHT), (-REACH, REACH), (-REACH, REACH)];
     let spec = system(v, w).into();
-    let mut patches = surface::patches(&spec, &ranges, 20);
+    let mut patches = surface::patches(&spec, &ranges);
     for corner in patches.iter_mut().flat_map(|p| p.corners.iter_mut()) {
         *corner = turn(*corner);
     }
