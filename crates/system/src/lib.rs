@@ -11,8 +11,8 @@
 //! holds the built-in ones. Bound to a dimension ([`System::bind`], [`Field::bind`]) they are
 //! evaluated over any number type.
 //!
-//! The paper's own, [`Caricature`], exists as Rust too, with [`Smoothed`] and [`Hysteretic`] on top:
-//! a fast path, tested to give the bits of its file. Equations in Rust are generic over
+//! The paper's own, [`Caricature`], exists as Rust too, with [`Smoothed`] and [`Hysteretic`] on
+//! top: a fast path, tested to give the bits of its file. Equations in Rust are generic over
 //! [`Elementary`], so that each is written once.
 #![forbid(unsafe_code)]
 // tests compare with tolerances, not with hashes
