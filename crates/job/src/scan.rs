@@ -2,6 +2,7 @@
 //! of two settings.
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
@@ -14,7 +15,7 @@ use twofold_integrate::Monitor;
 use super::classification::Classification;
 use super::executor::{Executor, JobMonitor, Progress};
 use super::general::GeneralRun;
-use super::question::JobError;
+use super::question::{AnyQuestion, Ask, JobError, Question};
 use super::run::Run;
 use super::spec::{RunSpec, SwitchSpec};
 use super::sweep::{Axis, Base, Coordinate, GeneralEnding, GeneralOutcome, OutcomeQuestion, Sweep};
@@ -72,7 +73,7 @@ pub struct Scanned {
 pub const MOST_RUNS: u64 = 1_000_000;
 
 /// The attractor of a run, and its place.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Landing {
     word: String,
     place: Vec<Vec<f64>>,
@@ -85,16 +86,18 @@ struct Found {
     late: Vec<(f64, Vec<f64>)>,
     /// Over two settings.
     landing: Option<Landing>,
-    /// End of the run: state and mode.
-    end: Option<(Vec<f64>, usize)>,
+    end: Option<End>,
 }
+
+/// End of a run: state and mode.
+type End = (Vec<f64>, usize);
 
 type Cell = Option<(Vec<Entry>, Result<Found, JobError>)>;
 
 /// Stops single runs when the scan is to stop.
-struct Asked<'a> {
-    monitor: &'a dyn Monitor,
-    finished: &'a AtomicU64,
+pub(crate) struct Asked<'a> {
+    pub monitor: &'a dyn Monitor,
+    pub finished: &'a AtomicU64,
 }
 
 impl Monitor for Asked<'_> {
@@ -251,37 +254,26 @@ impl Scan {
                 })
                 .collect(),
             Some(follow) => {
-                let mut up: Vec<u64> = (0..self.cells()).collect();
-                up.sort_by(|a, b| {
-                    self.sweep.settings(*a)[0]
-                        .value()
-                        .total_cmp(&self.sweep.settings(*b)[0].value())
-                });
-                let down: Vec<u64> = up.iter().rev().copied().collect();
-                let along = |rows: &[u64], word: &'static str| {
+                let along = |(word, rows): &Way| {
                     let mut before = None;
                     let mut cells = Vec::with_capacity(rows.len());
                     for row in rows {
                         let cell = self.cell(*row, before.as_ref(), &asked);
                         count(&cell);
-                        // A run that fails, or is ended by an event, hands nothing on: the next one
-                        // begins at the start.
-                        before =
-                            cell.as_ref().and_then(|(_, found)| found.as_ref().ok()?.end.clone());
+                        before = handed_on(&cell);
                         let stopped = cell.is_none();
-                        cells.push((Some(word), cell));
+                        cells.push((*word, cell));
                         if stopped {
                             break;
                         }
                     }
                     cells
                 };
+                let ways = self.ways();
                 match follow {
-                    Follow::Up => along(&up, "up"),
-                    Follow::Down => along(&down, "down"),
+                    Follow::Up | Follow::Down => along(&ways[0]),
                     Follow::Both => {
-                        let (mut all, down) =
-                            rayon::join(|| along(&up, "up"), || along(&down, "down"));
+                        let (mut all, down) = rayon::join(|| along(&ways[0]), || along(&ways[1]));
                         all.extend(down);
                         all
                     }
@@ -295,8 +287,23 @@ impl Scan {
         Scanned { table, basins, finished: finished.into_inner(), failed, first_error }
     }
 
+    /// The ways in which it goes over its settings.
+    fn ways(&self) -> Vec<Way> {
+        let mut up: Vec<u64> = (0..self.cells()).collect();
+        let Some(follow) = self.follow else { return vec![(None, up)] };
+        let values: Vec<f64> = up.iter().map(|row| self.sweep.settings(*row)[0].value()).collect();
+        up.sort_by(|a, b| values[*a as usize].total_cmp(&values[*b as usize]));
+        let down: Vec<u64> = up.iter().rev().copied().collect();
+        let (up, down) = ((Some("up"), up), (Some("down"), down));
+        match follow {
+            Follow::Up => vec![up],
+            Follow::Down => vec![down],
+            Follow::Both => vec![up, down],
+        }
+    }
+
     /// One run, or nothing if it was stopped.
-    fn cell(&self, row: u64, from: Option<&(Vec<f64>, usize)>, asked: &Asked<'_>) -> Cell {
+    fn cell(&self, row: u64, from: Option<&End>, asked: &Asked<'_>) -> Cell {
         let settings = self.sweep.settings(row);
         let found = match self.sweep.run_of(row).map_err(JobError::Other) {
             Err(error) => Err(error),
@@ -312,7 +319,7 @@ impl Scan {
     fn of_surfaces(
         &self,
         mut run: RunSpec,
-        from: Option<&(Vec<f64>, usize)>,
+        from: Option<&End>,
         asked: &Asked<'_>,
     ) -> Result<Found, JobError> {
         let none = Found { settings: Vec::new(), late: Vec::new(), landing: None, end: None };
@@ -340,7 +347,7 @@ impl Scan {
     fn of_general(
         &self,
         mut run: GeneralRun,
-        from: Option<&(Vec<f64>, usize)>,
+        from: Option<&End>,
         asked: &Asked<'_>,
     ) -> Result<Found, JobError> {
         let none = Found { settings: Vec::new(), late: Vec::new(), landing: None, end: None };
@@ -491,4 +498,281 @@ fn late(t_end: f64, states: &[&str], answer: &Answer) -> Option<Vec<(f64, Vec<f6
         .enumerate()
         .filter(|(row, w)| *w == "up" && t[*row] > 0.5 * t_end);
     Some(upward.map(|(row, _)| (t[row], columns.iter().map(|c| c[row]).collect())).collect())
+}
+
+/// The state from which the next run is followed. A run that fails, or is ended by an event, hands
+/// nothing on: the next one begins at the start.
+fn handed_on(cell: &Cell) -> Option<End> {
+    cell.as_ref().and_then(|(_, found)| found.as_ref().ok()?.end.clone())
+}
+
+/// A scan as a question: the table that [`Scan::compute`] makes. It rests on [`ScanPart`]s, so that
+/// one that was stopped goes on where it was. Over one setting a run that fails is an error, since
+/// its place in the diagram would be empty; over two it is a row.
+#[derive(Clone, Debug)]
+pub struct ScanQuestion(Arc<Planned>);
+
+/// A scan with its runs in their order.
+#[derive(Debug)]
+struct Planned {
+    scan: Scan,
+    ways: Vec<Way>,
+}
+
+/// A way in which a scan goes over its settings: a word, and the rows in their order.
+type Way = (Option<&'static str>, Vec<u64>);
+
+/// Some neighbouring runs of a scan.
+#[derive(Clone, Debug)]
+struct ScanPart {
+    plan: Arc<Planned>,
+    /// Which of its ways.
+    way: usize,
+    /// From this run of the way on.
+    from: usize,
+    /// As many of them.
+    size: usize,
+}
+
+/// Most parts of a question of many runs: one that is stopped loses at most so much of it for each
+/// thread.
+pub(crate) const MOST_PARTS: u64 = 32;
+
+/// A column of a part's table, by a name that no state has.
+const RUN: &str = "run number";
+
+impl From<Scan> for ScanQuestion {
+    fn from(scan: Scan) -> Self {
+        let ways = scan.ways();
+        Self(Arc::new(Planned { scan, ways }))
+    }
+}
+
+impl Scan {
+    /// Everything that its table depends on.
+    fn json(&self) -> Value {
+        json!({ "sweep": self.sweep, "follow": self.follow,
+            "alike": self.is_map().then_some(self.alike) })
+    }
+
+    /// Its settings, for people.
+    fn varied(&self) -> String {
+        self.axes().iter().map(|axis| axis.coordinate.to_string()).collect::<Vec<_>>().join(", ")
+    }
+}
+
+impl ScanQuestion {
+    fn parts(&self) -> Vec<ScanPart> {
+        let runs = self.0.scan.cells();
+        let size = usize::try_from(runs.div_ceil(MOST_PARTS)).unwrap_or(usize::MAX).max(1);
+        let parts = |(way, (_, rows)): (usize, &Way)| {
+            let from = (0..rows.len()).step_by(size);
+            from.map(move |from| ScanPart { plan: self.0.clone(), way, from, size })
+        };
+        self.0.ways.iter().enumerate().flat_map(parts).collect()
+    }
+}
+
+impl Question for ScanQuestion {
+    fn kind(&self) -> &'static str {
+        "scan"
+    }
+
+    fn json(&self) -> Value {
+        self.0.scan.json()
+    }
+
+    fn label(&self) -> String {
+        format!("scan over {}", self.0.scan.varied())
+    }
+
+    fn rests_on(&self) -> Vec<AnyQuestion> {
+        self.parts().into_iter().map(|part| Arc::new(part) as _).collect()
+    }
+
+    fn compute(&self, executor: &dyn Ask, _: &dyn Monitor) -> Result<Answer, JobError> {
+        let Planned { scan, ways } = &*self.0;
+        let mut cells = Vec::new();
+        for part in self.parts() {
+            let answer = executor.ask(&part)?;
+            let (word, _) = ways[part.way];
+            cells.extend(part.cells(&answer)?.into_iter().map(|cell| (word, cell)));
+        }
+        let table = if scan.is_map() { scan.endings(&cells).0 } else { scan.passages(&cells) };
+        Ok(Answer::of_tables(vec![table]))
+    }
+}
+
+impl ScanPart {
+    fn rows(&self) -> &[u64] {
+        let (_, rows) = &self.plan.ways[self.way];
+        &rows[self.from..(self.from + self.size).min(rows.len())]
+    }
+
+    /// The part that ends where this one begins, if attractors are followed.
+    fn before(&self) -> Option<Self> {
+        let from = self.from.checked_sub(self.size)?;
+        self.plan.scan.follow.map(|_| Self { from, ..self.clone() })
+    }
+
+    /// Its runs, from its answer.
+    fn cells(&self, answer: &Answer) -> Result<Vec<Cell>, JobError> {
+        let scan = &self.plan.scan;
+        let found = |row: u64, late, landing| {
+            let settings = scan.sweep.settings(row);
+            (settings.clone(), Ok(Found { settings, late, landing, end: None }))
+        };
+        if scan.is_map() {
+            let landings: Vec<Result<Landing, String>> = answer.fact("landings")?;
+            let cell = |(row, landing): (&u64, Result<Landing, String>)| match landing {
+                Ok(landing) => found(*row, Vec::new(), Some(landing)),
+                Err(why) => (scan.sweep.settings(*row), Err(JobError::Other(why))),
+            };
+            return Ok(self.rows().iter().zip(landings).map(|pair| Some(cell(pair))).collect());
+        }
+        let empty = || JobError::Other("a part of the scan has no table".into());
+        let table = answer.tables.first().ok_or_else(empty)?;
+        let (of, t) = (table.integers(RUN), table.numbers("t"));
+        let states: Vec<&[f64]> =
+            scan.states().into_iter().map(|name| table.numbers(name)).collect();
+        let mut rest = 0..of.len();
+        let mut cell = |row: &u64| {
+            let count = of[rest.clone()].iter().take_while(|run| **run == *row as i64).count();
+            let own = rest.by_ref().take(count);
+            let late = own.map(|i| (t[i], states.iter().map(|s| s[i]).collect())).collect();
+            Some(found(*row, late, None))
+        };
+        Ok(self.rows().iter().map(&mut cell).collect())
+    }
+}
+
+impl Question for ScanPart {
+    fn kind(&self) -> &'static str {
+        "scan-part"
+    }
+
+    fn json(&self) -> Value {
+        let scan = self.plan.scan.json();
+        json!({ "scan": scan, "way": self.way, "from": self.from, "size": self.size })
+    }
+
+    fn label(&self) -> String {
+        let way = self.plan.ways[self.way].0.map_or(String::new(), |word| format!(" {word}"));
+        let last = self.from + self.rows().len();
+        format!("scan over {}{way}, runs {} to {last}", self.plan.scan.varied(), self.from + 1)
+    }
+
+    fn extent(&self) -> f64 {
+        self.rows().len() as f64
+    }
+
+    fn cost(&self) -> f64 {
+        self.plan.scan.sweep.t_end() * self.rows().len() as f64
+    }
+
+    fn rests_on(&self) -> Vec<AnyQuestion> {
+        self.before().into_iter().map(|part| Arc::new(part) as _).collect()
+    }
+
+    /// Over one setting the table `late`, a row a crossing, and of attractors that are followed the
+    /// fact `end`; over two the fact `landings`.
+    fn compute(&self, executor: &dyn Ask, monitor: &dyn Monitor) -> Result<Answer, JobError> {
+        let before = self.before().map(|part| executor.ask(&part)).transpose()?;
+        let mut before: Option<End> =
+            before.map(|answer| answer.fact("end")).transpose()?.unwrap_or_default();
+        let finished = AtomicU64::new(0);
+        let asked = Asked { monitor, finished: &finished };
+        let states = self.plan.scan.states();
+        let columns = [Column::integers(RUN), Column::numbers("t")].into_iter();
+        let mut table = Table::new("late", columns.chain(states.into_iter().map(Column::numbers)));
+        let mut landings = Vec::new();
+        for &row in self.rows() {
+            if asked.reached(0.0).is_break() {
+                return Err(JobError::Interrupted);
+            }
+            let cell = self.plan.scan.cell(row, before.as_ref(), &asked);
+            before = handed_on(&cell);
+            let (_, found) = cell.ok_or(JobError::Interrupted)?;
+            finished.fetch_add(1, Ordering::Relaxed);
+            if self.plan.scan.is_map() {
+                let landing = found.map_err(|error| error.to_string());
+                landings.extend(landing.map(|found| found.landing).transpose());
+                continue;
+            }
+            let found = found.map_err(|error| {
+                let value = &self.plan.scan.sweep.settings(row)[0];
+                let at = match value {
+                    Entry::Number(value) => value.to_string(),
+                    Entry::Integer(value) => value.to_string(),
+                    Entry::Word(word) => word.clone(),
+                };
+                JobError::Other(format!("{} = {at}: {error}", self.plan.scan.varied()))
+            })?;
+            for (t, x) in found.late {
+                let numbers = [t].into_iter().chain(x).map(Entry::Number);
+                table.push([Entry::Integer(row as i64)].into_iter().chain(numbers));
+            }
+        }
+        if self.plan.scan.is_map() {
+            return Ok(Answer::of_tables(Vec::new()).with_fact("landings", &landings));
+        }
+        let answer = Answer::of_tables(vec![table]);
+        Ok(if self.plan.scan.follow.is_some() { answer.with_fact("end", &before) } else { answer })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Store, encode};
+    use twofold_hybrid::{Definition, Model, Options};
+
+    /// The logistic map once a unit of time; with `fails` a field that has no value beyond r = 3.3.
+    fn scan(over: &[&str], follow: Option<Follow>, fails: bool) -> Scan {
+        let more = if fails { " + 0*sqrt(3.3 - r)" } else { "" };
+        let text = format!(
+            "states = ['x']\nstart = [0.3]\nparameters = {{ r = 2.8 }}\nf = \
+                ['-x{more}']\n[[event]]\nwhen = 'cos(pi*t)'\nset = {{ x = 'exp(1)*r*x*(1 - x)' }}"
+        );
+        let model = Model::new(Definition::from_toml(&text, "logistic").unwrap());
+        let record = Record::Times { every: 1.0 };
+        let run =
+            GeneralRun { model, options: Options { t_end: 40.0, record, ..Options::default() } };
+        let axes = over.iter().map(|axis| axis.parse().unwrap()).collect();
+        Scan::new(Sweep::new(run, axes, None).unwrap(), follow, 0.01).unwrap()
+    }
+
+    /// The table of the command, whatever the parts and the ways.
+    #[test]
+    fn a_scan_as_a_question_has_its_table() {
+        let diagram = ["params.r=2.8..3.9:70"];
+        let map = ["params.r=2.8,3.2,3.5", "start.x=0.1..0.9:3"];
+        for (over, follow, parts) in [
+            (&diagram[..], None, 24),
+            (&diagram, Some(Follow::Down), 24),
+            (&diagram, Some(Follow::Both), 48),
+            (&map, None, 9),
+        ] {
+            let (scan, folder) = (scan(over, follow, false), tempfile::tempdir().unwrap());
+            let store = Store::new(folder.path());
+            let question: AnyQuestion = Arc::new(ScanQuestion::from(scan.clone()));
+            let executor = Executor::new(Some(store.clone()), &());
+            executor.gather(std::slice::from_ref(&question));
+            let answer = executor.ask(&*question).unwrap();
+            let bits = |table: &Table| encode::bits(std::slice::from_ref(table));
+            assert_eq!(bits(&answer.tables[0]), bits(&scan.compute(&()).table), "{follow:?}");
+            // One that was stopped goes on with the parts that are kept.
+            assert_eq!(store.entries().unwrap().len(), parts + 1);
+        }
+    }
+
+    #[test]
+    fn a_run_that_fails_leaves_no_hole_in_a_diagram() {
+        let question = ScanQuestion::from(scan(&["params.r=3.2,3.4"], None, true));
+        let error = Executor::quiet().ask(&question).unwrap_err().to_string();
+        assert!(error.starts_with("params.r = 3.4: "), "{error}");
+        let map = scan(&["params.r=3.2,3.4", "start.x=0.2,0.3"], None, true);
+        let answer = Executor::quiet().ask(&ScanQuestion::from(map)).unwrap();
+        assert_eq!(answer.tables[0].words("ending").filter(|word| *word == "failed").count(), 2);
+    }
 }

@@ -42,6 +42,7 @@ mod far;
 mod general;
 mod lanes;
 mod outcome;
+mod question;
 mod rows;
 
 use serde::{Deserialize, Serialize};
@@ -49,7 +50,8 @@ use serde_json::{Value, json};
 
 pub use axis::{Axis, AxisError, Coordinate, FORMS, Values};
 pub use general::{GeneralEnding, GeneralOutcome};
-pub use outcome::{Ending, Outcome, OutcomeQuestion};
+pub use outcome::{Ending, Outcome, OutcomeQuestion, is_open, is_outcome};
+pub use question::SweepQuestion;
 pub use rows::{Row, Rows, RowsError, VERSION};
 
 use super::classification::Classification;

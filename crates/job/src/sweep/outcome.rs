@@ -92,6 +92,41 @@ pub(super) fn word_of(verdict: &Verdict) -> String {
     }
 }
 
+/// Words of outcomes, K standing for a period.
+const WORDS: [&str; 15] = [
+    "rest",
+    "period-K",
+    "leaving-period-K",
+    "quasi-periodic",
+    "irregular",
+    "undecided",
+    "noisy",
+    "noisy-around-period-K",
+    "far",
+    "escaped",
+    "too-few",
+    "moving",
+    "stopped",
+    "accumulates",
+    "failed",
+];
+
+/// Whether a row may have this outcome.
+pub fn is_outcome(word: &str) -> bool {
+    let digits = word.trim_end_matches(|c: char| c.is_ascii_digit());
+    let period = &word[digits.len()..];
+    let word = match period.parse::<u64>() {
+        Ok(1..) if !period.starts_with('0') => format!("{digits}K"),
+        _ => word.to_owned(),
+    };
+    WORDS.contains(&word.as_str()) && (period.is_empty() != word.ends_with('K'))
+}
+
+/// Whether an outcome leaves open what the run ends on.
+pub fn is_open(word: &str) -> bool {
+    ["undecided", "too-few", "failed"].contains(&word)
+}
+
 impl Outcome {
     fn at_rest(rest: &Rest, answer: &Answer) -> Result<Self, JobError> {
         let bare = Self::bare("rest", answer.rows() as u64, answer.fact("t")?, steps(answer));
@@ -274,6 +309,17 @@ impl OutcomeQuestion {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn words_of_outcomes_are_known_with_a_period_where_they_have_one() {
+        for word in ["rest", "period-1", "leaving-period-12", "noisy", "noisy-around-period-3"] {
+            assert!(is_outcome(word), "{word}");
+        }
+        for word in ["", "period", "period-", "period-0", "period-01", "period-K", "rest-1", "2"] {
+            assert!(!is_outcome(word), "{word}");
+        }
+        assert!(WORDS.iter().filter(|word| is_open(word)).count() == 3);
+    }
     use crate::Executor;
     use crate::cases;
     use crate::spec::Observation;
