@@ -14,9 +14,11 @@ use super::{Folder, FolderError, Source};
 use crate::analyse::branch::Change;
 use crate::analyse::counts::wilson;
 use crate::job::general::MeanRate;
+use crate::job::sweep::{is_open, is_outcome};
 use crate::job::{Answer, AnyQuestion, Executor, JobError, Table};
 use crate::num::elementary::pow;
 use crate::num::random::RandomStream;
+use crate::paper::plots;
 use crate::record::Hash;
 use crate::system::diagnostic::nearest;
 
@@ -54,8 +56,11 @@ pub struct ClaimFile {
     table: Option<Spanned<String>>,
     /// Quantity of the column, or of a complex fact: last, first, max, min, mean, span, count,
     /// modulus. A mean is one over rows, which stand denser where a path bends; with `every` in
-    /// the run it is one over time.
+    /// the run it is one over time. Of a scan or sweep also share, of rows with this `word`, and
+    /// onset, the column's value from which on the outcome is this `word`.
     take: Option<Spanned<String>>,
+    /// The word of share and onset: an outcome of a sweep, "period-1".
+    word: Option<Spanned<String>>,
     /// The paper's value.
     equals: Option<Spanned<f64>>,
     /// Largest difference that still agrees.
@@ -86,6 +91,61 @@ impl ClaimFile {
         let of = std::iter::once(&self.of).chain(&self.and).cloned().collect();
         Some((self.column.clone()?, self.table.clone(), of))
     }
+
+    /// Whether that is a column of words.
+    pub(super) fn counts_words(&self) -> bool {
+        self.take.as_ref().is_some_and(|take| take.get_ref() == "share")
+    }
+}
+
+impl ClaimFile {
+    /// The fault of a share or onset that is taken of this source, with its place and advice.
+    fn misread(&self, name: &Name, source: &Source) -> Option<(Range<usize>, String, String)> {
+        let take = self.take.as_ref()?;
+        let (column, word) = (self.column.as_ref()?, self.word.as_ref()?);
+        let of = name.get_ref();
+        let taken = take.get_ref().as_str();
+        if !["share", "onset"].contains(&taken) {
+            return None;
+        }
+        let json = source.question.json();
+        let settings = json["sweep"]["over"].as_array().map_or(0, Vec::len);
+        let is_diagram = source.ask == Ask::Scan && settings == 1;
+        let sweep = "name a measure with sweep = { ... }".to_owned();
+        if !matches!(source.ask, Ask::Scan | Ask::Sweep) || taken == "share" && is_diagram {
+            let why =
+                format!("`{of}` asks for {}, of which no {taken} is taken", source.ask.asked());
+            return Some((name.span(), why, sweep));
+        }
+        if taken == "onset" && json["follow"] == "both" {
+            let why = format!("`{of}` goes up and down, and has two onsets");
+            return Some((name.span(), why, "follow up or down in a measure of its own".into()));
+        }
+        let given = word.get_ref();
+        let wrong = |why: String, help: &str| Some((word.span(), why, help.to_owned()));
+        if is_diagram && period_of(given).is_none_or(|period| period < 2) {
+            let why = format!("an orbit diagram does not tell where `{given}` begins");
+            return wrong(why, &format!("give period-2 to period-{LONGEST}, or {sweep}"));
+        }
+        if taken == "onset" && is_open(given) {
+            return wrong(format!("`{given}` leaves open what a run ends on"), "give an outcome");
+        }
+        let outcome =
+            taken == "onset" || ["outcome", "ending"].contains(&column.get_ref().as_str());
+        let by_event = source.ask == Ask::Scan
+            && (given.starts_with("stopped by ") || given.ends_with(" accumulates"));
+        if outcome && !is_outcome(given) && !by_event {
+            let help = "give rest, period-K, irregular or another word of a sweep's outcomes";
+            return wrong(format!("there is no outcome `{given}`"), help);
+        }
+        None
+    }
+}
+
+/// The K of "period-K".
+fn period_of(word: &str) -> Option<usize> {
+    let period = word.strip_prefix("period-")?.parse().ok()?;
+    (is_outcome(word) && period <= LONGEST).then_some(period)
 }
 
 /// Repetitions of a check.
@@ -137,8 +197,17 @@ pub struct Claim {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 enum Read {
-    Fact { path: String, modulus: bool },
-    Column { table: Option<String>, column: String, take: Take },
+    Fact {
+        path: String,
+        modulus: bool,
+    },
+    Column {
+        table: Option<String>,
+        column: String,
+        take: Take,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        word: Option<String>,
+    },
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -151,6 +220,8 @@ enum Take {
     Mean,
     Span,
     Count,
+    Share,
+    Onset,
 }
 
 /// The check.
@@ -176,9 +247,17 @@ enum Check {
 
 /// Kinds of checks, the keys that each needs beside `of`, and those that it may have.
 const KINDS: [(&str, &[&str], &[&str]); 7] = [
-    ("value", &["equals", "within"], &["read", "column", "table", "take"]),
-    ("ratio", &["equals", "within", "and"], &["read", "column", "table", "take", "and-read"]),
-    ("order", &["relation"], &["read", "column", "table", "take", "than", "and", "and-read"]),
+    ("value", &["equals", "within"], &["read", "column", "table", "take", "word"]),
+    (
+        "ratio",
+        &["equals", "within", "and"],
+        &["read", "column", "table", "take", "word", "and-read"],
+    ),
+    (
+        "order",
+        &["relation"],
+        &["read", "column", "table", "take", "word", "than", "and", "and-read"],
+    ),
     ("period", &["is"], &["within"]),
     ("chaos", &[], &[]),
     ("attractors", &["and", "same"], &["within"]),
@@ -260,6 +339,7 @@ impl Claim {
             ("column", c.column.as_ref().map(Spanned::span)),
             ("table", c.table.as_ref().map(Spanned::span)),
             ("take", c.take.as_ref().map(Spanned::span)),
+            ("word", c.word.as_ref().map(Spanned::span)),
             ("equals", c.equals.as_ref().map(Spanned::span)),
             ("within", c.within.as_ref().map(Spanned::span)),
             ("relation", c.relation.as_ref().map(Spanned::span)),
@@ -298,6 +378,11 @@ impl Claim {
             }
         }
         super::day(origin, "decided", &c.decided)?;
+        for (name, source) in std::iter::once((&c.of, of)).chain(c.and.as_ref().zip(and)) {
+            if let Some((at, why, help)) = c.misread(name, source) {
+                return Err(wrong(at, why, help));
+            }
+        }
         let reads = [(Some(&c.of), Some(of)), (c.and.as_ref(), and)];
         for (name, source) in reads.iter().filter_map(|(name, source)| Some(((*name)?, (*source)?)))
         {
@@ -620,6 +705,10 @@ fn no_number(ask: Ask, path: &str, modulus: bool) -> (String, String) {
         path.split('/').next().unwrap_or_default()
     }
     let (name, all) = (head(path), ask.numbers());
+    if all.is_empty() {
+        let why = format!("{} has no facts to read", ask.asked());
+        return (why, "give column = \"NAME\" with take".to_owned());
+    }
     let mut heads: Vec<&str> = all.iter().map(|known| head(known)).collect();
     heads.dedup();
     if !heads.contains(&name) {
@@ -656,6 +745,10 @@ fn reading(origin: &Origin, place: &Range<usize>, c: &ClaimFile) -> Result<Read,
                     ));
                 }
             };
+            if let Some(word) = &c.word {
+                let why = "`word` has no effect on a fact".into();
+                return Err(wrong(word.span(), why, "leave it out, or give column"));
+            }
             if let Some(table) = &c.table {
                 return Err(wrong(
                     table.span(),
@@ -674,8 +767,10 @@ fn reading(origin: &Origin, place: &Range<usize>, c: &ClaimFile) -> Result<Read,
                 Some(("mean", _)) => Take::Mean,
                 Some(("span", _)) => Take::Span,
                 Some(("count", _)) => Take::Count,
+                Some(("share", _)) => Take::Share,
+                Some(("onset", _)) => Take::Onset,
                 Some((other, at)) => {
-                    let help = "give last, first, max, min, mean, span or count";
+                    let help = "give last, first, max, min, mean, span, count, share or onset";
                     return Err(wrong(at, format!("`{other}` cannot be taken of a column"), help));
                 }
                 None => {
@@ -686,8 +781,18 @@ fn reading(origin: &Origin, place: &Range<usize>, c: &ClaimFile) -> Result<Read,
                     ));
                 }
             };
+            let counts = matches!(take, Take::Share | Take::Onset);
+            if let Some(word) = c.word.as_ref().filter(|_| !counts) {
+                let why = "`word` has an effect on share and onset alone".into();
+                return Err(wrong(word.span(), why, "leave it out"));
+            }
+            if counts && c.word.is_none() {
+                let help = "give word, such as word = \"period-1\"";
+                return Err(wrong(column.span(), "of which word?".into(), help));
+            }
             let table = c.table.as_ref().map(|t| t.get_ref().clone());
-            Ok(Read::Column { table, column: column.get_ref().clone(), take })
+            let word = c.word.as_ref().map(|w| w.get_ref().clone());
+            Ok(Read::Column { table, column: column.get_ref().clone(), take, word })
         }
         (Some(_), Some(column)) => {
             let why = "the claim reads a fact and a column".into();
@@ -743,9 +848,9 @@ impl Read {
                     _ => Err(format!("\"{path}\" is {at}, which is no number")),
                 }
             }
-            Read::Column { table, column, take } => {
-                let table = crate::paper::plots::table(answer, table.as_deref())?;
-                let values = crate::paper::plots::column(table, column)?;
+            Read::Column { table, column, take, .. } => {
+                let table = plots::table(answer, table.as_deref())?;
+                let values = plots::column(table, column)?;
                 // Blank cells are no numbers.
                 let numbers: Vec<f64> = values.iter().copied().filter(|v| !v.is_nan()).collect();
                 let (low, high) = numbers
@@ -765,6 +870,8 @@ impl Read {
                     Take::Min => low,
                     Take::Mean => numbers.iter().sum::<f64>() / numbers.len() as f64,
                     Take::Span => high - low,
+                    // They are measured with an interval.
+                    Take::Share | Take::Onset => return Err("it is no number of a row".into()),
                 };
                 if taken.is_nan() {
                     return Err(format!("column \"{column}\" is blank in that row"));
@@ -775,14 +882,23 @@ impl Read {
     }
 }
 
-/// A number with half of its 95 % interval, if it has one.
+/// A number with half of its 95 % interval, if it has one, or of the interval in which it lies.
 struct Measured {
     value: f64,
     half: f64,
+    /// The finding before the number, in words.
+    how: String,
+}
+
+impl Measured {
+    fn of(value: f64, half: f64) -> Self {
+        Self { value, half, how: String::new() }
+    }
 }
 
 impl std::fmt::Display for Measured {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.how)?;
         f.write_str(&short(self.value))?;
         if self.half > 0.0 { write!(f, " ± {}", short(self.half)) } else { Ok(()) }
     }
@@ -792,6 +908,19 @@ impl Read {
     /// The number with the interval that stands beside it.
     fn measured(&self, answer: &Answer) -> Result<Measured, String> {
         let beside = match self {
+            Read::Column { table, column, take: Take::Share, word } => {
+                let table = plots::table(answer, table.as_deref())?;
+                return share(table, column, word.as_deref().unwrap_or_default());
+            }
+            Read::Column { table, column, take: Take::Onset, word } => {
+                let table = plots::table(answer, table.as_deref())?;
+                let word = word.as_deref().unwrap_or_default();
+                let Onset::Between(a, b) = onset(table, column, word)? else {
+                    return Err(format!("{word} does not begin in these rows"));
+                };
+                let how = format!("{word} begins from {} to {}: ", short(a), short(b));
+                return Ok(Measured { value: 0.5 * (a + b), half: 0.5 * (b - a).abs(), how });
+            }
             Read::Fact { path, modulus: false } => match path.strip_suffix("/value") {
                 Some("exponent") => Some("half_width".to_owned()),
                 Some(of) => Some(format!("{of}/half_width")),
@@ -800,8 +929,108 @@ impl Read {
             _ => None,
         };
         let half = beside.map(|path| Read::Fact { path, modulus: false }.of(answer));
-        Ok(Measured { value: self.of(answer)?, half: half.and_then(Result::ok).unwrap_or(0.0) })
+        Ok(Measured::of(self.of(answer)?, half.and_then(Result::ok).unwrap_or(0.0)))
     }
+
+    /// The finding if it does not begin within `within` of `equals`, though rows reach so far on
+    /// both sides.
+    fn never(&self, answer: &Answer, equals: f64, within: f64) -> Result<Option<String>, String> {
+        let Read::Column { table, column, take: Take::Onset, word: Some(word) } = self else {
+            return Ok(None);
+        };
+        let table = plots::table(answer, table.as_deref())?;
+        let Onset::Never(a, b) = onset(table, column, word)? else { return Ok(None) };
+        let said = format!("no {word} from {} to {} ({equals} claimed)", short(a), short(b));
+        if a.min(b) <= equals - within && a.max(b) >= equals + within {
+            return Ok(Some(said));
+        }
+        Err(format!("{said}: the rows do not reach so far"))
+    }
+}
+
+/// The share of rows with this word, with the wider half of its 95 % interval (Wilson 1927), as if
+/// rows were drawn at random. Of rows whose outcome is open any number may have the word.
+fn share(table: &Table, column: &str, word: &str) -> Result<Measured, String> {
+    let words = plots::words(table, column)?;
+    let outcomes = outcomes(table).unwrap_or_else(|| words.clone());
+    let rows = words.len() as u64;
+    if rows == 0 {
+        return Err(format!("column \"{column}\" has no rows"));
+    }
+    let hits = words.iter().filter(|w| **w == word).count() as u64;
+    let open =
+        words.iter().zip(&outcomes).filter(|(w, o)| **w != word && is_open(o)).count() as u64;
+    let (low, high) = (wilson(hits, rows, 0.95)[0], wilson(hits + open, rows, 0.95)[1]);
+    let value = hits as f64 / rows as f64;
+    let left = if open > 0 { format!(" ({open} are open)") } else { String::new() };
+    let how = format!("{hits} of {rows} rows are {word}{left}: ");
+    Ok(Measured { value, half: (high - value).max(value - low), how })
+}
+
+/// Outcomes of a sweep's rows, or of a map's.
+fn outcomes(table: &Table) -> Option<Vec<&str>> {
+    ["outcome", "ending"].iter().find_map(|name| plots::words(table, name).ok())
+}
+
+/// Place of an onset.
+#[derive(Debug, PartialEq)]
+enum Onset {
+    /// Between the last value without it and the first one with it.
+    Between(f64, f64),
+    /// Not from this value to that one.
+    Never(f64, f64),
+}
+
+/// Place where the outcome becomes this word, along a column whose values go one way. Rows whose
+/// outcome is open make it wider.
+fn onset(table: &Table, column: &str, word: &str) -> Result<Onset, String> {
+    let values = plots::column(table, column)?;
+    let rows: Vec<(f64, Option<bool>)> = match outcomes(table) {
+        Some(outcomes) => {
+            let is = |o: &&str| if is_open(o) { None } else { Some(*o == word) };
+            values.iter().copied().zip(outcomes.iter().map(is)).collect()
+        }
+        None => periods(table, &values)
+            .into_iter()
+            .map(|(value, found)| (value, found.map(|n| Some(n) == period_of(word))))
+            .collect(),
+    };
+    let rises = |a: f64, b: f64| rows.windows(2).all(|w| (b - a) * (w[1].0 - w[0].0) > 0.0);
+    let (Some((first, _)), Some((last, _))) = (rows.first(), rows.last()) else {
+        return Err(format!("column \"{column}\" has no rows"));
+    };
+    if !rises(*first, *last) {
+        let why = "its values do not go one way; vary it alone, and give its values in order";
+        return Err(format!("column \"{column}\" has no onset: {why}"));
+    }
+    let begins = rows.iter().position(|(_, is)| *is == Some(true));
+    let before = &rows[..begins.unwrap_or(rows.len())];
+    let without = before.iter().rev().find(|(_, is)| *is == Some(false));
+    match (begins, without) {
+        (Some(at), Some((without, _))) => Ok(Onset::Between(*without, rows[at].0)),
+        (Some(at), None) => Err(format!(
+            "{word} at {}, and no outcome before it: begin with a value that has another one",
+            short(rows[at].0)
+        )),
+        (None, _) if rows.iter().all(|(_, is)| is.is_some()) => Ok(Onset::Never(*first, *last)),
+        (None, _) => Err(format!("no row is {word}, and some are open; give a later t-end")),
+    }
+}
+
+/// Periods of an orbit diagram's points, value by value; none if they do not come back.
+fn periods(table: &Table, values: &[f64]) -> Vec<(f64, Option<usize>)> {
+    let states = table.columns.iter().skip_while(|c| c.name != "t").skip(1);
+    let states: Vec<&[f64]> = states.map(|c| table.numbers(&c.name)).collect();
+    let mut found = Vec::new();
+    let mut from = 0;
+    for group in values.chunk_by(|a, b| a == b) {
+        let rows = from..from + group.len();
+        from = rows.end;
+        let points: Vec<Vec<f64>> = rows.map(|i| states.iter().map(|s| s[i]).collect()).collect();
+        let period = period(&points, REPEATS).or_else(|| approached(&points));
+        found.push((group[0], period));
+    }
+    found
 }
 
 /// Whether a number is off by at most `within`, if its interval does not leave that open.
@@ -822,6 +1051,9 @@ impl Check {
         let first = &answers[0];
         match self {
             Check::Value { read, equals, within } => {
+                if let Some(said) = read.never(first, *equals, *within)? {
+                    return Ok((false, said));
+                }
                 let found = read.measured(first)?;
                 let off = (found.value - equals).abs();
                 let said = format!("{found} ({equals} claimed, {} off)", short(off));
@@ -846,7 +1078,7 @@ impl Check {
             Check::Order { read, less, than, other } => {
                 let value = read.measured(first)?;
                 let than = match (than, other) {
-                    (Some(than), _) => Measured { value: *than, half: 0.0 },
+                    (Some(than), _) => Measured::of(*than, 0.0),
                     (None, Some(other)) => other.measured(answers.last().unwrap_or(first))?,
                     (None, None) => return Err("nothing to compare with".into()),
                 };
@@ -1282,8 +1514,9 @@ mod tests {
         assert_eq!(fact("multipliers/0", true), Ok(5.0));
         assert!(fact("multiplier", false).unwrap_err().contains("it has multipliers"));
         assert!(fact("multipliers/7/0", false).unwrap_err().contains("no \"7\""));
-        let column =
-            |take| Read::Column { table: None, column: "p".into(), take }.of(&answer).unwrap();
+        let column = |take| {
+            Read::Column { table: None, column: "p".into(), take, word: None }.of(&answer).unwrap()
+        };
         let found =
             [Take::Last, Take::First, Take::Max, Take::Min, Take::Mean, Take::Span, Take::Count]
                 .map(column);
@@ -1295,7 +1528,7 @@ mod tests {
         let read = |cells: &[f64], take| {
             let mut table = Table::new("path", vec![crate::job::Column::numbers("p")]);
             cells.iter().for_each(|v| table.push(vec![crate::job::Entry::Number(*v)]));
-            Read::Column { table: None, column: "p".into(), take }
+            Read::Column { table: None, column: "p".into(), take, word: None }
                 .of(&Answer::of_tables(vec![table]))
         };
         for take in [Take::Last, Take::First, Take::Max, Take::Min, Take::Mean, Take::Span] {
@@ -1304,6 +1537,90 @@ mod tests {
         assert_eq!(read(&[1.0, f64::NAN, 3.0], Take::Mean), Ok(2.0));
         assert_eq!(read(&[1.0, f64::NAN, 3.0], Take::Last), Ok(3.0));
         assert!(read(&[1.0, f64::NAN], Take::Last).unwrap_err().contains("blank in that row"));
+    }
+
+    fn rows(outcomes: &[(f64, &str)]) -> Table {
+        let columns = [crate::job::Column::numbers("p"), crate::job::Column::words("outcome")];
+        let mut table = Table::new("sweep", columns);
+        for (p, outcome) in outcomes {
+            let word = crate::job::Entry::Word((*outcome).into());
+            table.push([crate::job::Entry::Number(*p), word]);
+        }
+        table
+    }
+
+    /// The outcome changes between two rows that have one; what is open between them leaves open
+    /// where.
+    #[test]
+    fn an_onset_lies_between_rows_that_are_decided() {
+        let [one, two, open] = ["period-1", "period-2", "undecided"];
+        let of = |outcomes: &[(f64, &str)]| onset(&rows(outcomes), "p", two);
+        assert_eq!(of(&[(1.0, one), (2.0, two), (3.0, one)]), Ok(Onset::Between(1.0, 2.0)));
+        let widened = of(&[(4.0, one), (3.0, open), (2.0, "failed"), (1.0, two)]);
+        assert_eq!(widened, Ok(Onset::Between(4.0, 1.0)));
+        assert_eq!(of(&[(1.0, one), (2.0, "rest")]), Ok(Onset::Never(1.0, 2.0)));
+        for (outcomes, why) in [
+            (&[(1.0, open), (2.0, two)][..], "no outcome before it"),
+            (&[(1.0, one), (2.0, open)], "some are open"),
+            (&[(1.0, one), (3.0, one), (2.0, two)], "do not go one way"),
+            (&[(1.0, one), (1.0, two)], "do not go one way"),
+            (&[], "has no rows"),
+        ] {
+            let found = of(outcomes).unwrap_err();
+            assert!(found.contains(why), "{found}");
+        }
+        // A claim differs if it never begins in rows that reach far enough, and on those alone.
+        let (table, word) = (None, Some(two.to_owned()));
+        let read = Read::Column { table, column: "p".into(), take: Take::Onset, word };
+        let answer = [Arc::new(Answer::of_tables(vec![rows(&[(1.0, one), (2.0, one)])]))];
+        let judged = |equals| Check::Value { read: read.clone(), equals, within: 0.25 }.of(&answer);
+        assert_eq!(judged(1.5).map(|(agrees, _)| agrees), Ok(false));
+        assert!(judged(1.9).unwrap_err().contains("do not reach so far"));
+        let order = Check::Order { read, less: false, than: Some(1.5), other: None };
+        assert!(order.of(&answer).unwrap_err().contains("does not begin"));
+    }
+
+    /// Wilson's interval of 9 of 10 is 0.596 to 0.982; rows that are open may be of either kind.
+    #[test]
+    fn a_share_has_an_interval_that_open_rows_widen() {
+        let of = |hits: usize, open: usize| {
+            let words = |i| {
+                if i < hits {
+                    "rest"
+                } else if i < hits + open {
+                    "failed"
+                } else {
+                    "far"
+                }
+            };
+            let outcomes: Vec<(f64, &str)> = (0..10).map(|i| (i as f64, words(i))).collect();
+            share(&rows(&outcomes), "outcome", "rest").unwrap()
+        };
+        let Measured { value, half, how } = of(9, 0);
+        assert_eq!((value, how.as_str()), (0.9, "9 of 10 rows are rest: "));
+        assert!((half - (0.9 - 0.59585)).abs() < 1e-4, "{half}");
+        let Measured { value, half, how } = of(4, 2);
+        assert_eq!((value, how.as_str()), (0.4, "4 of 10 rows are rest (2 are open): "));
+        assert!((half - (wilson(6, 10, 0.95)[1] - 0.4)).abs() < 1e-12, "{half}");
+    }
+
+    /// Two points in turn, one, and none that come back; a value that was not crossed has no row.
+    #[test]
+    fn an_orbit_diagram_has_a_period_at_each_value() {
+        let columns = ["params.p", "t", "x"].map(crate::job::Column::numbers);
+        let mut table = Table::new("passages", columns);
+        let x = |p: i32, i: i32| match p {
+            1 => 0.5,
+            2 => f64::from(i % 2),
+            _ => f64::from(i * i % 97),
+        };
+        for (p, i) in [1, 2, 4].into_iter().flat_map(|p| (0..30).map(move |i| (p, i))) {
+            let cells = [f64::from(p), f64::from(i), x(p, i)];
+            table.push(cells.map(crate::job::Entry::Number));
+        }
+        let values = table.numbers("params.p").to_vec();
+        assert_eq!(periods(&table, &values), [(1.0, Some(1)), (2.0, Some(2)), (4.0, None)]);
+        assert_eq!(onset(&table, "params.p", "period-2"), Ok(Onset::Between(1.0, 2.0)));
     }
 
     /// Crossings that differ by the errors of a run are one point.

@@ -110,6 +110,9 @@ impl Folder {
         let known = self.known()?;
         for (name, source) in &self.sources {
             executor.asked_for(&*source.question, name.as_str());
+            for part in source.question.rests_on() {
+                executor.asked_for(&*part, name.as_str());
+            }
         }
         let mut asked: Vec<AnyQuestion> = questions(self.figures.iter().flat_map(|f| &f.pictures));
         for claim in &self.claims {

@@ -5,7 +5,8 @@
 //! paper.toml       citation, defaults of all runs, readings of the parameters, open questions
 //! systems/*.toml   its equations
 //! figures/*.toml   its figures, panel by panel
-//! measures.toml    what its claims rest on beside the figures: orbits, exponents, rests, runs
+//! measures.toml    what its claims rest on beside the figures: orbits, exponents, rests, runs,
+//!                  scans, sweeps
 //! claims.toml      its claims, each with a check and the day on which its rule was fixed
 //! data/*.csv       numbers read off the paper, drawn over panels
 //! expected/        the hashes and outcomes that were found before
@@ -98,6 +99,8 @@ struct ReadColumns {
     /// The table [default: the first].
     table: Option<Spanned<String>>,
     columns: Vec<Spanned<String>>,
+    /// Whether they are columns of words.
+    words: bool,
 }
 
 impl ReadColumns {
@@ -112,7 +115,11 @@ impl ReadColumns {
             let at = self.table.as_ref().unwrap_or(name);
             let table = plots::table(answer, self.table.as_ref().map(|t| t.get_ref().as_str()))
                 .map_err(|why| wrong(at, why))?;
-            plots::column(table, name.get_ref()).map_err(|why| wrong(name, why))?;
+            let found = match self.words {
+                true => plots::words(table, name.get_ref()).map(drop),
+                false => plots::column(table, name.get_ref()).map(drop),
+            };
+            found.map_err(|why| wrong(name, why))?;
         }
         Ok(())
     }
@@ -405,6 +412,11 @@ struct MeasureFile {
     lyapunov: Option<Spanned<Words>>,
     /// Equilibria and pseudo-equilibria, as `twofold rests` finds them.
     rests: Option<Spanned<Words>>,
+    /// An orbit diagram, or a map of endings, as `twofold scan` computes it: the table of its late
+    /// crossings, or of its endings. Over one setting every run has to succeed.
+    scan: Option<Spanned<Words>>,
+    /// Many runs, as `twofold sweep` computes them: the table of its rows.
+    sweep: Option<Spanned<Words>>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -616,19 +628,21 @@ impl Folder {
         for (name, measure) in measures {
             plain(&origin, &name, "measure")?;
             let place = measure.span();
-            let MeasureFile { run, orbit, lyapunov, rests } = measure.into_inner();
+            let MeasureFile { run, orbit, lyapunov, rests, scan, sweep } = measure.into_inner();
             let given = [
                 (Ask::Run, run),
                 (Ask::Orbit, orbit),
                 (Ask::Lyapunov, lyapunov),
                 (Ask::Rests, rests),
+                (Ask::Scan, scan),
+                (Ask::Sweep, sweep),
             ];
             let mut given: Vec<_> =
                 given.into_iter().filter_map(|(ask, words)| Some((ask, words?))).collect();
             let (Some((ask, words)), true) = (given.pop(), given.is_empty()) else {
                 let why =
                     format!("measure `{}` asks no question, or more than one", name.get_ref());
-                let help = "give it one of run, orbit, lyapunov, rests".to_owned();
+                let help = "give it one of run, orbit, lyapunov, rests, scan, sweep".to_owned();
                 return Err(FolderError::at(&origin, place, why, Some(help)));
             };
             let said = Said::new(&origin, &words, &self.common, &[])?;
@@ -928,6 +942,7 @@ impl Folder {
                 question: question.clone(),
                 table: panel.table.clone(),
                 columns: std::iter::once(x).chain(y).cloned().collect(),
+                words: false,
             });
             let columns = Columns {
                 table: panel.table.as_ref().map(|t| t.get_ref().clone()),
@@ -1050,7 +1065,7 @@ impl Folder {
                 let why = format!("there are two claims `{}`", claim.get_ref().id.get_ref());
                 return Err(FolderError::at(&origin, claim.get_ref().id.span(), why, None));
             }
-            let read = claim.get_ref().column();
+            let (read, words) = (claim.get_ref().column(), claim.get_ref().counts_words());
             let claim = Claim::read(&origin, claim, &|name| self.source(&origin, name))?;
             self.claims.push(claim);
             let Some((column, table, of)) = read else { continue };
@@ -1060,6 +1075,7 @@ impl Folder {
                     question: self.source(&origin, &name)?.question.clone(),
                     table: table.clone(),
                     columns: vec![column.clone()],
+                    words,
                 });
             }
         }

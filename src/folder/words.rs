@@ -12,10 +12,12 @@ use toml::{Spanned, Value};
 use super::FolderError;
 use crate::cli::CliError;
 use crate::cli::asked;
-use crate::cli::commands::{lyapunov, orbit, rests};
+use crate::cli::commands::{lyapunov, orbit, rests, scan, sweep};
 use crate::cli::flags::{RunFlags, Use};
 use crate::cli::models::table_files;
 use crate::job::AnyQuestion;
+use crate::job::scan::{MOST_RUNS, ScanQuestion};
+use crate::job::sweep::SweepQuestion;
 use crate::paper::plots::Recorded;
 use crate::system::diagnostic::nearest;
 use crate::system::{Diagnostic, library};
@@ -58,6 +60,10 @@ pub enum Ask {
     Lyapunov,
     /// `twofold rests`.
     Rests,
+    /// `twofold scan`.
+    Scan,
+    /// `twofold sweep`.
+    Sweep,
 }
 
 impl Ask {
@@ -68,6 +74,8 @@ impl Ask {
             Ask::Orbit => "a closed orbit",
             Ask::Lyapunov => "an exponent",
             Ask::Rests => "rests",
+            Ask::Scan => "a scan",
+            Ask::Sweep => "a sweep",
         }
     }
 
@@ -122,6 +130,8 @@ impl Ask {
                 "rests/*/family/dimension",
                 "rests/*/family/ends/*/*",
             ],
+            // All that they find is in their tables.
+            Ask::Scan | Ask::Sweep => &[],
         }
     }
 
@@ -139,12 +149,15 @@ impl Ask {
     }
 }
 
-/// Flags that say where an answer goes, and one that reads a whole run from elsewhere: not a
-/// question's.
-const NOT_ASKED: [&str; 5] = ["spec", "out", "format", "quiet", "help"];
+/// Flags that say where an answer goes and by which means it is computed, and one that reads a
+/// whole run from elsewhere: not a question's.
+pub const NOT_ASKED: [&str; 12] = [
+    "spec", "out", "format", "quiet", "help", "plot", "show", "threads", "shard", "resume",
+    "recheck", "json",
+];
 
 /// Flags that are given several times rather than as a list.
-const REPEATED: [&str; 2] = ["set", "within"];
+const REPEATED: [&str; 3] = ["set", "within", "over"];
 
 impl Words {
     fn flags(&self, origin: &Origin) -> Result<Vec<Flag>, FolderError> {
@@ -391,6 +404,18 @@ impl Said {
                 let question =
                     self.parsed::<rests::Arguments>(root)?.question().map_err(refused)?;
                 Ok(Arc::new(question))
+            }
+            Ask::Scan => {
+                let scan = self.parsed::<scan::Arguments>(root)?.scan().map_err(refused)?;
+                Ok(Arc::new(ScanQuestion::from(scan)))
+            }
+            Ask::Sweep => {
+                let sweep = self.parsed::<sweep::Arguments>(root)?.sweep().map_err(refused)?;
+                if sweep.rows() > MOST_RUNS {
+                    let why = format!("{} runs; a measure has at most {MOST_RUNS}", sweep.rows());
+                    return Err(self.wrong(Some("over"), why, None));
+                }
+                Ok(Arc::new(SweepQuestion::from(sweep)))
             }
         }
     }

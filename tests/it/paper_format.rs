@@ -9,6 +9,7 @@ use clap::{Arg, ArgAction};
 use serde_json::{Map, Value, json};
 
 use twofold::analyse::branch::Change;
+use twofold::folder::words::NOT_ASKED;
 
 use super::common::schema;
 use super::reference::{Key, hold, keys, keys_tables, meaning, root, run_flags, source};
@@ -41,10 +42,10 @@ fn checks() -> Vec<[Vec<String>; 3]> {
     let (body, _) = body.split_once("\n];").unwrap();
     let quoted =
         |part: &str| part.split('"').skip(1).step_by(2).map(str::to_owned).collect::<Vec<_>>();
-    let lines = body.lines().filter(|l| l.trim().starts_with("(\""));
-    lines
-        .map(|line| {
-            let parts: Vec<_> = line.split("&[").map(quoted).collect();
+    body.split("\n    (")
+        .skip(1)
+        .map(|kind| {
+            let parts: Vec<_> = kind.split("&[").map(quoted).collect();
             parts.try_into().expect("a kind, what it needs, what it may have")
         })
         .collect()
@@ -105,9 +106,10 @@ fn value(arg: &Arg) -> Value {
 fn question(command: &str) -> Value {
     let definition = twofold::cli::commands::definition();
     let command = definition.find_subcommand(command).unwrap();
-    let hidden = ["spec", "out", "format", "quiet", "help", "version", "print-spec", "horizon"];
+    let hidden = ["version", "print-spec", "horizon"];
     let own = run_flags();
-    let wanted = |a: &&Arg| a.get_long().is_some_and(|l| !hidden.contains(&l));
+    let wanted =
+        |a: &&Arg| a.get_long().is_some_and(|l| !hidden.contains(&l) && !NOT_ASKED.contains(&l));
     // A run's own command has flags of its output beside those of the run.
     let flags: Vec<&Arg> = match command.get_name() {
         "run" => own.iter().filter(wanted).collect(),
@@ -145,7 +147,7 @@ fn typed(key: &Key) -> Value {
             json!({ "enum": ["series", "plane", "space", "section", "columns", "halves",
                 "surface"] })
         }
-        "Words" if ["orbit", "lyapunov", "rests"].contains(&key.name.as_str()) => {
+        "Words" if ["orbit", "lyapunov", "rests", "scan", "sweep"].contains(&key.name.as_str()) => {
             question(&key.name)
         }
         "Words" => question("run"),
@@ -181,8 +183,9 @@ fn typed(key: &Key) -> Value {
         }
         "relation" => value["enum"] = json!(["less", "<", "greater", ">"]),
         "take" => {
-            value["enum"] =
-                json!(["last", "first", "max", "min", "mean", "span", "count", "modulus"])
+            value["enum"] = json!([
+                "last", "first", "max", "min", "mean", "span", "count", "share", "onset", "modulus"
+            ])
         }
         "format" => value["const"] = json!(1),
         _ => {}
@@ -221,9 +224,12 @@ fn claim() -> Value {
             // A fact, or a quantity of a column.
             then["oneOf"] = json!([
                 { "required": ["read"], "properties": { "column": false, "table": false,
-                    "take": { "const": "modulus" } } },
-                { "required": ["column", "take"], "properties": { "read": false, "take": { "enum":
-                    ["last", "first", "max", "min", "mean", "span", "count"] } } },
+                    "word": false, "take": { "const": "modulus" } } },
+                { "required": ["column", "take"], "properties": { "read": false, "word": false,
+                    "take": { "enum":
+                        ["last", "first", "max", "min", "mean", "span", "count"] } } },
+                { "required": ["column", "take", "word"], "properties": { "read": false,
+                    "take": { "enum": ["share", "onset"] } } },
             ]);
         }
         if may.iter().any(|key| key == "than") {
@@ -331,7 +337,7 @@ fn papers_follow_the_schemas() {
 /// values of another type or out of their range. (A day as a text is the same in JSON.)
 #[test]
 fn a_schema_and_its_reader_refuse_the_same() {
-    let changes: [(&str, &str, &str, &str); 31] = [
+    let changes: [(&str, &str, &str, &str); 35] = [
         ("paper.toml", "paper", "year = 2026", "year = 70000"),
         ("paper.toml", "paper", "year = 2026", "year = 2026\npublished = 10:00:00"),
         ("paper.toml", "paper", "[run]", "[readings.\"a b\"]\nabout = \"\"\n[run]"),
@@ -376,6 +382,10 @@ fn a_schema_and_its_reader_refuse_the_same() {
         ("figures/fig1.toml", "figure", "draw = \"series\"", "draw = \"sries\""),
         ("figures/fig1.toml", "figure", "label = \"b\"", ""),
         ("measures.toml", "measures", "settle = 20", "settel = 20"),
+        ("measures.toml", "measures", "[cycle]", "[cycle]\nscan = {}"),
+        ("measures.toml", "measures", "settle = 20", "threads = 2"),
+        ("claims.toml", "claims", "read = \"period\"", "read = \"period\"\nword = \"rest\""),
+        ("claims.toml", "claims", "read = \"period\"", "column = \"outcome\"\ntake = \"share\""),
         ("claims.toml", "claims", "check = \"order\"", "check = \"ordre\""),
         ("claims.toml", "claims", "place = \"sec. 2\"", "plaec = \"sec. 2\""),
     ];

@@ -1275,3 +1275,178 @@ run = { t-end = 11 }
         assert!(said.iter().all(|s| said_of.contains(s)), "{to}: {said_of}");
     }
 }
+
+/// The logistic map x -> r x (1 - x) once a unit of time, at the half of it: e^-t in between is
+/// undone by the factor of the map. Its period doubles at r = 3, and at 1 + sqrt(6) = 3.449.
+const LOGISTIC: &str = "states = [\"x\"]\nstart = [0.3]\nparameters = { r = 2.8 }\n\
+    f = [\"-x\"]\n[[event]]\nwhen = \"cos(pi*t)\"\n\
+    set = { x = \"exp(1)*r*x*(1 - x)\" }\n";
+
+/// Its scan and sweeps.
+const RUNS: &str = "\n[diagram]\nscan = { system = \"systems/logistic.toml\", period = 1, t-end = \
+    400, over = \"params.r=2.8..3.4:25\" }\n\
+    [turns]\nsweep = { system = \"systems/logistic.toml\", period = 1, t-end = 400, over = \
+    \"params.r=2.8..3.4:13\" }\n\
+    [few]\nsweep = { system = \"systems/logistic.toml\", period = 1, t-end = 400, over = \
+    [\"params.r=2.7,2.8,3.2,3.3\", \"start.x=0.2,0.4,0.6\"] }\n";
+
+fn with_runs() -> TempDir {
+    let place = small();
+    let root = place.path().join("p");
+    fs::write(root.join("systems/logistic.toml"), LOGISTIC).unwrap();
+    let text = fs::read_to_string(root.join("measures.toml")).unwrap();
+    fs::write(root.join("measures.toml"), text + RUNS).unwrap();
+    place
+}
+
+/// A claim that reads a column, with the rest of its rule.
+fn of_column(of: &str, column: &str, rule: &str) -> String {
+    format!("check = \"value\"\nof = \"{of}\"\ncolumn = \"{column}\"\n{rule}")
+}
+
+/// The line of `make` about the first claim with another rule, and all that it says.
+fn scored(root: &Path, rule: &str) -> (String, String) {
+    let text = fs::read_to_string(root.join("claims.toml")).unwrap();
+    let (before, after) = text.split_once("check = ").unwrap();
+    let rest = after.split_once("\n\n").map_or("", |(_, rest)| rest);
+    fs::write(root.join("claims.toml"), format!("{before}{rule}\n\n{rest}")).unwrap();
+    let (_, out, said) = paper(&["make", "--quiet"], root);
+    let line = out.lines().find(|line| line.contains("period:")).unwrap_or_default();
+    (line.to_owned(), format!("{out}{said}"))
+}
+
+/// An orbit diagram and a table of runs: drawn as columns, and read by claims.
+#[test]
+fn scans_and_sweeps_are_measures() {
+    let place = with_runs();
+    let root = place.path().join("p");
+    let panel = |label, of, y| {
+        format!(
+            "\n[[panel]]\nlabel = \"{label}\"\ndraw = \"columns\"\nof = \"{of}\"\nx = \
+                \"params.r\"\ny = [\"{y}\"]\ndots = true\n"
+        )
+    };
+    let text = fs::read_to_string(root.join("figures/fig1.toml")).unwrap();
+    let panels = panel("c", "diagram", "x") + &panel("d", "turns", "exponent");
+    fs::write(root.join("figures/fig1.toml"), text + &panels).unwrap();
+    let (code, _, said) = paper(&["make"], &root);
+    assert_eq!(code, 0, "{said}");
+    for line in ["diagram: scan over params.r, runs 1 to 1: ", "turns: sweep over params.r, rows"] {
+        assert!(said.contains(line), "{line}: {said}");
+    }
+    let scan = Command::cargo_bin("twofold")
+        .unwrap()
+        .args(["scan", "--period", "1", "--t-end", "400", "--over", "params.r=2.8..3.4:25"])
+        .args(["--quiet", "--system"])
+        .arg(root.join("systems/logistic.toml"))
+        .output()
+        .unwrap();
+    let rows = |bytes: &[u8]| -> Vec<String> {
+        let text = std::str::from_utf8(bytes).unwrap();
+        text.lines().filter(|line| !line.starts_with('#')).map(str::to_owned).collect()
+    };
+    let ours = fs::read(root.join("out/fig1/fig1-c-passages.csv")).unwrap();
+    assert_eq!(rows(&ours), rows(&scan.stdout));
+
+    let onset = |of, word, at, within| {
+        let take = format!("take = \"onset\"\nword = \"{word}\"");
+        of_column(of, "params.r", &format!("{take}\nequals = {at}\nwithin = {within}"))
+    };
+    let share = |equals, within| {
+        let take = "take = \"share\"\nword = \"period-2\"";
+        of_column("few", "outcome", &format!("{take}\nequals = {equals}\nwithin = {within}"))
+    };
+    for (rule, outcome, words) in [
+        (onset("diagram", "period-2", "3", "0.1"), "agrees", "period-2 begins from 2.9"),
+        (onset("turns", "period-2", "3", "0.15"), "agrees", "period-2 begins from 3 to 3.05"),
+        (onset("diagram", "period-2", "3.3", "0.1"), "differs", "3.3 claimed"),
+        (onset("diagram", "period-3", "3.2", "0.1"), "cannot be scored", "some are open"),
+        (onset("diagram", "period-2", "3", "1e-3"), "cannot be scored", "does not decide it"),
+        (onset("diagram", "period-2", "9", "0.1"), "differs", "9 claimed"),
+        (share("0.5", "0.3"), "agrees", "6 of 12 rows are period-2: 0.5 ± "),
+        (share("0.1", "0.1"), "differs", "0.1 claimed"),
+        (share("0.6", "0.1"), "cannot be scored", "does not decide it"),
+    ] {
+        let (line, all) = scored(&root, &rule);
+        assert!(line.contains(outcome) && line.contains(words), "{rule}: {line}\n{all}");
+    }
+    // Nothing was computed again.
+    let (_, _, said) = paper(&["make"], &root);
+    assert!(!said.contains("over params.r, r"), "{said}");
+}
+
+/// Values that do not go one way have no onset; a run that fails leaves no hole in a diagram.
+#[test]
+fn a_scan_that_is_no_diagram_is_not_scored() {
+    let place = with_runs();
+    let root = place.path().join("p");
+    let onset = "take = \"onset\"\nword = \"period-2\"\nequals = 3\nwithin = 1";
+    let (line, all) = scored(&root, &of_column("few", "params.r", onset));
+    assert!(line.contains("do not go one way"), "{line}\n{all}");
+    let rule = of_column("diagram", "x", "take = \"max\"\nequals = 1\nwithin = 1");
+    change(&root, "systems/logistic.toml", "-x\"", "-x + 0*sqrt(3.3 - r)\"");
+    let (line, all) = scored(&root, &rule);
+    assert!(line.contains("params.r = 3.325: "), "{line}\n{all}");
+    // Of a sweep it is a row, and leaves the share open.
+    let share = "take = \"share\"\nword = \"period-2\"\nequals = 0.5\nwithin = 0.3";
+    let (line, all) = scored(&root, &of_column("turns", "outcome", share));
+    assert!(line.contains("are open") && line.contains("cannot be scored"), "{line}\n{all}");
+}
+
+/// Wrong words of scans and sweeps, and of what claims read of them.
+#[test]
+fn what_is_wrong_in_scans_and_sweeps_is_said_with_its_place() {
+    let onset = |of: &str, word: &str| {
+        let take = format!("take = \"onset\"\nword = \"{word}\"\nequals = 3\nwithin = 1");
+        of_column(of, "params.r", &take)
+    };
+    let share = |of: &str, column: &str, more: &str| {
+        of_column(of, column, &format!("take = \"share\"\n{more}equals = 3\nwithin = 1"))
+    };
+    let over = "over = \"params.r=2.8..3.4:25\"";
+    let diagram = |word: &str| format!("{over}, {word}");
+    let cases: Vec<(&str, &str, String, &[&str])> = vec![
+        ("measures.toml", over, "over = \"params.q=1..2:3\"".into(), &["q", "measures.toml:9:"]),
+        ("measures.toml", over, "over = 3".into(), &["measures.toml:9:"]),
+        ("measures.toml", over, "overs = 3".into(), &["unknown key `overs`", "mean `over`?"]),
+        ("measures.toml", over, diagram("alike = 0.1"), &["--alike has no effect", "toml:9:"]),
+        ("measures.toml", over, diagram("plot = \"x.png\""), &["`plot` is not part of", ":9:"]),
+        ("measures.toml", over, diagram("threads = 2"), &["`threads` is not part of", ":9:"]),
+        ("measures.toml", ":13\"", ":13\", shard = \"1/2\"".into(), &["`shard` is not part of"]),
+        ("measures.toml", ":13\"", ":2000000\"".into(), &["at most 1000000", "toml:11:"]),
+        ("measures.toml", ":13\"", ":13\", random = 3".into(), &["measures.toml:11:"]),
+        ("claims.toml", VALUE, onset("diagram", "period-1"), &["does not tell", "toml:11:8"]),
+        ("claims.toml", VALUE, onset("turns", "perod-2"), &["no outcome `perod-2`", "toml:11:8"]),
+        ("claims.toml", VALUE, onset("turns", "failed"), &["leaves open what", "toml:11:8"]),
+        ("claims.toml", VALUE, onset("cycle", "rest"), &["no onset is taken", "toml:8:6"]),
+        ("claims.toml", VALUE, share("diagram", "x", "word = \"rest\"\n"), &["no share is taken"]),
+        ("claims.toml", VALUE, share("few", "outcome", ""), &["of which word?", "toml:9:10"]),
+        (
+            "claims.toml",
+            VALUE,
+            share("few", "outcom", "word = \"rest\"\n"),
+            &["no column of words \"outcom\"", "toml:9:10", "it has mode, event, outcome"],
+        ),
+        (
+            "claims.toml",
+            VALUE,
+            of_column("few", "end", "take = \"max\"\nword = \"rest\"\nequals = 3\nwithin = 1"),
+            &["`word` has an effect on share and onset alone", "toml:11:8"],
+        ),
+        ("claims.toml", "of = \"cycle\"", "of = \"few\"".into(), &["a sweep has no facts"]),
+    ];
+    for (file, from, to, said) in cases {
+        let place = with_runs();
+        let root = place.path().join("p");
+        change(&root, file, from, &to);
+        let (code, out, error) = paper(&["make", "--quiet"], &root);
+        assert_eq!(code, 2, "{to}: {out}{error}");
+        assert!(said.iter().all(|s| error.contains(s)), "{to}: {error}");
+    }
+    let place = with_runs();
+    let root = place.path().join("p");
+    change(&root, "measures.toml", over, &diagram("follow = \"both\""));
+    change(&root, "claims.toml", VALUE, &onset("diagram", "period-2"));
+    let (code, _, error) = paper(&["make", "--quiet"], &root);
+    assert!(code == 2 && error.contains("goes up and down, and has two onsets"), "{error}");
+}

@@ -238,10 +238,12 @@ impl Plots {
 }
 
 impl Plot {
-    /// Parameters of its system, but that along which a branch is followed.
+    /// Parameters of its system, but that along which a branch is followed and those over which
+    /// runs vary.
     fn parameters(&self) -> Vec<(String, f64)> {
         let question = self.question.json();
-        let system = &question["system"];
+        let runs = &question["sweep"];
+        let system = question.get("system").unwrap_or(&runs["run"]["system"]);
         let mut parameters: Vec<(String, f64)> =
             match serde_json::from_value::<System>(system.clone()) {
                 Ok(system) => {
@@ -255,7 +257,16 @@ impl Plot {
                 }
             };
         parameters.retain(|(name, _)| question["along"]["parameter"] != *name);
+        for axis in runs["over"].as_array().into_iter().flatten() {
+            parameters.retain(|(name, _)| axis["coordinate"] != format!("params.{name}"));
+        }
         parameters
+    }
+
+    /// Dots of a table. Those of an orbit diagram have one shade, as `twofold scan` draws them:
+    /// periodic branches would be denser than chaos.
+    fn look_of_dots(&self) -> DotStyle {
+        if self.question.kind() == "scan" { DotStyle::plain(style::INK) } else { DotStyle::late() }
     }
 
     fn sheet(&self, answer: &Answer) -> Result<Sheet, String> {
@@ -264,7 +275,7 @@ impl Plot {
                 let frame = recorded.frame();
                 plot::sheet(&frame, answer, look, Vec::new()).map_err(|e| e.to_string())?
             }
-            Drawing::Columns(columns) => columns.sheet(answer)?,
+            Drawing::Columns(columns) => columns.sheet(answer, self.look_of_dots())?,
         };
         Ok(self.with_points(sheet))
     }
@@ -289,7 +300,7 @@ impl Plot {
             Drawing::Columns(columns) => {
                 let names = columns.y.iter().chain([&columns.x]).map(String::as_str);
                 let table = columns.table.as_deref().unwrap_or_default();
-                columns.sheet(&two_rows(table, names.collect()))?
+                columns.sheet(&two_rows(table, names.collect()), self.look_of_dots())?
             }
         };
         Ok(self.with_points(sheet))
@@ -318,7 +329,7 @@ impl Plot {
 }
 
 impl Columns {
-    fn sheet(&self, answer: &Answer) -> Result<Sheet, String> {
+    fn sheet(&self, answer: &Answer, look: DotStyle) -> Result<Sheet, String> {
         let table = table(answer, self.table.as_deref())?;
         let x = column(table, &self.x)?;
         let ys = self.y.iter().map(|name| column(table, name)).collect::<Result<Vec<_>, _>>()?;
@@ -338,7 +349,7 @@ impl Columns {
             let colour = COLOURS[k % COLOURS.len()];
             let points = x.iter().zip(y.iter()).map(|(x, y)| [*x, *y]).collect();
             let key = if self.dots {
-                let dots = DotStyle { colour, ..DotStyle::late() };
+                let dots = DotStyle { colour, ..look };
                 panel = panel.dots(points, dots);
                 LegendKey::Dots(dots)
             } else {
@@ -394,6 +405,24 @@ pub fn column<'a>(table: &'a Table, name: &str) -> Result<std::borrow::Cow<'a, [
         table.columns.iter().filter(is_number).map(|c| c.name.as_str()).collect();
     Err(format!(
         "table \"{}\" has no column of numbers \"{name}\"; it has {}",
+        table.name,
+        listed(&known)
+    ))
+}
+
+/// A column of words.
+///
+/// # Errors
+/// If the table has no such column: its name, and those that there are.
+pub fn words<'a>(table: &'a Table, name: &str) -> Result<Vec<&'a str>, String> {
+    let are_words = |c: &&twofold_job::Column| matches!(c.cells, Cells::Words(_));
+    let known = table.columns.iter().filter(are_words).map(|c| c.name.as_str());
+    if known.clone().any(|column| column == name) {
+        return Ok(table.words(name).collect());
+    }
+    let known: Vec<&str> = known.collect();
+    Err(format!(
+        "table \"{}\" has no column of words \"{name}\"; it has {}",
         table.name,
         listed(&known)
     ))

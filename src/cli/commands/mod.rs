@@ -18,7 +18,7 @@ mod run;
 pub(crate) mod scan;
 pub(crate) mod sensitivities;
 mod store;
-mod sweep;
+pub(crate) mod sweep;
 mod verify;
 
 use std::process::ExitCode;

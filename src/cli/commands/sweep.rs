@@ -153,7 +153,16 @@ const ONE_STATE: &str = "where a run ends is seen where it meets a section, whic
     not have: give a system of two states or more, or write this one with `f = [...]` instead of \
     h, plus and minus";
 
-/// The sweep that the flags describe.
+impl Arguments {
+    /// The sweep that is asked for.
+    ///
+    /// # Errors
+    /// If a flag has no effect, or a value is wrong.
+    pub fn sweep(&self) -> Result<Sweep, CliError> {
+        sweep(self)
+    }
+}
+
 fn sweep(arguments: &Arguments) -> Result<Sweep, CliError> {
     let usage = |text: String| Err(CliError::Usage(text));
     if let Some((flag, axis)) = arguments.flags.replaced_by(&arguments.over) {
