@@ -191,6 +191,10 @@ trap: ## check figures with every rounding function of the platform's mathematic
 bench-peers: ## W1 and W2 of benches/README.md by the peers and by us, in turn: table, ratios, picture (needs g++, Boost, SUNDIALS, python3)
 	@sh benches/peers/run.sh
 
+.PHONY: bench-work-precision
+bench-work-precision: ## error against time on six problems, by us and by the peers: benches/work-precision (needs g++, Boost, SUNDIALS, python3 and PyPI; twenty minutes)
+	@sh benches/work-precision/run.sh
+
 bench-cost: ## cost against end time, layer and tolerance: benches/cost.csv, cost.md and cost.svg
 	@$(CARGO) build --release --locked --quiet --manifest-path benches/peers/ours/Cargo.toml --target-dir target --bin twofold-cost
 	@target/release/twofold-cost > benches/cost.csv
