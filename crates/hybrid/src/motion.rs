@@ -514,6 +514,8 @@ struct Follower<'a> {
     holds: Vec<bool>,
     /// Events whose conditions become true at the run's very beginning.
     at_start: Vec<usize>,
+    /// Values of the watched expressions before a table's step.
+    watched_before: Vec<f64>,
     /// Whether tables have stepped on to other pieces at this moment.
     tables_step: bool,
     /// The largest size of each state so far.
@@ -959,6 +961,7 @@ impl<'a> Follower<'a> {
             event_of,
             holds: vec![false; events.len()],
             at_start: Vec::new(),
+            watched_before: Vec::new(),
             tables_step: false,
             size: x.iter().map(|v| v.abs()).collect(),
             lately: x.iter().map(|v| v.abs()).collect(),
@@ -1509,6 +1512,9 @@ impl<'a> Follower<'a> {
             .map(|g| self.compiled.place(*g).map_or(f64::NAN, |p| values[p]))
             .collect();
         self.tables_step = config.pieces != self.config.pieces;
+        if self.tables_step {
+            self.watched_before = values[self.compiled.active.len()..].to_vec();
+        }
         self.adopt(config, sliding.clone());
         if !self.equation.tables.is_empty() {
             // A table's jump may carry switching functions over zero, or away from it.

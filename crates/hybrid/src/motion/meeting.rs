@@ -1,5 +1,6 @@
 //! Actions at a point that is met: crossings, events, resets, contacts.
 
+use super::settling::Jump;
 use super::*;
 
 /// Smaller values of what is held at zero, and smaller speeds, relative to their sizes, are drift.
@@ -18,6 +19,10 @@ impl Follower<'_> {
     ) -> Result<Option<Ending>, HybridError> {
         let mut zero = self.sliding.clone();
         let mut fired = due.to_vec();
+        let before = match std::mem::take(&mut self.watched_before) {
+            known if !known.is_empty() => known,
+            _ => self.watched_values().split_off(self.compiled.active.len()),
+        };
         let mut passed = Vec::new();
         let mut crossed = Vec::new();
         let (mut leave, mut opened, mut ceases) = (Vec::new(), Vec::new(), false);
@@ -173,20 +178,36 @@ impl Follower<'_> {
             }
             self.rest_on_stops()?;
         }
-        let jumps = if switches { self.watch_jumps(&held, &passed) } else { Vec::new() };
+        let jumps = if switches { self.watch_jumps(&held, &before, &passed) } else { Vec::new() };
         for (i, _) in &jumps {
             passed.push(*i);
             if !self.pass(*i, definition, &mut fired, observe) {
                 return Ok(Some(Ending::Interrupted));
             }
         }
-        for i in passed {
-            let old = self.watch_side[i];
-            self.watch_side[i] = -old;
-            self.fresh_watch[i] = true;
-            (self.released[i], self.tangent[i]) = (0.0, false);
+        for i in &passed {
+            self.watch_side[*i] = -self.watch_side[*i];
+            self.fresh_watch[*i] = true;
+            (self.released[*i], self.tangent[*i]) = (0.0, false);
         }
-        jumps.iter().for_each(|(i, away)| self.fresh_watch[*i] = !away);
+        for (i, jump) in jumps {
+            match jump {
+                Jump::Over => self.fresh_watch[i] = false,
+                Jump::Leaves => {}
+                Jump::Onto => self.begin_watching(i, true, false),
+            }
+        }
+        if switches {
+            // A switch of the moment of their zero may have made them jump.
+            let values = self.watched_values().split_off(self.compiled.active.len());
+            for i in passed {
+                let size = self.magnitude(&self.equation.watched[i]).max(before[i].abs());
+                let value = values[i];
+                if value.abs() > 1e-12 * size {
+                    (self.watch_side[i], self.fresh_watch[i]) = (value.signum(), false);
+                }
+            }
+        }
         fired.extend(self.new_conditions(definition));
         // Switches that come ever faster with events, such as speeds that turn between impacts, end
         // where these do.
@@ -361,10 +382,19 @@ impl Follower<'_> {
         let mut mode = None;
         // Of several events, the states that each leaves behind.
         let mut left_behind = Vec::new();
+        let mut happened = Vec::new();
         for i in &fired {
             let event = &definition.events()[*i];
-            self.outcome.events += 1;
             self.x.copy_from_slice(&new);
+            // An earlier event of this moment may have kept a condition from becoming true.
+            if let When::Becomes(e) = &event.when
+                && new != old
+                && !self.becomes_true(e, mode, &old)
+            {
+                continue;
+            }
+            happened.push(*i);
+            self.outcome.events += 1;
             if !quiet && !self.emit(self.t, Some(&event.name), observe) {
                 return Ok(Some(Ending::Interrupted));
             }
@@ -414,6 +444,7 @@ impl Follower<'_> {
                 }
             }
         }
+        let fired = happened;
         if !new.iter().all(|v| v.is_finite()) {
             let names: Vec<&str> =
                 fired.iter().map(|i| definition.events()[*i].name.as_str()).collect();
@@ -510,6 +541,16 @@ impl Follower<'_> {
             }
             newly = self.new_conditions(definition);
             newly.extend(struck);
+            for (i, event) in definition.events().iter().enumerate() {
+                // It became false at this moment, and true again right after it.
+                if let When::Becomes(e) = &event.when
+                    && self.holds[i]
+                    && !fired.contains(&i)
+                    && !self.holds_here(e, &old)
+                {
+                    newly.push(i);
+                }
+            }
             if changed {
                 let blown = self.blown(definition, &old, &fired, &left_behind)?;
                 newly.extend(blown);
@@ -577,6 +618,44 @@ impl Follower<'_> {
         }
         // Events that a reset or a new mode makes true happen at once.
         self.happen(definition, &newly, &[], observe)
+    }
+
+    /// Whether a condition that becomes true at the state `old` still does at the present one, to
+    /// which events of the same moment have led, and from which the motion goes on in `mode`.
+    fn becomes_true(&mut self, e: &Expression, mode: Option<usize>, old: &[f64]) -> bool {
+        let mut at = self.config.clone();
+        at.mode = mode.unwrap_or(at.mode);
+        let (compiled, rates) = self.rates_of_second_order(&at);
+        for guard in 0..at.sides.len() {
+            let ahead = compiled.place(guard).map_or(0.0, |place| rates.direction(place));
+            if let Some(side) = self.side_at(guard, old, ahead) {
+                at.sides[guard] = side;
+            }
+        }
+        self.equation.holds(e, &at)
+    }
+
+    /// Whether a condition holds at the very place to which events have led from the state `old`.
+    fn holds_here(&self, e: &Expression, old: &[f64]) -> bool {
+        let mut at = self.config.clone();
+        for guard in 0..at.sides.len() {
+            if let Some(side) = self.side_at(guard, old, 0.0) {
+                at.sides[guard] = side;
+            }
+        }
+        self.equation.holds(e, &at)
+    }
+
+    /// The side of a switching function if it is another one than at the state `old`, or if it is
+    /// zero there and here, and goes on to the side `ahead`.
+    fn side_at(&self, guard: usize, old: &[f64], ahead: f64) -> Option<f64> {
+        let e = &self.equation.guards[guard].expression;
+        let moved = self.equation.value(e, self.t, old) != self.equation.value(e, self.t, &self.x);
+        match self.side_of(guard) {
+            Some(side) => moved.then_some(side),
+            None if moved => Some(0.0),
+            None => (ahead != 0.0 && !self.equation.guards[guard].whole).then_some(ahead),
+        }
     }
 
     /// Whether a value of a watched expression is on the side that its event passes to.
@@ -651,6 +730,12 @@ impl Follower<'_> {
             if rates.direction(place) == side && !(rates.first[place].abs() < small) {
                 continue;
             }
+            // An event that does not turn the speed is none of a contact: what leaves its zero has
+            // not come to it.
+            let turned = self.direction_after(event, place);
+            if turned == side || turned == 0.0 && direction == Direction::Both {
+                continue;
+            }
             if self.tangents.is_some() {
                 return Err(self.no_tangents(
                     "what lies at an event's zero is struck through it, where neighbours have no \
@@ -670,6 +755,20 @@ impl Follower<'_> {
             found.push(event);
         }
         Ok(found)
+    }
+
+    /// The way in which a watched value would go on if an event happened now.
+    fn direction_after(&mut self, event: usize, place: usize) -> f64 {
+        let event = &self.model.definition().events()[event];
+        let (watched, mut config) = (place - self.compiled.active.len(), self.config.clone());
+        config.mode = event.mode.unwrap_or(config.mode);
+        let old = self.x.clone();
+        for (state, value) in &event.set {
+            self.x[*state] = self.equation.value(value, self.t, &old);
+        }
+        let (compiled, rates) = self.rates_of_second_order(&config);
+        self.x = old;
+        rates.direction(compiled.active.len() + watched)
     }
 
     /// The time of a flight over an event's surface whose height is a thousand roundings of the

@@ -1768,8 +1768,14 @@ impl Follower<'_> {
     }
 
     /// The watched expressions that a switch made jump over zero or onto it, and those held at zero
-    /// until now that leave it to the side that they came from; and whether each is away from zero.
-    pub(super) fn watch_jumps(&mut self, held: &[bool], passed: &[usize]) -> Vec<(usize, bool)> {
+    /// until now that leave it to the side that they came from; `before` are their values until
+    /// then.
+    pub(super) fn watch_jumps(
+        &mut self,
+        held: &[bool],
+        before: &[f64],
+        passed: &[usize],
+    ) -> Vec<(usize, Jump)> {
         let mut values = vec![0.0; self.compiled.outputs];
         self.compiled.watched.evaluate(&self.variables, &mut values);
         let active = self.compiled.active.len();
@@ -1781,16 +1787,23 @@ impl Follower<'_> {
             if rests || held[i] && self.held[i] {
                 continue;
             }
-            let away = value.abs() > 1e-12 * self.magnitude(&self.equation.watched[i]);
+            // What jumps is as exact as it was before.
+            let size = self.magnitude(&self.equation.watched[i]).max(before[i].abs());
+            let small = 1e-12 * size;
+            let away = value.abs() > small;
             let leaves = held[i] && !away && {
                 self.begin_watching(i, true, false);
                 let ahead = std::mem::replace(&mut self.watch_side[i], side);
                 let left = self.left_watch[i];
                 if left != 0.0 { left * side < 0.0 } else { ahead == -side }
             };
-            let onto = self.held[i] && self.compiled.touches[active + i].is_empty();
-            if leaves || away && value * side < 0.0 || onto {
-                found.push((i, away));
+            let stays = self.held[i] && self.compiled.touches[active + i].is_empty();
+            if away && value * side < 0.0 {
+                found.push((i, Jump::Over));
+            } else if leaves || stays {
+                found.push((i, Jump::Leaves));
+            } else if !away && before[i] * side > small {
+                found.push((i, Jump::Onto));
             }
         }
         found
@@ -2052,6 +2065,16 @@ impl Follower<'_> {
         }
         new
     }
+}
+
+/// A meeting of a watched expression with zero that a switch brings about.
+pub(super) enum Jump {
+    /// It is on the other side now.
+    Over,
+    /// It was held at zero and leaves it, or is held there from now on.
+    Leaves,
+    /// It jumps onto zero.
+    Onto,
 }
 
 /// Accelerations of function `i` of two and rates of the other one in the four fields, numbered by
