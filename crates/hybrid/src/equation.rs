@@ -98,6 +98,8 @@ pub struct Equation {
     pub guards: Vec<Guard>,
     /// The first of the guards that the conditions of events alone ask.
     of_fields: usize,
+    /// For each event the guards that its condition asks.
+    pub(crate) of_events: Vec<Vec<usize>>,
     /// Whether any equation has a root, a logarithm or a division.
     pub(crate) has_domain_ends: bool,
     by_text: HashMap<String, (usize, bool)>,
@@ -232,6 +234,7 @@ impl Equation {
             values,
             guards: Vec::new(),
             of_fields: 0,
+            of_events: Vec::new(),
             has_domain_ends: false,
             by_text: HashMap::new(),
             tables,
@@ -263,6 +266,11 @@ impl Equation {
         for e in &conditions {
             equation.find(e, true, true)?;
         }
+        let asked = |event: &crate::definition::Event| match &event.when {
+            When::Becomes(e) => equation.guards_of(e),
+            _ => Vec::new(),
+        };
+        equation.of_events = equation.definition.events.iter().map(asked).collect();
         let sets = equation.definition.events.iter().flat_map(|event| &event.set);
         for e in
             fields.iter().chain(&terms).chain(&watched).chain(&conditions).chain(sets.map(|s| &s.1))
@@ -816,6 +824,24 @@ impl Equation {
     fn positive(&self, e: &Expression, at: &Configuration) -> bool {
         let (i, flipped) = self.guard(e, false);
         !self.rests(i, at) && (at.sides[i] > 0.0) != flipped
+    }
+
+    /// The guards that a condition asks.
+    fn guards_of(&self, condition: &Expression) -> Vec<usize> {
+        let (mut open, mut found, mut seen) = (vec![condition.clone()], Vec::new(), HashSet::new());
+        while let Some(e) = open.pop() {
+            match &e {
+                Expression::Greater(a, b) => match of_each(a, b) {
+                    Some(each) => open.push(each),
+                    None => found.push(self.guard(&difference(a, b), false).0),
+                },
+                Expression::Name(name) if seen.insert(name.clone()) => {
+                    open.extend(self.term(name).cloned());
+                }
+                e => open.extend(e.parts().into_iter().cloned()),
+            }
+        }
+        found
     }
 
     /// Whether a guard is asked by the conditions of events alone.

@@ -772,17 +772,28 @@ impl Follower<'_> {
     }
 
     /// The time of a flight over an event's surface whose height is a thousand roundings of the
-    /// event's expression: shorter ones are not resolved.
+    /// event's expression: shorter ones are not resolved. Of a condition's expressions those count
+    /// that are zero here.
     fn grain(&mut self, event: usize) -> f64 {
-        let Some(watched) = self.event_of.iter().position(|e| *e == Some(event)) else {
-            return 0.0;
-        };
         let (compiled, rates) = self.rates_of_second_order(&self.config.clone());
-        let place = compiled.active.len() + watched;
-        let bend = rates.second[place].abs();
-        let rounding = 0.25 * self.grain_of(watched, rates.terms[place]);
-        // A parabola of height bend*g^2/8.
-        if bend > 0.0 { (8e3 * rounding / bend).sqrt() } else { 0.0 }
+        let flight = |follower: &Self, place: usize, e: &Expression| {
+            let bend = rates.second[place].abs();
+            let rounding = 0.25 * follower.grain_of_expression(e, rates.terms[place]);
+            // A parabola of height bend*g^2/8.
+            if bend > 0.0 { (8e3 * rounding / bend).sqrt() } else { 0.0 }
+        };
+        if let Some(watched) = self.event_of.iter().position(|e| *e == Some(event)) {
+            let e = &self.equation.watched[watched];
+            return flight(self, compiled.active.len() + watched, e);
+        }
+        let asked = self.equation.of_events[event].iter();
+        asked
+            .filter(|guard| self.side_of(**guard).is_none())
+            .filter_map(|guard| {
+                let place = compiled.place(*guard)?;
+                Some(flight(self, place, &self.equation.guards[*guard].expression))
+            })
+            .fold(0.0, f64::max)
     }
 
     /// Bodies that lie without a speed at surfaces on which motion may stick, and are pressed

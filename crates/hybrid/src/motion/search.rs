@@ -83,7 +83,9 @@ impl Follower<'_> {
     fn hides_a_kink(&mut self, step: &Step, guard: usize) -> bool {
         /// In units of a step's error: the zeros that the error makes are farther apart.
         const ERRORS: f64 = 10.0;
-        if self.equation.guards[guard].whole {
+        // For what decides an event the order of its zeros and of others matters.
+        let of_event = self.equation.of_events.iter().any(|asked| asked.contains(&guard));
+        if self.equation.guards[guard].whole || of_event {
             return false;
         }
         let (n, rtol) = (self.n, self.options.rtol);
@@ -674,7 +676,12 @@ impl Follower<'_> {
     /// A bound on the rounding of a watched expression's value: that of its terms, and of the time,
     /// by which they move at these speeds.
     pub(super) fn grain_of(&self, watched: usize, speeds: f64) -> f64 {
-        let terms = self.terms_now(&self.equation.watched[watched]);
+        self.grain_of_expression(&self.equation.watched[watched], speeds)
+    }
+
+    /// The same of any expression.
+    pub(super) fn grain_of_expression(&self, e: &Expression, speeds: f64) -> f64 {
+        let terms = self.terms_now(e);
         4.0 * f64::EPSILON * (terms + self.t.abs() * speeds)
     }
 
