@@ -662,8 +662,27 @@ impl Follower<'_> {
             }
             length = wanted;
         }
+        self.land_before_an_edge(step, length);
         if !matches!(sought, Sought::Pole(_)) {
             self.land_beyond(step, longest, sought, before, slope);
+        }
+    }
+
+    /// Stages at the end of a root's domain may be no numbers: a step that is shorter by little
+    /// more than the rounding of the time, and goes on by its speed there.
+    fn land_before_an_edge(&mut self, step: &mut Step, length: f64) {
+        let mut by = 4.0 * f64::EPSILON * (self.t + length).abs();
+        let mut tried = 0.0;
+        while !step.y.iter().all(|y| y.is_finite()) && tried < length {
+            tried = by.min(length);
+            step.take(length - tried, &mut |t, x, out| self.rhs(t, x, out));
+            let mut field = vec![0.0; self.n];
+            self.rhs(step.t + step.h, &step.y.clone(), &mut field);
+            if field.iter().all(|f| f.is_finite()) {
+                step.y.iter_mut().zip(&field).for_each(|(y, f)| *y += tried * f);
+                step.h = length;
+            }
+            by *= 8.0;
         }
     }
 
