@@ -1492,7 +1492,11 @@ impl<'a> Follower<'a> {
         let rounding = 2.0 * f64::EPSILON * step.t.abs();
         self.rhs(step.t - rounding, &step.x, &mut before);
         self.rhs(step.t + rounding, &step.x, &mut after);
-        before.iter().zip(&after).map(|(a, b)| (b - a).abs()).collect()
+        let change = |((a, now), b): ((&f64, &f64), &f64)| {
+            // Before the beginning of a root's domain there is no number.
+            if a.is_nan() { (b - now).abs() } else { (b - a).abs() }
+        };
+        before.iter().zip(&step.k[0]).zip(&after).map(change).collect()
     }
 
     /// Handles the events due at the present time together with the conditions met here.
