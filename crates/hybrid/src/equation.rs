@@ -379,16 +379,46 @@ impl Equation {
 
     /// Whether an expression has one of these names, by itself or in a term.
     fn sees(&self, e: &Expression, wanted: &dyn Fn(&str) -> bool) -> bool {
+        self.seen(e).into_iter().any(wanted)
+    }
+
+    /// The names that an expression has, by itself or in its terms.
+    fn seen<'a>(&'a self, e: &'a Expression) -> HashSet<&'a str> {
         let (mut open, mut seen) = (e.names(), HashSet::new());
         while let Some(name) = open.pop() {
-            if wanted(name) {
-                return true;
-            }
             if seen.insert(name) {
                 open.extend(self.term(name).into_iter().flat_map(Expression::names));
             }
         }
-        false
+        seen
+    }
+
+    /// The states that an expression sees.
+    pub(crate) fn states_seen(&self, e: &Expression) -> Vec<bool> {
+        let seen = self.seen(e);
+        self.definition.states().iter().map(|state| seen.contains(state.name.as_str())).collect()
+    }
+
+    /// The states that decide, in a mode, how these guards move: those that they see, and that the
+    /// equations of such states see. None if the time or a table is among it.
+    pub(crate) fn core(&self, guards: &[usize], mode: usize) -> Option<Vec<bool>> {
+        let states = self.definition.states();
+        let mut core = vec![false; states.len()];
+        let mut open: Vec<&Expression> =
+            guards.iter().map(|guard| &self.guards[*guard].expression).collect();
+        while let Some(e) = open.pop() {
+            if self.sees_time(e) {
+                return None;
+            }
+            for name in self.seen(e) {
+                if let Some(i) = states.iter().position(|s| s.name == name)
+                    && !std::mem::replace(&mut core[i], true)
+                {
+                    open.push(&self.definition.modes[mode].field[i]);
+                }
+            }
+        }
+        Some(core)
     }
 
     /// Whether anything depends on the time, events of the clock included.

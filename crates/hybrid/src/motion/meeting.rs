@@ -1062,23 +1062,57 @@ impl Follower<'_> {
         }
     }
 
-    /// Whether the motion rests from `t` on at the point that it has come to: all functions that
-    /// are nearly zero there are zero, a mixture of the fields around it vanishes, and none of the
-    /// fields leads away on its own side. If so the state is put there. `no_way`: no side leads on.
+    /// Whether the motion rests from `t` on at the point that it has come to, or states of it that
+    /// do not depend on others. `no_way`: no side leads on.
     pub(super) fn comes_to_rest(&mut self, t: f64, no_way: bool) -> bool {
-        if self.equation.depends_on_time() || self.equation.events_see_time() {
-            return false;
-        }
-        let n = self.n;
         let values = self.watched_values();
-        let largest = self.size.iter().fold(0.0_f64, |most, s| most.max(*s));
         let near = self.nearly_zero(&values);
         if near.is_empty() || near.len() > MOST_TOGETHER {
             return false;
         }
+        if self.rest_where_zero(t, no_way, &near, &values) {
+            return true;
+        }
+        // Each of several parts that do not see each other by itself.
+        let mut parts: Vec<(Vec<bool>, Vec<(usize, usize)>)> = Vec::new();
+        for one in &near {
+            let core = self.equation.core(&[one.1], self.config.mode);
+            let mut own = (core.unwrap_or_else(|| vec![true; self.n]), vec![*one]);
+            for (core, list) in std::mem::take(&mut parts) {
+                if core.iter().zip(&own.0).any(|(a, b)| *a && *b) {
+                    own.0.iter_mut().zip(&core).for_each(|(a, b)| *a |= *b);
+                    own.1.extend(list);
+                } else {
+                    parts.push((core, list));
+                }
+            }
+            parts.push(own);
+        }
+        parts.len() > 1
+            && parts.iter().any(|(_, part)| self.rest_where_zero(t, no_way, part, &values))
+    }
+
+    /// Whether the motion rests where the functions `near`, by place and guard, are zero: a mixture
+    /// of the fields around it vanishes, and none of the fields leads away on its own side. If so
+    /// the state is put there. States that these functions do not depend on may move on.
+    fn rest_where_zero(
+        &mut self,
+        t: f64,
+        no_way: bool,
+        near: &[(usize, usize)],
+        values: &[f64],
+    ) -> bool {
+        let n = self.n;
+        let largest = self.size.iter().fold(0.0_f64, |most, s| most.max(*s));
+        let guards: Vec<usize> = near.iter().map(|(_, guard)| *guard).collect();
+        let Some(core) = self.equation.core(&guards, self.config.mode) else { return false };
+        let whole = core.iter().all(|of| *of);
+        if whole && self.equation.events_see_time() || !whole && self.tangents.is_some() {
+            return false;
+        }
         let known: Vec<(usize, usize)> =
             near.iter().copied().filter(|(place, _)| values[*place].is_finite()).collect();
-        let x = self.nearest_meeting(&known, &values);
+        let x = self.nearest_meeting(&known, values);
         let of_sides = |vertex: usize, follower: &Self| {
             let mut config = follower.config.clone();
             for (i, (_, guard)) in near.iter().enumerate() {
@@ -1093,12 +1127,12 @@ impl Follower<'_> {
             follower.equation.compiled(config).field.evaluate(&v, &mut f);
             f
         };
-        let cells = self.cells_of(&near.iter().map(|(_, guard)| *guard).collect::<Vec<_>>());
+        let cells = self.cells_of(&guards);
         let vertices = cells.map_or((0..1 << near.len()).collect(), |cells| cells.patterns);
         let fields: Vec<Vec<f64>> =
             vertices.iter().map(|vertex| velocity(&of_sides(*vertex, self), &x, self)).collect();
         let left = self.options.t_end - t;
-        if no_way && self.stops_at_equality(t, &x, &near, &fields, left) {
+        if no_way && self.stops_at_equality(t, &x, near, &fields, left) {
             return true;
         }
         if !fields.iter().flatten().all(|f| f.is_finite()) {
@@ -1108,20 +1142,20 @@ impl Follower<'_> {
         let fastest: Vec<f64> =
             (0..n).map(|i| fields.iter().fold(0.0_f64, |most, f| most.max(f[i].abs()))).collect();
         let moves: Vec<usize> = (0..n)
-            .filter(|i| fastest[*i] * left > 1e-8 * self.size[*i].max(1e-3 * largest))
+            .filter(|i| core[*i] && fastest[*i] * left > 1e-8 * self.size[*i].max(1e-3 * largest))
             .collect();
         let parts: Vec<Vec<f64>> =
             fields.iter().map(|f| moves.iter().map(|i| f[*i] / fastest[*i]).collect()).collect();
         // If mixtures differ, only one that all surfaces hold is known to stay.
         // Nor are all mixtures there of functions with one zero, whose sides belong together.
-        let all_there = || settling::independent(&self.gradients_of(&near));
-        if (!all_there() || settling::mixtures_differ(&parts)) && !self.holds_still(&near, &moves) {
+        let all_there = || settling::independent(&self.gradients_of(near));
+        if (!all_there() || settling::mixtures_differ(&parts)) && !self.holds_still(near, &moves) {
             return false;
         }
         if !nearest_of_hull(&parts).iter().all(|v| v.abs() <= 1e-6) {
             return false;
         }
-        if let [(_, a), (_, b)] = near.as_slice()
+        if let [(_, a), (_, b)] = near
             && self.turns_away(&x, [*a, *b])
         {
             return false;
@@ -1144,11 +1178,29 @@ impl Follower<'_> {
                 return false;
             }
         }
-        self.x = x;
+        if whole {
+            (self.x, self.t, self.rests) = (x, t, true);
+            self.sliding = guards;
+            self.adopt(self.config.clone(), self.sliding.clone());
+            return true;
+        }
+        // The others move on, as the equations say where these functions are zero, if they do not
+        // see on which sides of them the motion has been.
+        let mut config = self.config.clone();
+        guards.iter().for_each(|guard| config.sides[*guard] = 0.0);
+        let still = velocity(&config, &x, self);
+        let goes_on = (0..n).all(|i| match core[i] {
+            true => still[i].abs() * left <= 1e-8 * self.size[i].max(largest),
+            false => fields.iter().all(|field| field[i] == still[i]),
+        });
+        if !goes_on {
+            return false;
+        }
+        let sliding: Vec<usize> =
+            self.sliding.iter().copied().filter(|guard| !guards.contains(guard)).collect();
+        let brief = t - self.t;
+        self.x = (0..n).map(|i| if core[i] { x[i] } else { x[i] + brief * still[i] }).collect();
         self.t = t;
-        self.rests = true;
-        self.sliding = near.iter().map(|(_, guard)| *guard).collect();
-        let (config, sliding) = (self.config.clone(), self.sliding.clone());
         self.adopt(config, sliding);
         true
     }

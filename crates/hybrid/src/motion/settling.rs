@@ -314,7 +314,8 @@ impl Follower<'_> {
         }
         let active = self.compiled.active.iter().copied();
         let rest = active.filter(|g| self.equation.rests(*g, &self.config) && !zero.contains(g));
-        let rest: Vec<usize> = rest.collect();
+        let rest: Vec<usize> =
+            rest.filter(|g| zero.iter().any(|met| self.may_move(*met, *g))).collect();
         zero.extend(rest);
         let mut known = 0;
         while known < zero.len() {
@@ -335,6 +336,14 @@ impl Follower<'_> {
                 }
             }
         }
+    }
+
+    /// Whether a switch of the function `met` may change how `guard` moves.
+    fn may_move(&self, met: usize, guard: usize) -> bool {
+        let mode = self.config.mode;
+        let Some(core) = self.equation.core(&[guard], mode) else { return true };
+        let seen = self.equation.states_seen(&self.equation.guards[met].expression);
+        seen.iter().zip(&core).any(|(seen, core)| *seen && *core)
     }
 
     /// Adds the functions that are zero because others are: x - z where x - y and y - z are.
