@@ -1120,6 +1120,14 @@ impl<'a> Follower<'a> {
                 continue;
             }
             self.open_pulled()?;
+            if let Some((event, error)) = self.pressed_without_rest() {
+                let event = definition.events()[event].name.clone();
+                let quiet = matches!(self.options.record, Record::Section(_));
+                if !quiet && !self.emit(self.t, Some(&event), observe) {
+                    return Ok(Ending::Interrupted);
+                }
+                return Ok(Ending::Zeno { event, t: self.t, error });
+            }
             if !self.x.iter().all(|v| v.is_finite()) {
                 return Err(self.left_domain(step.t, &step.x));
             }

@@ -4983,3 +4983,154 @@ fn touching_pendula_hand_on_their_speeds() {
         }
     }
 }
+
+/// An event of a clock's moment sees what the clock has done; a condition that is about to become
+/// true there, or that a reset makes false, is asked again.
+#[test]
+fn events_of_one_moment_are_asked_again() {
+    let counter = |head: &str, events: &str| {
+        format!("states = ['x', 'q', 'n']\n{head}\n{events}\nset = {{ n = 'n + 1' }}")
+    };
+    let saw = "start = [0, 0, 0]\nf = ['1', '0', '0']\n[[event]]\n";
+    let wave = "start = [0, 1, 0]\nf = ['2*q - 1', '0', '0']\n[[event]]\nevery = 1\n\
+        set = { q = '1 - q' }\n[[event]]\n";
+    for method in Method::ALL {
+        let count = |head: &str, events: &str, t: f64| {
+            end_of(&counter(head, events), t, method).unwrap_or_else(|e| panic!("{method:?}: {e}"))
+                [2]
+        };
+        // A sawtooth is reset just as it comes to its level; a triangle is turned back there.
+        let reset = "every = 1\nset = { x = '0' }\n[[event]]\nwhen = 'x > 1'";
+        assert_eq!(count(saw, reset, 20.5), 0.0, "{method:?}");
+        assert_eq!(count(wave, "when = 'x > 1'", 10.5), 0.0, "{method:?}");
+        assert_eq!(count(wave, "when = 'x < 0'", 10.5), 0.0, "{method:?}");
+        // True at the start, false at t = 1 and true right after it.
+        let again = "at = 1\nset = { x = '0' }\n[[event]]\nwhen = 'x > 0'";
+        assert_eq!(count(saw, again, 5.0), 2.0, "{method:?}");
+        let mode = "states = ['x', 'n']\nstart = [0, 0]\n[modes.a]\nf = ['1', '0']\n[modes.b]\n\
+            f = ['1', '0']\n[[event]]\nat = 1\nmode = 'b'\nset = { x = '0' }\n[[event]]\n\
+            when = 'x > 0'\nfrom = 'b'\nset = { n = 'n + 1' }";
+        assert_eq!(end_of(mode, 5.0, method).unwrap()[1], 1.0, "{method:?}");
+    }
+}
+
+#[test]
+fn events_fire_where_their_expression_jumps_onto_zero() {
+    for method in Method::ALL {
+        let count = |when: &str, t: f64| {
+            let text = format!(
+                "states = ['x', 'n']\nstart = [0, 0]\nf = ['1', '0']\n[[event]]\nwhen = '{when}'\n\
+                 set = {{ n = 'n + 1' }}"
+            );
+            end_of(&text, t, method).unwrap_or_else(|e| panic!("{method:?} {when}: {e}"))[1]
+        };
+        assert_eq!(count("mod(x, 1)", 3.2), 3.0, "{method:?}");
+        assert_eq!(count("mod(-x, 1)", 3.2), 3.0, "{method:?}");
+        assert_eq!(count("mod(t, 1)", 3.2), 3.0, "{method:?}");
+        assert_eq!(count("mod(t - 0.0559, 0.1)", 3.02), 30.0, "{method:?}");
+        assert_eq!(count("floor(x - 0.5) - n", 3.0), 3.0, "{method:?}");
+    }
+}
+
+/// What has rested at an event's zero comes from no side: it leaves without the event, unless this
+/// turns its speed back as an impact does.
+#[test]
+fn what_rests_at_zero_leaves_it_without_an_event() {
+    for method in Method::ALL {
+        for (force, direction) in
+            [("10*q", "both"), ("-10*q", "both"), ("10*q", "up"), ("-10*q", "down")]
+        {
+            let text = format!(
+                "states = ['x', 'v', 'q', 'n']\nstart = [0, 0, 0, 0]\nf = ['v', '{force}', '0', \
+                 '0']\n[[event]]\nat = 1\nset = {{ q = '1' }}\n[[event]]\nwhen = 'x'\n\
+                 direction = '{direction}'\nset = {{ n = 'n + 1' }}"
+            );
+            let x = end_of(&text, 4.0, method).unwrap_or_else(|e| panic!("{method:?}: {e}"));
+            near(x[0].abs(), 45.0, 1e-8);
+            assert_eq!(x[3], 0.0, "{method:?} {force} {direction}");
+        }
+    }
+}
+
+/// Impacts accumulate at sqrt(2/g) (1 + r)/(1 - r), also by the condition that the ball is below
+/// its floor and falls.
+#[test]
+fn impacts_by_a_condition_accumulate() {
+    for method in Method::ALL {
+        for r in [0.3_f64, 0.5, 0.8] {
+            let text = format!(
+                "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-9.81']\n[[event]]\n\
+                 when = 'x <= 0 and v < 0'\nset = {{ v = '-{r}*v' }}"
+            );
+            let options = Options { t_end: 60.0, method, ..Options::default() };
+            let outcome = follow(&model(&text), &options, &mut |_| true).unwrap();
+            let Ending::Zeno { t, error, .. } = outcome.ending else {
+                panic!("{method:?}: {:?}", outcome.ending)
+            };
+            let zeno = (2.0 / 9.81_f64).sqrt() * (1.0 + r) / (1.0 - r);
+            assert!((t - zeno).abs() <= error && error < 1e-11, "{method:?}: {t} {zeno} {error:e}");
+        }
+    }
+}
+
+/// The roots of a check valve begin and end at its switches, where rounding may put the state
+/// beyond them.
+#[test]
+fn a_check_valve_opens_and_closes_at_its_roots() {
+    let text = "states = ['p', 'r']\nstart = [0.3492, 0.1]\n\
+        f = ['(qv - L*sign(p - r)*sqrt(abs(p - r)))/V', 'L*sign(p - r)*sqrt(abs(p - r)) - 0.3*r']\n\
+        [parameters]\nA = 1.1349\nw = 2.1635\nk = 1.8779\nV = 0.3895\nL = 0.3808\n\
+        [let]\nps = 'A*max(sin(w*t), 0)'\nqv = 'if(ps > p, k*sqrt(ps - p), 0)'";
+    for method in Method::ALL {
+        let x = end_of(text, 20.0, method).unwrap_or_else(|e| panic!("{method:?}: {e}"));
+        // SciPy's DOP853 at 1e-12 by modes gives these digits.
+        near(x[0], 0.470_424_462, 2e-9);
+        near(x[1], 0.457_876_915, 2e-9);
+    }
+}
+
+/// Time-optimal control comes to the origin and stays; what it does not see moves on.
+#[test]
+fn a_part_of_the_states_comes_to_rest() {
+    let fuller = "states = ['x', 'v', 'J']\nstart = [1, 0, 0]\n\
+        f = ['v', '-sign(x + 0.4446*v*abs(v))', '1']";
+    let optimal = "states = ['x', 'v', 'z']\nstart = [1, 0, 0]\n\
+        f = ['v', '-sign(x + 0.5*v*abs(v))', 'x - z']";
+    let axes = "states = ['x', 'v', 'y', 'w']\nstart = [1, 0, 3, 0]\n\
+        f = ['v', '-sign(x + 0.5*v*abs(v))', 'w', '-sign(y + 0.5*w*abs(w))']";
+    for method in Method::ALL {
+        let end = |text: &str, t: f64| {
+            end_of(text, t, method).unwrap_or_else(|e| panic!("{method:?}: {e}\n{text}"))
+        };
+        let x = end(fuller, 20.0);
+        assert!(x[0].abs() < 1e-12 && x[1].abs() < 1e-12, "{x:?}");
+        near(x[2], 20.0, 1e-12);
+        // x is 1 - t^2/2 to t = 1 and (2 - t)^2/2 to t = 2.
+        let at_two = 1.0 - 2.0 / std::f64::consts::E;
+        near(end(optimal, 5.0)[2], at_two * (-3.0_f64).exp(), 1e-9);
+        assert!(end(axes, 20.0).iter().all(|x| x.abs() < 1e-12));
+    }
+}
+
+/// A ball that falls on another one which lies on its floor: their impacts accumulate, and as no
+/// rest is defined for them the run ends there.
+#[test]
+fn impacts_without_a_rest_end_a_run() {
+    let text = "states = ['x', 'v', 'y', 'w']\nstart = [0, 0, 1, 0]\nf = ['v', '-9.81', 'w', \
+        '-9.81']\n[[event]]\nname = 'floor'\nwhen = 'x'\ndirection = 'down'\n\
+        set = { v = '-0.2*v' }\nafter_zeno = 'stick'\n[[event]]\nname = 'pair'\nwhen = 'y - x'\n\
+        direction = 'down'\nset = { v = 'w', w = 'v' }";
+    // The upper one bounces with the floor's restitution.
+    let zeno = (2.0 / 9.81_f64).sqrt() * 1.2 / 0.8;
+    for method in Method::ALL {
+        let options = Options { t_end: 3.0, method, ..Options::default() };
+        let outcome = follow(&model(text), &options, &mut |_| true).unwrap();
+        let Ending::Zeno { t, error, event } = outcome.ending else {
+            panic!("{method:?}: {:?}", outcome.ending)
+        };
+        assert!(
+            event == "pair" && (t - zeno).abs() <= error && error < 1e-6,
+            "{t} {zeno} {error:e}"
+        );
+    }
+}

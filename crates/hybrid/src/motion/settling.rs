@@ -1988,6 +1988,36 @@ impl Follower<'_> {
         all
     }
 
+    /// The event of bodies that touch and are pressed into each other, which no rest holds apart:
+    /// infinitely many in no time. With a bound on the time in which they begin.
+    pub(super) fn pressed_without_rest(&mut self) -> Option<(usize, f64)> {
+        /// Of the accelerations, what is none; of the time in which a state changes, what is short.
+        const SMALL: f64 = 1e-6;
+        const SHORT: f64 = 1e-3;
+        for i in (0..self.touches.len()).filter(|i| self.touches[*i]).collect::<Vec<_>>() {
+            let Some(event) = self.event_of[i] else { continue };
+            let event_now = &self.model.definition().events()[event];
+            let moved: Vec<usize> = event_now.set.iter().map(|(state, _)| *state).collect();
+            if event_now.sticks || !self.is_asked(i) {
+                continue;
+            }
+            let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; self.n]);
+            self.rhs(t, &x, &mut field);
+            let place = self.compiled.active.len() + i;
+            self.watched_values();
+            let bend = self.second_along(&field, None)[place];
+            let largest = moved.iter().fold(0.0_f64, |most, state| most.max(field[*state].abs()));
+            let small = 1e-13 * self.magnitude(&self.equation.watched[i]);
+            let time = (8.0 * small / bend.abs()).sqrt();
+            let times = field.iter().zip(&self.size).map(|(f, size)| size / f.abs());
+            let soon = time <= SHORT * times.fold(f64::INFINITY, f64::min);
+            if self.is_beyond(i, bend) && bend.abs() > SMALL * largest && soon {
+                return Some((event, time));
+            }
+        }
+        None
+    }
+
     /// Finds the side of a watched expression that a mode which has ended kept at zero: its value,
     /// and a small speed, are drift.
     pub(super) fn begin_watching_kept(&mut self, i: usize) {
