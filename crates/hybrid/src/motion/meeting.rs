@@ -91,6 +91,7 @@ impl Follower<'_> {
                 rule => slid.iter().for_each(|g| leave.push((*g, rule == Exit::Plus))),
             }
         }
+        let opens = !opened.is_empty();
         self.open(opened)?;
         self.left.fill(0.0);
         self.left_watch.fill(0.0);
@@ -178,7 +179,7 @@ impl Follower<'_> {
             }
             self.rest_on_stops()?;
         }
-        let jumps = if switches { self.watch_jumps(&held, &before, &passed) } else { Vec::new() };
+        let jumps = if switches || opens { self.watch_jumps(&held, &before, &passed) } else { Vec::new() };
         for (i, _) in &jumps {
             passed.push(*i);
             if !self.pass(*i, definition, &mut fired, observe) {

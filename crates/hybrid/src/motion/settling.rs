@@ -1647,7 +1647,8 @@ impl Follower<'_> {
     }
 
     /// Finds the watched expressions that stay at zero: their gradients are sums of those of the
-    /// surfaces slid upon, or they depend on the sides of switches alone.
+    /// surfaces slid upon, and of contacts and their speeds, or they depend on the sides of switches
+    /// alone. Contacts' own are looked after by these.
     pub(super) fn hold_watched(&mut self) {
         self.held.fill(false);
         if self.held.is_empty() {
@@ -1657,28 +1658,57 @@ impl Follower<'_> {
         let active = self.compiled.active.len();
         let is_zero = |i: &usize| {
             values[active + i].abs() <= 1e-12 * self.magnitude(&self.equation.watched[*i])
+                && !self.contacts.iter().any(|contact| contact.watched == *i)
         };
         let zero: Vec<usize> = (0..self.held.len()).filter(is_zero).collect();
         if zero.is_empty() {
             return;
         }
         let gradients = self.compiled.gradients(&self.variables);
-        let span = self.options.t_end - self.options.t_start;
-        let row = |place: usize| {
-            let mut row = vec![0.0; self.n + 1];
-            for (variable, slope) in self.compiled.touches[place].iter().zip(&gradients[place]) {
-                let size = *self.size.get(*variable).unwrap_or(&span);
-                row[*variable] = slope * if size > 0.0 { size } else { 1.0 };
-            }
-            row
-        };
+        let row = |place: usize| self.scaled(self.dense(place, &gradients));
         let surfaces = self.sliding.iter().filter_map(|g| self.compiled.place(*g)).map(row);
-        let surfaces: Vec<Vec<f64>> = surfaces.collect();
-        for i in zero {
-            let place = active + i;
-            self.held[i] = self.compiled.touches[place].is_empty()
-                || !surfaces.is_empty() && is_sum_of(&surfaces, row(place));
+        let mut surfaces: Vec<Vec<f64>> = surfaces.collect();
+        let rows: Vec<(usize, Vec<f64>)> =
+            zero.into_iter().map(|i| (i, row(active + i))).collect();
+        surfaces.extend(self.contact_rows(&gradients));
+        for (i, row) in rows {
+            self.held[i] = self.compiled.touches[active + i].is_empty()
+                || !surfaces.is_empty() && is_sum_of(&surfaces, row);
         }
+    }
+
+    /// A gradient by the states and the time, from those by what a value depends on.
+    fn dense(&self, place: usize, gradients: &[Vec<f64>]) -> Vec<f64> {
+        let mut row = vec![0.0; self.n + 1];
+        let along = self.compiled.touches[place].iter().zip(&gradients[place]);
+        along.for_each(|(variable, slope)| row[*variable] = *slope);
+        row
+    }
+
+    /// The same in units of the states' sizes and of the run.
+    fn scaled(&self, mut row: Vec<f64>) -> Vec<f64> {
+        let span = self.options.t_end - self.options.t_start;
+        for (slope, size) in row.iter_mut().zip(self.size.iter().chain([&span])) {
+            *slope *= if *size > 0.0 { *size } else { 1.0 };
+        }
+        row
+    }
+
+    /// The gradients of contacts' expressions and of these' speeds.
+    fn contact_rows(&mut self, gradients: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        if self.contacts.is_empty() {
+            return Vec::new();
+        }
+        let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; self.n]);
+        self.rhs(t, &x, &mut field);
+        self.watched_values();
+        let by: Vec<Vec<f64>> = (0..=self.n).map(|i| self.second_along(&field, Some(i))).collect();
+        let rows = |contact: &Contact| {
+            let place = self.compiled.active.len() + contact.watched;
+            let speed = by.iter().map(|by| by[place]).collect();
+            [self.scaled(self.dense(place, gradients)), self.scaled(speed)]
+        };
+        self.contacts.iter().flat_map(rows).collect()
     }
 
     /// Finds the switching functions that contacts hold at zero: their gradients are sums of those
@@ -1692,36 +1722,12 @@ impl Follower<'_> {
     pub(super) fn hold_guards_but(&mut self, known: &[(usize, f64)]) -> Result<(), HybridError> {
         let before = self.guard_held.clone();
         self.guard_held.fill(false);
+        self.hold_watched();
         if !self.contacts.is_empty() {
-            let (n, t, x) = (self.n, self.t, self.x.clone());
-            let mut field = vec![0.0; n];
-            self.rhs(t, &x, &mut field);
-            let span = self.options.t_end - self.options.t_start;
-            let scaled = |mut row: Vec<f64>| {
-                for (slope, size) in row.iter_mut().zip(self.size.iter().chain([&span])) {
-                    *slope *= if *size > 0.0 { *size } else { 1.0 };
-                }
-                row
-            };
+            let (t, x) = (self.t, self.x.clone());
+            self.watched_values();
             let gradients = self.compiled.gradients(&self.variables);
-            let gradient = |place: usize| {
-                let mut row = vec![0.0; n + 1];
-                let along = self.compiled.touches[place].iter().zip(&gradients[place]);
-                along.for_each(|(variable, slope)| row[*variable] = *slope);
-                scaled(row)
-            };
-            let active = self.compiled.active.len();
-            // By the states and by the time.
-            let by: Vec<Vec<f64>> = (0..=n).map(|i| self.second_along(&field, Some(i))).collect();
-            let surfaces: Vec<Vec<f64>> = self
-                .contacts
-                .iter()
-                .map(|contact| active + contact.watched)
-                .flat_map(|place| {
-                    let speed = by.iter().map(|by| by[place]).collect();
-                    [gradient(place), scaled(speed)]
-                })
-                .collect();
+            let surfaces = self.contact_rows(&gradients);
             for (place, guard) in self.compiled.active.iter().enumerate() {
                 let g = &self.equation.guards[*guard];
                 let small = 1e-12 * self.magnitude(&g.expression);
@@ -1729,7 +1735,7 @@ impl Follower<'_> {
                 self.guard_held[*guard] = !g.whole
                     && !self.slides[*guard]
                     && value.abs() <= small
-                    && is_sum_of(&surfaces, gradient(place));
+                    && is_sum_of(&surfaces, self.scaled(self.dense(place, &gradients)));
             }
         }
         if self.guard_held == before {
