@@ -2046,11 +2046,17 @@ impl Follower<'_> {
 
     /// Lets a watched expression that leaves zero be beyond it by what it is now, and by rounding.
     pub(super) fn release(&mut self, i: usize, speeds: f64) {
+        /// In units of the tolerance, the error of the multistep method's first steps, which are of
+        /// first order.
+        const ERRORS: f64 = 10.0;
         let e = &self.equation.watched[i];
         let beyond = -self.equation.value(e, self.t, &self.x) * self.watch_side[i];
-        self.released[i] = beyond.max(0.0)
-            + 4.0 * self.grain_of(i, speeds)
-            + 64.0 * f64::EPSILON * self.magnitude(e);
+        let error = match self.options.method {
+            Method::Lsoda => ERRORS * self.options.rtol,
+            _ => 64.0 * f64::EPSILON,
+        };
+        self.released[i] =
+            beyond.max(0.0) + 4.0 * self.grain_of(i, speeds) + error * self.magnitude(e);
     }
 
     /// Whether a watched expression has no speed at the present point.
