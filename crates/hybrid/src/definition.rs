@@ -368,7 +368,13 @@ pub fn is_general(text: &str, json: bool) -> bool {
         return value.map_or(true, |v| KEYS.iter().any(|k| v.get(k).is_some()));
     }
     let table = toml::de::DeTable::parse(text);
-    table.map_or(true, |table| KEYS.iter().any(|k| table.get_ref().get(*k).is_some()))
+    table.map_or(true, |table| {
+        // A field below the line [parameters] is meant for the top.
+        let parameters = table.get_ref().get("parameters").and_then(|p| p.get_ref().as_table());
+        KEYS.iter().any(|k| table.get_ref().get(*k).is_some())
+            || parameters
+                .is_some_and(|p| p.get("f").is_some_and(|f| f.get_ref().as_array().is_some()))
+    })
 }
 
 /// A step of the way to a place in a document.
@@ -427,6 +433,51 @@ fn span_of(text: &str, place: &Place) -> Option<Range<usize>> {
     Some(span)
 }
 
+/// Advice for an event that is to fire where two sides are equal.
+fn met(text: &str, mut problem: Problem) -> Problem {
+    if let Some((left, right)) = text.split_once('=')
+        && !text.contains(['<', '>', '!'])
+    {
+        let (left, right) = (left.trim(), right.trim_start_matches('=').trim());
+        problem.help = Some(match (left, right) {
+            ("t", time) => format!("at a time: at = {time}; at each of several: at = [1, 2]"),
+            (left, "0") => {
+                format!("an event fires where its expression is zero: when = \"{left}\"")
+            }
+            _ => {
+                format!("an event fires where its expression is zero: when = \"{left} - {right}\"")
+            }
+        });
+    }
+    problem
+}
+
+/// Advice for a value of another kind than its key wants, by the line that it stands on.
+fn remedy(text: &str, span: Range<usize>) -> Option<String> {
+    let before = text.get(..span.start)?;
+    let line = before.rsplit('\n').next()?;
+    let (rest, table) = (text.get(span.start..)?, before.rsplit("\n[").next()?);
+    let within = (before.contains("\n[") || before.starts_with('['))
+        .then(|| table.trim_start_matches('[').split(']').next().unwrap_or("").to_owned());
+    // A table's own line is no key of the table before it.
+    if rest.starts_with("[event]") {
+        return Some("write [[event]]: there may be several".into());
+    }
+    let key = line.split('=').next()?.trim();
+    let of_the_top = ["f", "states", "start", "axes", "h", "plus", "minus", "name", "title"];
+    Some(match (key, within) {
+        (key, Some(table)) if of_the_top.contains(&key) && !table.contains("modes") => format!(
+            "`{key}` stands in the table [{table}] here: write it above the file's first [table]"
+        ),
+        ("f", _) => "write an expression for each state: f = [\"v\", \"-x\"]".into(),
+        ("states", _) => "write a list of names: states = [\"x\", \"v\"]".into(),
+        ("start", _) => "write a number for each state, in their order: start = [1, 0]".into(),
+        ("direction", _) => "write \"up\", \"down\" or \"both\"".into(),
+        ("stop", _) => "write true or false".into(),
+        _ => return None,
+    })
+}
+
 impl Definition {
     /// Changes each expression of fields, terms and events, but for times.
     pub(crate) fn change_expressions(&mut self, change: impl Fn(&mut Expression)) {
@@ -465,11 +516,9 @@ impl Definition {
         let document: Document = toml::from_str(text).map_err(|e| {
             let quoted: Vec<&str> = e.message().split('`').skip(1).step_by(2).collect();
             let near = quoted.split_first().and_then(|(unknown, known)| nearest(unknown, known));
-            at(
-                e.message().to_owned(),
-                e.span().unwrap_or(0..0),
-                near.map(|n| format!("did you mean `{n}`?")),
-            )
+            let span = e.span().unwrap_or(0..0);
+            let help = near.map(|n| format!("did you mean `{n}`?"));
+            at(e.message().to_owned(), span.clone(), help.or_else(|| remedy(text, span)))
         })?;
         Self::from_document(document).map_err(|problem| {
             let mut span = span_of(text, &problem.place).unwrap_or(0..0);
@@ -723,8 +772,14 @@ impl Definition {
             match known.iter().position(|n| n == name && !n.is_empty()) {
                 Some(i) => Ok(Some(i)),
                 None => {
-                    let help = nearest(name, &known).map(|near| format!("did you mean `{near}`?"));
-                    problem(place, format!("there is no mode `{name}`"), help.as_deref())
+                    let help = match nearest(name, &known) {
+                        Some(near) => format!("did you mean `{near}`?"),
+                        None if known.iter().all(|name| name.is_empty()) => {
+                            "it has no modes: write [modes.NAME] with its f".into()
+                        }
+                        None => format!("modes are {}", known.join(", ")),
+                    };
+                    problem(place, format!("there is no mode `{name}`"), Some(&help))
                 }
             }
         };
@@ -736,7 +791,8 @@ impl Definition {
             let when = match (&entry.when, &entry.at, &entry.every) {
                 (Some(text), None, None) => {
                     let at = inside(&place, "when");
-                    let parsed = parse(at.clone(), text, &all)?;
+                    let parsed =
+                        parse(at.clone(), text, &all).map_err(|problem| met(text, problem))?;
                     let named = matches!(&parsed, Expression::Name(name)
                         if conditions.contains(&name.as_str()));
                     if !moves(&parsed, d, &terms) {
@@ -766,8 +822,16 @@ impl Definition {
                         Constants::List(list) => list.clone(),
                     };
                     let at = inside(&place, "at");
+                    let listed = |mut problem: Problem| {
+                        let comma =
+                            problem.within.as_ref().is_some_and(|(text, _)| text.contains(','));
+                        if comma {
+                            problem.help = Some("several times are a list: at = [1, 2]".into());
+                        }
+                        problem
+                    };
                     let read = times.iter().map(|c| parse(at.clone(), &c.text(), &constants));
-                    let read: Vec<Expression> = read.collect::<Result<_, _>>()?;
+                    let read: Vec<Expression> = read.collect::<Result<_, _>>().map_err(listed)?;
                     let moments: Vec<f64> = read.iter().map(constant).collect();
                     for (k, time) in moments.iter().enumerate() {
                         if !time.is_finite() {
@@ -827,7 +891,9 @@ impl Definition {
             let from = mode_named(inside(&place, "from"), &entry.from)?;
             let sticks = entry.after_zeno == Some(AfterZeno::Stick);
             if sticks && (set.len() != 1 || !matches!(when, When::Zero(..))) {
-                let help = "give when = \"x\" (its zero is the surface) and set = { v = \"-r*v\" }";
+                let help = "give when = \"x\" (its zero is the surface) and set = { v = \"-r*v\" }; \
+                    where two bodies strike each other leave after_zeno out: the run ends where \
+                    impacts accumulate";
                 return problem(
                     inside(&place, "after_zeno"),
                     "only an event that sets one state where an expression is zero can stick",

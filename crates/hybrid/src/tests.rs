@@ -5134,3 +5134,29 @@ fn impacts_without_a_rest_end_a_run() {
         );
     }
 }
+
+/// Advice for slips of beginners.
+#[test]
+fn wrong_kinds_of_values_are_told_what_to_write() {
+    let error = |text: &str| Definition::from_toml(text, "f").unwrap_err().to_string();
+    let head = "states = ['x', 'v']\nstart = [0, 1]\n";
+    let event = |entry: &str| format!("{head}f = ['v', '-x']\n[[event]]\n{entry}");
+    for (text, help) in [
+        (event("when = 'x = 0'"), "when = \"x\""),
+        (event("when = 'x = v'"), "when = \"x - v\""),
+        (event("when = 't = 1'"), "at = 1"),
+        (event("at = '1, 2'"), "at = [1, 2]"),
+        (event("when = 'x'\nmode = 'on'"), "[modes.NAME]"),
+        (event("when = 'x'\ndirection = -1"), "\"down\""),
+        (event("when = 'x'\nstop = 'yes'"), "true or false"),
+        (event("when = 'x'").replace("[[event]]", "[event]"), "[[event]]"),
+        (format!("{head}[parameters]\nk = 1\nf = ['v', '-k*x']"), "above the file's first"),
+        (format!("{head}f = 'v, -x'"), "an expression for each state"),
+        (format!("{head}f = ['v', '-x(t)']"), "without their time: x"),
+        ("states = 'x v'\nf = ['v', '-x']".into(), "a list of names"),
+        ("states = ['x']\nstart = { x = 0 }\nf = ['1']".into(), "a number for each state"),
+    ] {
+        let error = error(&text);
+        assert!(error.contains("help: ") && error.contains(help), "{error}");
+    }
+}

@@ -1122,7 +1122,12 @@ impl Parser<'_> {
     fn missing_operator(&self) -> String {
         let before = self.at.checked_sub(1).map_or("a", |i| &self.text[self.tokens[i].1.clone()]);
         let here = &self.text[self.span()];
+        let is_time =
+            self.tokens.get(self.at + 1).is_some_and(|(_, span)| &self.text[span.clone()] == "t");
         match before {
+            before if here == "(" && is_time => {
+                format!("states are written without their time: {before}")
+            }
             ")" => format!("products are written with a star: (...)*{here}"),
             _ => format!("products are written with a star: {before}*{here}"),
         }
