@@ -623,24 +623,24 @@ struct Pace {
     made: f64,
     /// Doublings in a row that made hardly more time than the one before.
     slower: u32,
+    /// Doublings in a row at whose pace the end is out of reach.
+    far: u32,
 }
 
 impl Pace {
     /// Looks at a run that came to time `t` by so many steps. Whether its time goes with the
-    /// logarithm of its steps.
-    fn look(&mut self, steps: u64, t: f64) -> bool {
+    /// logarithm of its steps, or has long gone so slowly, that `most` do not reach its end.
+    fn is_hopeless(&mut self, steps: u64, t: f64, t_end: f64, most: u64) -> bool {
         if steps < (2 * self.since.0).max(STEPS_OF_A_PACE) {
             return false;
         }
         let made = t - self.since.1;
+        let all = (t_end - t) / made * (steps - self.since.0) as f64;
         self.slower = if made < NO_LONGER * self.made { self.slower + 1 } else { 0 };
+        self.far = if all > most as f64 { self.far + 1 } else { 0 };
         (self.since, self.made) = ((steps, t), made);
-        self.slower >= 3
-    }
-
-    /// The time that it comes to by `most` steps, if so.
-    fn reach(&self, steps: u64, t: f64, most: u64) -> f64 {
-        t + self.made * f64::from((most / steps).checked_ilog2().unwrap_or(0) + 1)
+        let doublings = (most / steps).checked_ilog2().unwrap_or(0) + 1;
+        self.slower >= 3 && t + made * f64::from(doublings) < t_end || self.far >= FAR
     }
 }
 
@@ -752,6 +752,8 @@ const LITTLE_TIME: f64 = 1e-6;
 /// A run is looked at each time its steps have doubled, from so many on. If twice the steps make
 /// less than this times the time for three doublings on end, its time goes with their logarithm.
 const STEPS_OF_A_PACE: u64 = 1 << 14;
+/// Doublings at a pace by which the end is out of reach.
+const FAR: u32 = 6;
 const NO_LONGER: f64 = 1.5;
 
 /// Scale of each state's error in a step.
@@ -1092,15 +1094,13 @@ impl<'a> Follower<'a> {
                     return Err(HybridError::Stuck { t: self.t, x: self.x.clone(), why });
                 }
                 let Outcome { steps, switches, events, .. } = self.outcome;
-                if pace.look(steps, self.t)
-                    && switches + events > steps / 100
-                    && pace.reach(steps, self.t, self.options.max_steps) < self.options.t_end
-                {
+                let (t_end, most) = (self.options.t_end, self.options.max_steps);
+                if pace.is_hopeless(steps, self.t, t_end, most) && switches + events > steps / 100 {
                     let why = format!(
-                        "switches or events follow each other ever faster, as chatter that decays \
-                        ({steps} steps so far; if it goes on so, the end takes more than \
-                        --max-steps allows). End the run before (--t-end), or write a smooth \
-                        function for the switch, as tanh(u/1e-3) for sign(u)"
+                        "switches or events follow each other ever faster, as chatter ({steps} \
+                        steps so far; if it goes on so, the end takes more than --max-steps \
+                        allows). End the run before (--t-end), or write a smooth function for \
+                        the switch, as tanh(u/1e-3) for sign(u)"
                     );
                     return Err(HybridError::Stuck { t: self.t, x: self.x.clone(), why });
                 }

@@ -179,7 +179,8 @@ impl Follower<'_> {
             }
             self.rest_on_stops()?;
         }
-        let jumps = if switches || opens { self.watch_jumps(&held, &before, &passed) } else { Vec::new() };
+        let jumps =
+            if switches || opens { self.watch_jumps(&held, &before, &passed) } else { Vec::new() };
         for (i, _) in &jumps {
             passed.push(*i);
             if !self.pass(*i, definition, &mut fired, observe) {

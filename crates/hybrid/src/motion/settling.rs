@@ -1668,8 +1668,7 @@ impl Follower<'_> {
         let row = |place: usize| self.scaled(self.dense(place, &gradients));
         let surfaces = self.sliding.iter().filter_map(|g| self.compiled.place(*g)).map(row);
         let mut surfaces: Vec<Vec<f64>> = surfaces.collect();
-        let rows: Vec<(usize, Vec<f64>)> =
-            zero.into_iter().map(|i| (i, row(active + i))).collect();
+        let rows: Vec<(usize, Vec<f64>)> = zero.into_iter().map(|i| (i, row(active + i))).collect();
         surfaces.extend(self.contact_rows(&gradients));
         for (i, row) in rows {
             self.held[i] = self.compiled.touches[active + i].is_empty()
