@@ -5160,3 +5160,38 @@ fn wrong_kinds_of_values_are_told_what_to_write() {
         assert!(error.contains("help: ") && error.contains(help), "{error}");
     }
 }
+
+/// Derivatives where several surfaces are left, or met by functions that are one where the motion
+/// is, at one moment: two stops whose speed turns, a lift that brakes to rest.
+#[test]
+fn derivatives_of_surfaces_met_together() {
+    let stops = "states = ['x', 'v', 'z', 'w']\nstart = [0, 0.5, 0, 0]\n\
+        f = ['v', 'sin(0.8*t) - 0.3*x - 0.1*v - 0.8*z - 0.5*w', \
+        'if(z >= 0.2, min(v, 0), if(z <= -0.2, max(v, 0), v))', \
+        'if(w >= 0.3, min(v, 0), if(w <= -0.3, max(v, 0), v))']";
+    let lift = "states = ['x', 'v', 'c', 'dir']\nstart = [0, 0, 0, 1]\n\
+        [modes.acc]\nf = ['v', '1.85*dir', '0', '0']\n[modes.cruise]\nf = ['v', '0', '0', '0']\n\
+        [modes.brake]\nf = ['v', '-1.85*dir', '0', '0']\n[modes.dwell]\nf = ['0', '0', '1', '0']\n\
+        [[event]]\nwhen = 'abs(v) > 1.92'\nfrom = 'acc'\nmode = 'cruise'\n\
+        [[event]]\nwhen = 'dir*(18 - x) < v^2/3.7'\nfrom = 'cruise'\nmode = 'brake'\n\
+        [[event]]\nwhen = 'dir*v < 0'\nfrom = 'brake'\nmode = 'dwell'\nset = { v = '0', c = '0' }";
+    for (text, t_end) in [(stops, 40.0), (lift, 12.0)] {
+        let model = model(text);
+        let options = Options { t_end, ..Options::default() };
+        let found = sensitivity::sensitivities(&model, &options, &[]).unwrap();
+        let start = model.start().unwrap().unwrap();
+        for j in 0..4 {
+            let end = |by: f64| {
+                let mut x = start.clone();
+                x[j] += by;
+                let options = Options { start: Some(x), rtol: 1e-13, ..options.clone() };
+                follow(&model, &options, &mut |_| true).unwrap().x
+            };
+            let (up, down) = (end(1e-6), end(-1e-6));
+            for i in 0..4 {
+                let want = (up[i] - down[i]) / 2e-6;
+                near(found.by_start[i][j], want, 1e-5 * (1.0 + want.abs()));
+            }
+        }
+    }
+}

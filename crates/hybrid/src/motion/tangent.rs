@@ -417,6 +417,16 @@ impl Follower<'_> {
                 self.compiled.field.evaluate(&self.variables, &mut field);
             }
         }
+        if self.sliding.len() > 1 && !field.iter().all(|f| f.is_finite()) {
+            // Of several surfaces the lower sides' field, if it runs along all of them.
+            let mut low = vec![0.0; n];
+            self.compiled.field.evaluate(&self.variables, &mut low);
+            let rates = Self::along(&self.compiled, &self.variables, &low);
+            let places = self.sliding.iter().filter_map(|guard| self.compiled.place(*guard));
+            if places.into_iter().all(|p| rates[p].abs() <= 1e-9 * self.speeds(&low, p)) {
+                field = low;
+            }
+        }
         let mut found: Option<(Vec<f64>, f64)> = None;
         for sought in met {
             let place = match *sought {
@@ -451,11 +461,8 @@ impl Follower<'_> {
             }
             let scaled: Vec<f64> = gradient.iter().map(|g| g / speed).collect();
             if let Some((other, s)) = &found {
-                let differ = other
-                    .iter()
-                    .zip(&scaled)
-                    .any(|(a, b)| (a / s - b).abs() > 1e-6 * (b.abs() + (a / s).abs()));
-                if differ {
+                let other: Vec<f64> = other.iter().map(|g| g / s).collect();
+                if self.part_ways(&other, &scaled) {
                     return Err(self.no_tangents(
                         "two surfaces are met at one moment, where neighbours have no common \
                             linear motion",
@@ -507,10 +514,10 @@ impl Follower<'_> {
             let slopes: Vec<f64> = (0..=self.n).map(slope).collect();
             let own: f64 =
                 slopes.iter().zip(field).map(|(g, f)| g * f).sum::<f64>() + slopes[self.n];
-            let apart = |(a, b): (&f64, &f64)| {
-                (a / own - b / speed).abs() > 1e-6 * ((a / own).abs() + (b / speed).abs())
+            let per = |gradient: &[f64], speed: f64| -> Vec<f64> {
+                gradient.iter().map(|g| g / speed).collect()
             };
-            slopes.iter().zip(gradient).any(apart)
+            self.part_ways(&per(&slopes[..self.n], own), &per(gradient, speed))
         };
         let new: Vec<usize> = zero[known..].iter().copied().filter(|g| differs(*g)).collect();
         new.into_iter().any(|other| {
@@ -528,6 +535,19 @@ impl Follower<'_> {
                 .iter()
                 .any(|side| !super::same(&field(self, *side, low), &field(self, *side, high)))
         })
+    }
+
+    /// Whether two gradients, each by the speed of its function, differ where states have their
+    /// sizes: neighbours meet the one and the other at different times.
+    fn part_ways(&self, one: &[f64], other: &[f64]) -> bool {
+        let in_size = |(g, size): (&f64, &f64)| g * if *size > 0.0 { *size } else { 1.0 };
+        let times = |gradient: &[f64]| -> Vec<f64> {
+            gradient.iter().zip(&self.size).map(in_size).collect()
+        };
+        let (one, other) = (times(one), times(other));
+        let largest = one.iter().chain(&other).fold(0.0_f64, |most, g| most.max(g.abs()));
+        let apart = |(a, b): (&f64, &f64)| !((a - b).abs() <= 1e-6 * largest);
+        one.iter().zip(&other).any(apart)
     }
 
     /// Whether motion that meets a surface at this speed turns back behind it by no more than
