@@ -891,8 +891,8 @@ impl Definition {
             let from = mode_named(inside(&place, "from"), &entry.from)?;
             let sticks = entry.after_zeno == Some(AfterZeno::Stick);
             if sticks && (set.len() != 1 || !matches!(when, When::Zero(..))) {
-                let help = "give when = \"x\" (its zero is the surface) and set = { v = \"-r*v\" }; \
-                    where two bodies strike each other leave after_zeno out: the run ends where \
+                let help = "give when = \"x\" (its zero is the surface) and set = { v = \"-r*v\" \
+                    }; where two bodies strike each other leave after_zeno out: the run ends where \
                     impacts accumulate";
                 return problem(
                     inside(&place, "after_zeno"),

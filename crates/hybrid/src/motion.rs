@@ -334,6 +334,16 @@ enum Sought {
     Beyond(usize),
 }
 
+/// A meeting of a watched expression with zero that a switch brings about.
+enum Jump {
+    /// It is on the other side now.
+    Over,
+    /// It was held at zero and leaves it, or is held there from now on.
+    Leaves,
+    /// It jumps onto zero.
+    Onto,
+}
+
 /// A kink of a field on the other side of a surface slid upon, whose function is another one there.
 #[derive(Clone, Copy, Debug)]
 struct Beyond {
@@ -514,6 +524,11 @@ struct Follower<'a> {
     holds: Vec<bool>,
     /// Events whose conditions become true at the run's very beginning.
     at_start: Vec<usize>,
+    /// Events whose conditions the switches of this moment make false.
+    unmade: Vec<usize>,
+    /// Whether a part of the states has come to rest, where neighbours have no common linear
+    /// motion.
+    part_rests: bool,
     /// Values of the watched expressions before a table's step.
     watched_before: Vec<f64>,
     /// Whether tables have stepped on to other pieces at this moment.
@@ -963,6 +978,8 @@ impl<'a> Follower<'a> {
             event_of,
             holds: vec![false; events.len()],
             at_start: Vec::new(),
+            unmade: Vec::new(),
+            part_rests: false,
             watched_before: Vec::new(),
             tables_step: false,
             size: x.iter().map(|v| v.abs()).collect(),

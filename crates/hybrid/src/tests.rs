@@ -5004,6 +5004,19 @@ fn events_of_one_moment_are_asked_again() {
         assert_eq!(count(saw, reset, 20.5), 0.0, "{method:?}");
         assert_eq!(count(wave, "when = 'x > 1'", 10.5), 0.0, "{method:?}");
         assert_eq!(count(wave, "when = 'x < 0'", 10.5), 0.0, "{method:?}");
+        // A condition that holds at the border, too, has never been false.
+        assert_eq!(count(wave, "when = 'x <= 1'", 10.5), 0.0, "{method:?}");
+        // The motion ends at the border.
+        let full = "start = [0, 1, 0]\nf = ['q', '0', '0']\n[[event]]\n";
+        let stops = "when = 'x >= 1'\nset = { q = '0' }\n[[event]]\nwhen = 'x > 1'";
+        assert_eq!(count(full, stops, 9.5), 0.0, "{method:?}");
+        let clock = "at = 1\nset = { q = '0' }\n[[event]]\nwhen = 'x > 1'";
+        assert_eq!(count(full, clock, 9.5), 0.0, "{method:?}");
+        // Made false by one clock and true by the next.
+        let two = "when = 'x > 3'\nset = { n = 'n + 1' }\n[[event]]\nevery = 1\nset = { x = '0' }\n\
+            [[event]]\nevery = 1\nset = { x = 'x + 5' }";
+        let text = format!("states = ['x', 'n']\nstart = [5, 0]\nf = ['0', '0']\n[[event]]\n{two}");
+        assert_eq!(end_of(&text, 9.5, method).unwrap()[1], 9.0, "{method:?}");
         // True at the start, false at t = 1 and true right after it.
         let again = "at = 1\nset = { x = '0' }\n[[event]]\nwhen = 'x > 0'";
         assert_eq!(count(saw, again, 5.0), 2.0, "{method:?}");
@@ -5032,8 +5045,8 @@ fn events_fire_where_their_expression_jumps_onto_zero() {
     }
 }
 
-/// What has rested at an event's zero comes from no side: it leaves without the event, unless this
-/// turns its speed back as an impact does.
+/// A state that has rested at an event's zero comes from no side: it leaves without the event,
+/// unless this turns its speed back as an impact does.
 #[test]
 fn what_rests_at_zero_leaves_it_without_an_event() {
     for method in Method::ALL {

@@ -1,6 +1,5 @@
 //! Actions at a point that is met: crossings, events, resets, contacts.
 
-use super::settling::Jump;
 use super::*;
 
 /// Smaller values of what is held at zero, and smaller speeds, relative to their sizes, are drift.
@@ -210,7 +209,9 @@ impl Follower<'_> {
                 }
             }
         }
+        let held = self.holds.clone();
         fired.extend(self.new_conditions(definition));
+        self.unmade = (0..held.len()).filter(|i| held[*i] && !self.holds[*i]).collect();
         // Switches that come ever faster with events, such as speeds that turn between impacts, end
         // where these do.
         let by_events = self.trains.iter().any(|train| train.shrinks(self.t));
@@ -384,13 +385,14 @@ impl Follower<'_> {
         let mut mode = None;
         // Of several events, the states that each leaves behind.
         let mut left_behind = Vec::new();
+        let unmade = std::mem::take(&mut self.unmade);
         let mut happened = Vec::new();
         for i in &fired {
             let event = &definition.events()[*i];
             self.x.copy_from_slice(&new);
             // An earlier event of this moment may have kept a condition from becoming true.
             if let When::Becomes(e) = &event.when
-                && new != old
+                && (new != old || mode.is_some())
                 && !self.becomes_true(e, mode, &old)
             {
                 continue;
@@ -454,7 +456,7 @@ impl Follower<'_> {
                 format!("`set` of {} gives {new:?}, which is no finite state", names.join(", "));
             return Err(HybridError::Stuck { t: self.t, x: old, why });
         }
-        let changed = new != old;
+        let changed = new != old || left_behind.iter().any(|x| *x != old);
         let none = vec![false; self.watch_side.len()];
         self.x.copy_from_slice(&old);
         let kept = if mode.is_some() { self.kept_at_zero() } else { none };
@@ -542,17 +544,15 @@ impl Follower<'_> {
                 }
             }
             newly = self.new_conditions(definition);
+            // A condition that a switch of this moment would have made false is true anew if it is
+            // false here.
+            newly.retain(|i| match &definition.events()[*i].when {
+                When::Becomes(e) if unmade.contains(i) => !self.holds_at(e, &old),
+                _ => true,
+            });
             newly.extend(struck);
-            for (i, event) in definition.events().iter().enumerate() {
-                // It became false at this moment, and true again right after it.
-                if let When::Becomes(e) = &event.when
-                    && self.holds[i]
-                    && !fired.contains(&i)
-                    && !self.holds_here(e, &old)
-                {
-                    newly.push(i);
-                }
-            }
+            let ends = [vec![old.clone()], left_behind.clone(), vec![self.x.clone()]];
+            newly.extend(self.true_again(definition, &fired, &ends.concat()));
             if changed {
                 let blown = self.blown(definition, &old, &fired, &left_behind)?;
                 newly.extend(blown);
@@ -629,35 +629,67 @@ impl Follower<'_> {
         at.mode = mode.unwrap_or(at.mode);
         let (compiled, rates) = self.rates_of_second_order(&at);
         for guard in 0..at.sides.len() {
-            let ahead = compiled.place(guard).map_or(0.0, |place| rates.direction(place));
-            if let Some(side) = self.side_at(guard, old, ahead) {
-                at.sides[guard] = side;
+            let whole = self.equation.guards[guard].whole;
+            let value = &self.equation.guards[guard].expression;
+            let moved = self.equation.value(value, self.t, old)
+                != self.equation.value(value, self.t, &self.x);
+            match (self.side_of(guard), compiled.place(guard)) {
+                (Some(side), _) if moved => at.sides[guard] = side,
+                (None, _) if moved => at.sides[guard] = 0.0,
+                (None, Some(place)) if !whole => at.sides[guard] = rates.direction(place),
+                _ => {}
             }
         }
         self.equation.holds(e, &at)
     }
 
-    /// Whether a condition holds at the very place to which events have led from the state `old`.
-    fn holds_here(&self, e: &Expression, old: &[f64]) -> bool {
+    /// Whether a condition holds at the very place of a state.
+    fn holds_at(&mut self, e: &Expression, x: &[f64]) -> bool {
+        let now = std::mem::replace(&mut self.x, x.to_vec());
         let mut at = self.config.clone();
         for guard in 0..at.sides.len() {
-            if let Some(side) = self.side_at(guard, old, 0.0) {
-                at.sides[guard] = side;
+            match self.side_of(guard) {
+                Some(side) => at.sides[guard] = side,
+                None if !self.equation.guards[guard].whole => at.sides[guard] = 0.0,
+                None => {}
             }
         }
+        self.x = now;
         self.equation.holds(e, &at)
     }
 
-    /// The side of a switching function if it is another one than at the state `old`, or if it is
-    /// zero there and here, and goes on to the side `ahead`.
-    fn side_at(&self, guard: usize, old: &[f64], ahead: f64) -> Option<f64> {
-        let e = &self.equation.guards[guard].expression;
-        let moved = self.equation.value(e, self.t, old) != self.equation.value(e, self.t, &self.x);
-        match self.side_of(guard) {
-            Some(side) => moved.then_some(side),
-            None if moved => Some(0.0),
-            None => (ahead != 0.0 && !self.equation.guards[guard].whole).then_some(ahead),
+    /// Conditions that hold once events have led from one state to the next, and did not hold at
+    /// one of these on the way, or at the last.
+    fn true_again(
+        &mut self,
+        definition: &crate::Definition,
+        fired: &[usize],
+        states: &[Vec<f64>],
+    ) -> Vec<usize> {
+        let mut found = Vec::new();
+        for (i, event) in definition.events().iter().enumerate() {
+            let When::Becomes(e) = &event.when else { continue };
+            if !self.holds[i] || fired.contains(&i) {
+                continue;
+            }
+            // A place that the events have not led to is only touched.
+            let asked = self.equation.of_events[i].clone();
+            let values = |follower: &Self, x: &[f64]| -> Vec<f64> {
+                let value = |guard: &usize| {
+                    follower.equation.value(
+                        &follower.equation.guards[*guard].expression,
+                        follower.t,
+                        x,
+                    )
+                };
+                asked.iter().map(value).collect()
+            };
+            let moves = states.windows(2).any(|two| values(self, &two[0]) != values(self, &two[1]));
+            if moves && !states.iter().all(|x| self.holds_at(e, x)) {
+                found.push(i);
+            }
         }
+        found
     }
 
     /// Whether a value of a watched expression is on the side that its event passes to.
@@ -1203,6 +1235,7 @@ impl Follower<'_> {
         let brief = t - self.t;
         self.x = (0..n).map(|i| if core[i] { x[i] } else { x[i] + brief * still[i] }).collect();
         self.t = t;
+        self.part_rests = true;
         self.adopt(config, sliding);
         true
     }

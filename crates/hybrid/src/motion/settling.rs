@@ -1647,8 +1647,8 @@ impl Follower<'_> {
     }
 
     /// Finds the watched expressions that stay at zero: their gradients are sums of those of the
-    /// surfaces slid upon, and of contacts and their speeds, or they depend on the sides of switches
-    /// alone. Contacts' own are looked after by these.
+    /// surfaces slid upon, of contacts and of these' speeds, or they depend on the sides of
+    /// switches alone. Contacts' own are not among them.
     pub(super) fn hold_watched(&mut self) {
         self.held.fill(false);
         if self.held.is_empty() {
@@ -1782,8 +1782,8 @@ impl Follower<'_> {
     }
 
     /// The watched expressions that a switch made jump over zero or onto it, and those held at zero
-    /// until now that leave it to the side that they came from; `before` are their values until
-    /// then.
+    /// until now that leave it to the side that they came from. Until then they had the values
+    /// `before`.
     pub(super) fn watch_jumps(
         &mut self,
         held: &[bool],
@@ -1801,7 +1801,7 @@ impl Follower<'_> {
             if rests || held[i] && self.held[i] {
                 continue;
             }
-            // What jumps is as exact as it was before.
+            // A jump is as exact as the value before it.
             let size = self.magnitude(&self.equation.watched[i]).max(before[i].abs());
             let small = 1e-12 * size;
             let away = value.abs() > small;
@@ -2115,16 +2115,6 @@ impl Follower<'_> {
         }
         new
     }
-}
-
-/// A meeting of a watched expression with zero that a switch brings about.
-pub(super) enum Jump {
-    /// It is on the other side now.
-    Over,
-    /// It was held at zero and leaves it, or is held there from now on.
-    Leaves,
-    /// It jumps onto zero.
-    Onto,
 }
 
 /// Accelerations of function `i` of two and rates of the other one in the four fields, numbered by

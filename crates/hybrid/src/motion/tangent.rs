@@ -342,6 +342,12 @@ impl Follower<'_> {
         if self.dependent {
             return Err(self.no_tangents("motion begins on surfaces that depend on each other"));
         }
+        if self.part_rests {
+            return Err(self.no_tangents(
+                "a part of the states rests where switches meet, where neighbours have no common \
+                    linear motion",
+            ));
+        }
         if k > 0 {
             let (t, x) = (self.t, self.x.clone());
             self.variables[..n].copy_from_slice(&x);
