@@ -8,9 +8,9 @@ use super::automatic::Automatic;
 use super::exit::{Chooser, ExitPlan};
 use super::flow::{
     FreeFlow, InPhysicalTime, Sided, SlidingFlow, Straight, Truncated, desingularised, length,
-    project,
+    lie_derivative, project,
 };
-use super::two_fold::{AlongCurve, FusedFolds, SlidingAtTwoFold};
+use super::two_fold::{AlongCurve, FusedFolds, LARGEST_RADIUS, Linearised, SlidingAtTwoFold};
 use super::{
     CHOOSE, Choice, EventKind, ExitRule, FilippovError, FilippovObserver, FilippovOptions,
     FilippovSummary, Mode, ModeEvent, Side,
@@ -326,14 +326,16 @@ fn chords<const N: usize, const M: usize>(step: &Step<'_, M>, theta: f64) -> [f6
 
 /// The two-fold that sliding may be running into.
 struct TwoFoldAhead<const N: usize> {
-    local: Option<SlidingAtTwoFold<N>>,
+    linear: Option<Linearised<N>>,
+    /// The same with its curves, once they have been needed.
+    whole: Option<SlidingAtTwoFold<N>>,
     /// The margins when it was last looked for.
     tried_at: f64,
 }
 
 impl<const N: usize> TwoFoldAhead<N> {
     fn new() -> Self {
-        Self { local: None, tried_at: f64::INFINITY }
+        Self { linear: None, whole: None, tried_at: f64::INFINITY }
     }
 
     /// Looks for it from `x`, each time the Lie derivatives have halved.
@@ -346,12 +348,30 @@ impl<const N: usize> TwoFoldAhead<N> {
         // From far away Newton's method may have found another two-fold: trust only the latest
         // answer.
         if let Ok(TwoFold { point, .. }) = two_fold(system, x)
-            && self.local.as_ref().is_none_or(|l| {
+            && self.linear.as_ref().is_none_or(|l| {
                 (l.point - point).amax() > LIMITS.same_point * x.amax().max(point.amax())
             })
         {
-            self.local = SlidingAtTwoFold::at(system, point);
+            (self.linear, self.whole) = (Linearised::at(system, point), None);
         }
+    }
+
+    /// The two-fold if the distance to it is at most `leg` radii, or `blur`. Its curves, of which
+    /// the radius is known, are expanded only when they may decide that.
+    fn within<P: PiecewiseSmooth<N>>(
+        &mut self,
+        system: &P,
+        x: &SVector<f64, N>,
+        leg: f64,
+        blur: f64,
+    ) -> Option<&SlidingAtTwoFold<N>> {
+        let linear = self.linear.as_ref()?;
+        let distance = (linear.point - x).norm();
+        if distance > (leg * LARGEST_RADIUS).max(blur) {
+            return None;
+        }
+        let fold = self.whole.get_or_insert_with(|| linear.with_curves(system));
+        (distance <= (leg * fold.radius).max(blur)).then_some(&*fold)
     }
 }
 
@@ -1567,17 +1587,13 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                 break Some(SlidingEnd::Time);
             }
             ahead.look(system, &self.x, sliding.margins(&sided, &self.x));
-            if let Some(fold) = &ahead.local {
-                let distance = (fold.point - self.x).norm();
-                // Nearer than the tolerances resolve there is nothing to integrate.
-                let Tolerance { rtol, atol } = self.settings.tolerance;
-                let blur = LIMITS.blur * (atol + rtol * self.x.amax());
-                if distance <= (self.settings.leg * fold.radius).max(blur)
-                    && let Some((leg, error)) =
-                        fold.time_to_arrive(system, &self.x, sliding.repelling)
-                {
-                    break self.arrive(fold.point, leg, error, mode);
-                }
+            // Nearer than the tolerances resolve there is nothing to integrate.
+            let Tolerance { rtol, atol } = self.settings.tolerance;
+            let blur = LIMITS.blur * (atol + rtol * self.x.amax());
+            if let Some(fold) = ahead.within(system, &self.x, self.settings.leg, blur)
+                && let Some((leg, error)) = fold.time_to_arrive(system, &self.x, sliding.repelling)
+            {
+                break self.arrive(fold.point, leg, error, mode);
             }
             // The size of h where the state is off by so much.
             let Tolerance { atol, .. } = self.settings.tolerance;
@@ -1591,7 +1607,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         self.count(&method.statistics());
         let from = Some(mode);
         match next {
-            None => match ahead.local {
+            None => match ahead.whole {
                 Some(fold) if self.t < self.t_end && self.stop.is_none() => {
                     Ok(State::TwoFold(Box::new(fold)))
                 }
@@ -1660,10 +1676,11 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                 }
             }
             let sided = self.sided();
-            let margin = |s| sliding.margins(&sided, &without_clock(&step.at(s)))[i];
+            let sign = -side.sign() * direction;
+            let margin = |s| sign * lie_derivative(&sided, &without_clock(&step.at(s)), side);
             let enclosed = |z: &SVector<Enclosed, M>| {
-                let (p, q) = lie_derivatives(&sided, &SVector::<Enclosed, N>::from_fn(|j, _| z[j]));
-                if i == 0 { p.scale(-direction) } else { q.scale(direction) }
+                let x = SVector::<Enclosed, N>::from_fn(|j, _| z[j]);
+                lie_derivative(&sided, &x, side).scale(sign)
             };
             // A set of states about the surface reaches to where such a field has no value: nothing
             // encloses it.

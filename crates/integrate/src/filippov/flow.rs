@@ -72,6 +72,24 @@ impl<P: PiecewiseSmooth<N>, const N: usize> VectorField<N> for FreeFlow<'_, P> {
     }
 }
 
+/// The Lie derivative of h along the field of `side`: one of the two of [`lie_derivatives`].
+pub(super) fn lie_derivative<P: PiecewiseSmooth<N>, S: Elementary, const N: usize>(
+    system: &P,
+    x: &SVector<S, N>,
+    side: Side,
+) -> S {
+    let slope = gradient(system, x);
+    let field = match side {
+        Side::Plus => system.plus(x),
+        Side::Minus => system.minus(x),
+    };
+    let mut sum = S::zero();
+    for i in 0..N {
+        sum += slope[i] * field[i];
+    }
+    sum
+}
+
 /// The desingularised sliding field F = L-h f+ - L+h f-: the sliding field multiplied by L-h - L+h.
 ///
 /// It is smooth everywhere, vanishes at a two-fold, and leaves h unchanged exactly: L_F h = L-h L+h

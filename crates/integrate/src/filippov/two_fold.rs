@@ -37,6 +37,8 @@ use twofold_system::variables;
 
 /// Terms kept in the series of the invariant curve.
 const TERMS: usize = 24;
+/// Upper bound of [`SlidingAtTwoFold::radius`].
+pub(super) const LARGEST_RADIUS: f64 = 1.0;
 
 /// An eigendirection of the desingularised sliding flow at a two-fold.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -151,47 +153,7 @@ impl<const N: usize> SlidingAtTwoFold<N> {
 
     /// The sliding flow at the two-fold `point`.
     pub fn at<P: PiecewiseSmooth<N>>(system: &P, point: SVector<f64, N>) -> Option<Self> {
-        let rows = fold_conditions(system, &point);
-        let (plus, minus) = (system.plus(&point), system.minus(&point));
-        let along =
-            |i: usize, f: &SVector<f64, N>| (0..N).map(|j| rows[i].partials[j] * f[j]).sum::<f64>();
-        let second = [along(1, &plus), along(1, &minus), along(2, &plus), along(2, &minus)];
-        let [pp, pm, mp, mm] = second;
-        let a = [[-pm, pp], [-mm, mp]];
-        let (trace, determinant) = (a[0][0] + a[1][1], a[0][0] * a[1][1] - a[0][1] * a[1][0]);
-        let discriminant = 0.25 * trace * trace - determinant;
-        let mut directions = None;
-        if discriminant > 0.0 {
-            let root = sqrt(discriminant);
-            let strong = 0.5 * trace + if trace < 0.0 { -root } else { root };
-            let weak = determinant / strong;
-            let direction = |rate: f64| -> Option<Eigendirection<N>> {
-                let (first, other) = ([a[0][1], rate - a[0][0]], [rate - a[1][1], a[1][0]]);
-                let size = |e: [f64; 2]| e[0] * e[0] + e[1] * e[1];
-                let mut lie = if size(first) >= size(other) { first } else { other };
-                if lie[0] > 0.0 || (lie[0] == 0.0 && lie[1] < 0.0) {
-                    lie = [-lie[0], -lie[1]];
-                }
-                let vector = shortest(&rows, [0.0, lie[0], lie[1]])?;
-                let norm = vector.norm();
-                Some(Eigendirection {
-                    rate,
-                    lie: [lie[0] / norm, lie[1] / norm],
-                    vector: vector / norm,
-                })
-            };
-            directions = Some([direction(weak)?, direction(strong)?]);
-        }
-        let curve = |sign: f64| {
-            let d = directions.as_ref()?;
-            let index = (0..2).find(|&i| d[i].slides() && d[i].rate * sign > 0.0)?;
-            Some(invariant_curve(system, &point, &d[index], d[1 - index].rate, index))
-        };
-        let (through, back) = (curve(-1.0), curve(1.0));
-        let radius =
-            [&through, &back].into_iter().flatten().map(|c| c.radius).fold(f64::INFINITY, f64::min);
-        let radius = if radius.is_finite() { radius.min(1.0) } else { 1e-3 };
-        Some(Self { point, second, directions, through, back, radius })
+        Linearised::at(system, point).map(|linear| linear.with_curves(system))
     }
 
     /// The coefficients of `x` - two-fold along the two eigendirections, to first order.
@@ -253,6 +215,66 @@ impl<const N: usize> SlidingAtTwoFold<N> {
             limit *= 0.5;
         }
         None
+    }
+}
+
+/// The linearisation alone: what is known of [`SlidingAtTwoFold`] without its curves, whose series
+/// take far longer.
+#[derive(Clone, Debug)]
+pub(super) struct Linearised<const N: usize> {
+    pub point: SVector<f64, N>,
+    second: [f64; 4],
+    directions: Option<[Eigendirection<N>; 2]>,
+}
+
+impl<const N: usize> Linearised<N> {
+    pub fn at<P: PiecewiseSmooth<N>>(system: &P, point: SVector<f64, N>) -> Option<Self> {
+        let rows = fold_conditions(system, &point);
+        let (plus, minus) = (system.plus(&point), system.minus(&point));
+        let along =
+            |i: usize, f: &SVector<f64, N>| (0..N).map(|j| rows[i].partials[j] * f[j]).sum::<f64>();
+        let second = [along(1, &plus), along(1, &minus), along(2, &plus), along(2, &minus)];
+        let [pp, pm, mp, mm] = second;
+        let a = [[-pm, pp], [-mm, mp]];
+        let (trace, determinant) = (a[0][0] + a[1][1], a[0][0] * a[1][1] - a[0][1] * a[1][0]);
+        let discriminant = 0.25 * trace * trace - determinant;
+        let mut directions = None;
+        if discriminant > 0.0 {
+            let root = sqrt(discriminant);
+            let strong = 0.5 * trace + if trace < 0.0 { -root } else { root };
+            let weak = determinant / strong;
+            let direction = |rate: f64| -> Option<Eigendirection<N>> {
+                let (first, other) = ([a[0][1], rate - a[0][0]], [rate - a[1][1], a[1][0]]);
+                let size = |e: [f64; 2]| e[0] * e[0] + e[1] * e[1];
+                let mut lie = if size(first) >= size(other) { first } else { other };
+                if lie[0] > 0.0 || (lie[0] == 0.0 && lie[1] < 0.0) {
+                    lie = [-lie[0], -lie[1]];
+                }
+                let vector = shortest(&rows, [0.0, lie[0], lie[1]])?;
+                let norm = vector.norm();
+                Some(Eigendirection {
+                    rate,
+                    lie: [lie[0] / norm, lie[1] / norm],
+                    vector: vector / norm,
+                })
+            };
+            directions = Some([direction(weak)?, direction(strong)?]);
+        }
+        Some(Self { point, second, directions })
+    }
+
+    pub fn with_curves<P: PiecewiseSmooth<N>>(&self, system: &P) -> SlidingAtTwoFold<N> {
+        let Self { point, second, directions } = self.clone();
+        let curve = |sign: f64| {
+            let d = directions.as_ref()?;
+            let index = (0..2).find(|&i| d[i].slides() && d[i].rate * sign > 0.0)?;
+            Some(invariant_curve(system, &point, &d[index], d[1 - index].rate, index))
+        };
+        let (through, back) = (curve(-1.0), curve(1.0));
+        let radius =
+            [&through, &back].into_iter().flatten().map(|c| c.radius).fold(f64::INFINITY, f64::min);
+        let radius = if radius.is_finite() { radius.min(LARGEST_RADIUS) } else { 1e-3 };
+        SlidingAtTwoFold { point, second, directions, through, back, radius }
     }
 }
 
