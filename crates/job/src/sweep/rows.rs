@@ -396,12 +396,16 @@ impl Rows {
 
     /// The description of the rows in their files.
     pub fn about(&self) -> Value {
+        self.about_table(&self.table())
+    }
+
+    fn about_table(&self, table: &Table) -> Value {
         let mut about = self.heading();
         about["rows"] = json!(self.sweep.rows());
         // The version of the numerics that computed the rows is as much a statement as the rows
         // are.
         let mut said = canonical_json(&about);
-        said.extend(encode::bits(&[self.table()]));
+        said.extend(encode::bits(std::slice::from_ref(table)));
         about["data"] = json!(Hash::of(&said));
         about
     }
@@ -418,7 +422,8 @@ impl Rows {
 
     /// The rows as CSV.
     pub fn csv(&self) -> Vec<u8> {
-        encode::csv(&self.table(), &self.about())
+        let table = self.table();
+        encode::csv(&table, &self.about_table(&table))
     }
 
     /// The rows as lines of a journal, a heading first.
