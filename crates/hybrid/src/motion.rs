@@ -526,6 +526,8 @@ struct Follower<'a> {
     at_start: Vec<usize>,
     /// Events whose conditions the switches of this moment make false.
     unmade: Vec<usize>,
+    /// When each watched expression was passed last.
+    passed_at: Vec<f64>,
     /// Whether a part of the states has come to rest, where neighbours have no common linear
     /// motion.
     part_rests: bool,
@@ -979,6 +981,7 @@ impl<'a> Follower<'a> {
             holds: vec![false; events.len()],
             at_start: Vec::new(),
             unmade: Vec::new(),
+            passed_at: vec![f64::NEG_INFINITY; watched],
             part_rests: false,
             watched_before: Vec::new(),
             tables_step: false,
@@ -1308,7 +1311,10 @@ impl<'a> Follower<'a> {
                 // If switches or events are frequent, a step is about as long as the time between
                 // them.
                 let between = std::mem::replace(&mut last_met, self.t);
-                let between = 1.5 * (self.t - between).max(f64::EPSILON * self.t.abs());
+                // Those in no time are rounding, which longer steps leave behind.
+                let rounding =
+                    f64::EPSILON * self.t.abs() * f64::from(1_u32 << quiet.min(LONG_QUIET));
+                let between = 1.5 * (self.t - between).max(rounding);
                 // Steps in which nothing is told from rounding grow at last.
                 if quiet < LONG_QUIET { h_next.max(h).min(between) } else { h_next.max(h) }
             } else {

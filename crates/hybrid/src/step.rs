@@ -282,12 +282,20 @@ impl Step {
             .map(|i| self.x[i].abs().max((h * self.k[0][i]).abs()).max(LEAST_STATE))
             .collect();
         let (mut f, mut last, mut settled) = (vec![vec![0.0; n]; 3], f64::INFINITY, false);
-        for _ in 0..12 {
+        for iteration in 0..12 {
             for s in 0..3 {
                 for i in 0..n {
                     self.stage[i] = self.x[i] + z[s * n + i];
                 }
                 rhs(self.t + c[s] * h, &self.stage, &mut f[s]);
+            }
+            if iteration == 0 && !f.iter().flatten().all(|f| f.is_finite()) {
+                // A state that waits while the time goes on may leave a root's domain: begin with
+                // where its speed leads.
+                for (s, c) in c.iter().enumerate() {
+                    (0..n).for_each(|i| z[s * n + i] = c * h * self.k[0][i]);
+                }
+                continue;
             }
             let mut right = vec![0.0; m];
             for p in 0..3 {

@@ -5,6 +5,9 @@ use super::*;
 /// Smaller values of what is held at zero, and smaller speeds, relative to their sizes, are drift.
 pub(super) const DRIFT: f64 = 1e-7;
 
+/// Times less apart are one moment, relative to the time.
+const SAME_MOMENT: f64 = 16.0 * f64::EPSILON;
+
 /// Changes of states by an event are rounding up to so small a part of their largest sizes.
 const BLOW: f64 = 1e-13;
 
@@ -36,6 +39,11 @@ impl Follower<'_> {
                 }
                 Sought::Watched(i) => {
                     passed.push(i);
+                    // Rounding of an expression that is passed is no other crossing.
+                    let last = std::mem::replace(&mut self.passed_at[i], self.t);
+                    if self.t - last <= SAME_MOMENT * self.t.abs() && !self.turns(i) {
+                        continue;
+                    }
                     if !self.pass(i, definition, &mut fired, observe) {
                         return Ok(Some(Ending::Interrupted));
                     }
@@ -553,6 +561,10 @@ impl Follower<'_> {
             newly.extend(struck);
             let ends = [vec![old.clone()], left_behind.clone(), vec![self.x.clone()]];
             newly.extend(self.true_again(definition, &fired, &ends.concat()));
+            if let Some(event) = self.endless(definition, &fired) {
+                zeno = Some((event, self.t, 4.0 * f64::EPSILON * self.t.abs()));
+                newly.retain(|i| *i != event);
+            }
             if changed {
                 let blown = self.blown(definition, &old, &fired, &left_behind)?;
                 newly.extend(blown);
@@ -575,6 +587,10 @@ impl Follower<'_> {
             }
         }
         if !changed && mode.is_none() {
+            let event = self.endless(definition, &fired).or_else(|| self.pushes_on(&fired));
+            if let Some(event) = event {
+                zeno = Some((event, self.t, 4.0 * f64::EPSILON * self.t.abs()));
+            }
             // Bodies that strike without a speed.
             for i in 0..self.watch_side.len() {
                 let met = self.event_of[i].is_some_and(|event| fired.contains(&event));
@@ -658,8 +674,49 @@ impl Follower<'_> {
         self.equation.holds(e, &at)
     }
 
+    /// An event of a direction that has happened and changed nothing, since what it turns back has
+    /// no speed yet, while the motion goes on through it.
+    fn pushes_on(&mut self, fired: &[usize]) -> Option<usize> {
+        (0..self.watch_side.len()).find_map(|i| {
+            let event = self.event_of[i].filter(|event| fired.contains(event))?;
+            let side = self.watch_side[i];
+            let through = self.fresh_watch[i] && self.is_beyond(i, side) && !self.touches[i];
+            let place = self.compiled.active.len() + i;
+            (through && self.direction_after(event, place) != side).then_some(event)
+        })
+    }
+
+    /// An event that has happened whose condition is false here and true right after, and that
+    /// makes it false there as well: it happens infinitely often in no time.
+    fn endless(&mut self, definition: &crate::Definition, fired: &[usize]) -> Option<usize> {
+        let x = self.x.clone();
+        fired.iter().copied().find(|i| {
+            let event = &definition.events()[*i];
+            let When::Becomes(e) = &event.when else { return false };
+            let goes_on = self.holds[*i] && event.mode.is_none() && !event.set.is_empty();
+            if !goes_on || self.holds_at(e, &x) {
+                return false;
+            }
+            let mut field = vec![0.0; self.n];
+            self.rhs(self.t, &x, &mut field);
+            let brief = self.brief(&field);
+            let t = self.t;
+            let mut velocity = |t: f64, x: &[f64]| {
+                let mut field = vec![0.0; x.len()];
+                self.rhs(t, x, &mut field);
+                field
+            };
+            let ahead = a_little_later(&mut velocity, t, &x, brief);
+            let mut after = ahead.clone();
+            for (state, value) in &event.set {
+                after[*state] = self.equation.value(value, self.t, &ahead);
+            }
+            self.holds_at(e, &ahead) && !self.holds_at(e, &after)
+        })
+    }
+
     /// Conditions that hold once events have led from one state to the next, and did not hold at
-    /// one of these on the way, or at the last.
+    /// one of these on the way, or at the last; of an event that is among them, at the last.
     fn true_again(
         &mut self,
         definition: &crate::Definition,
@@ -669,9 +726,11 @@ impl Follower<'_> {
         let mut found = Vec::new();
         for (i, event) in definition.events().iter().enumerate() {
             let When::Becomes(e) = &event.when else { continue };
-            if !self.holds[i] || fired.contains(&i) {
+            if !self.holds[i] {
                 continue;
             }
+            // Where it has fired itself only what it has led to counts.
+            let states = if fired.contains(&i) { &states[states.len() - 2..] } else { states };
             // A place that the events have not led to is only touched.
             let asked = self.equation.of_events[i].clone();
             let values = |follower: &Self, x: &[f64]| -> Vec<f64> {
@@ -685,7 +744,8 @@ impl Follower<'_> {
                 asked.iter().map(value).collect()
             };
             let moves = states.windows(2).any(|two| values(self, &two[0]) != values(self, &two[1]));
-            if moves && !states.iter().all(|x| self.holds_at(e, x)) {
+            let asked = if fired.contains(&i) { &states[1..] } else { states };
+            if moves && !asked.iter().all(|x| self.holds_at(e, x)) {
                 found.push(i);
             }
         }
@@ -791,18 +851,24 @@ impl Follower<'_> {
         Ok(found)
     }
 
-    /// The way in which a watched value would go on if an event happened now.
+    /// The way in which a watched value would go on at first order if an event happened a brief
+    /// time from now.
     fn direction_after(&mut self, event: usize, place: usize) -> f64 {
         let event = &self.model.definition().events()[event];
         let (watched, mut config) = (place - self.compiled.active.len(), self.config.clone());
         config.mode = event.mode.unwrap_or(config.mode);
-        let old = self.x.clone();
+        let (old, mut field) = (self.x.clone(), vec![0.0; self.n]);
+        self.rhs(self.t, &old, &mut field);
+        let brief = self.brief(&field);
+        let ahead: Vec<f64> = old.iter().zip(&field).map(|(x, f)| x + brief * f).collect();
+        self.x.copy_from_slice(&ahead);
         for (state, value) in &event.set {
-            self.x[*state] = self.equation.value(value, self.t, &old);
+            self.x[*state] = self.equation.value(value, self.t, &ahead);
         }
-        let (compiled, rates) = self.rates_of_second_order(&config);
+        let (compiled, rates) = self.rates(&config);
         self.x = old;
-        rates.direction(compiled.active.len() + watched)
+        let speed = rates.first_or_zero(compiled.active.len() + watched);
+        if speed == 0.0 { 0.0 } else { speed.signum() }
     }
 
     /// The time of a flight over an event's surface whose height is a thousand roundings of the
@@ -1108,22 +1174,27 @@ impl Follower<'_> {
             return true;
         }
         // Each of several parts that do not see each other by itself.
-        let mut parts: Vec<(Vec<bool>, Vec<(usize, usize)>)> = Vec::new();
+        struct Part {
+            core: Vec<bool>,
+            near: Vec<(usize, usize)>,
+        }
+        let mut parts: Vec<Part> = Vec::new();
         for one in &near {
             let core = self.equation.core(&[one.1], self.config.mode);
-            let mut own = (core.unwrap_or_else(|| vec![true; self.n]), vec![*one]);
-            for (core, list) in std::mem::take(&mut parts) {
-                if core.iter().zip(&own.0).any(|(a, b)| *a && *b) {
-                    own.0.iter_mut().zip(&core).for_each(|(a, b)| *a |= *b);
-                    own.1.extend(list);
+            let core = core.unwrap_or_else(|| vec![true; self.n]);
+            let mut own = Part { core, near: vec![*one] };
+            for part in std::mem::take(&mut parts) {
+                if part.core.iter().zip(&own.core).any(|(a, b)| *a && *b) {
+                    own.core.iter_mut().zip(&part.core).for_each(|(a, b)| *a |= *b);
+                    own.near.extend(part.near);
                 } else {
-                    parts.push((core, list));
+                    parts.push(part);
                 }
             }
             parts.push(own);
         }
         parts.len() > 1
-            && parts.iter().any(|(_, part)| self.rest_where_zero(t, no_way, part, &values))
+            && parts.iter().any(|part| self.rest_where_zero(t, no_way, &part.near, &values))
     }
 
     /// Whether the motion rests where the functions `near`, by place and guard, are zero: a mixture

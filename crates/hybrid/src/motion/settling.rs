@@ -1909,24 +1909,36 @@ impl Follower<'_> {
     /// Whether a watched expression that is zero and whose event changes its speed stays there, as
     /// this and its change a brief time ahead are rounding: bodies that touch move on together.
     pub(super) fn touches_on(&mut self, i: usize) -> bool {
-        let Some(event) = self.event_of[i].filter(|_| !self.held[i]) else { return false };
+        if self.event_of[i].is_none() || self.held[i] {
+            return false;
+        }
         let place = self.compiled.active.len() + i;
         let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; self.n]);
         self.rhs(t, &x, &mut field);
         let value = self.watched_values()[place];
         let speed = Self::along(&self.compiled, &self.variables, &field)[place];
         let small = 1e-13 * self.magnitude(&self.equation.watched[i]);
-        let changes_speed = |(state, _): &(usize, Expression)| {
-            self.second_along(&field, Some(*state))[place] != 0.0
-        };
         (speed * self.brief(&field)).abs() <= small
             && speed.abs() <= SMALLEST_SLOPE * self.speeds(&field, place)
-            && self.model.definition().events()[event].set.iter().any(changes_speed)
+            && self.turns(i)
             && self.watched_ahead(place).iter().all(|ahead| (ahead - value).abs() <= small)
     }
 
+    /// Whether the event of a watched expression changes its speed.
+    pub(super) fn turns(&mut self, i: usize) -> bool {
+        let Some(event) = self.event_of[i] else { return false };
+        let place = self.compiled.active.len() + i;
+        let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; self.n]);
+        self.rhs(t, &x, &mut field);
+        self.watched_values();
+        let changes_speed = |(state, _): &(usize, Expression)| {
+            self.second_along(&field, Some(*state))[place] != 0.0
+        };
+        self.model.definition().events()[event].set.iter().any(changes_speed)
+    }
+
     /// A time in which states that move so do not change by a hundredth of their sizes.
-    fn brief(&self, field: &[f64]) -> f64 {
+    pub(super) fn brief(&self, field: &[f64]) -> f64 {
         const BRIEF: f64 = 0.005;
         BRIEF * self.whole_time(field)
     }
