@@ -52,8 +52,5 @@ pub fn smoothed_in_lanes(
     transition: Transition,
     eps: f64,
 ) -> Option<impl Lanes<3>> {
-    match system.compiled() {
-        Some(system) => Some(Smoothed { system, transition, eps }),
-        _ => None,
-    }
+    system.compiled().map(|system| Smoothed { system, transition, eps })
 }

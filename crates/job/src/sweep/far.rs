@@ -17,7 +17,7 @@ use twofold_system::caricature::MinusSign;
 /// if there is none, or the system is another one. Kicks are taken to be too small to throw an
 /// orbit out again.
 pub(super) fn corner(run: &RunSpec) -> Option<f64> {
-    let Some(c) = run.system.compiled() else { return None };
+    let c = run.system.compiled()?;
     if c.first_component_of_minus != MinusSign::Equation4 || !(c.alpha > 0.0 && c.beta > 0.0) {
         return None;
     }
