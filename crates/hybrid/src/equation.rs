@@ -49,6 +49,8 @@ pub struct Configuration {
     pub pieces: Vec<usize>,
     /// The guards whose zero is slid upon, if the equations have roots.
     pub(crate) slid: Vec<usize>,
+    /// The states that rest, whatever else moves.
+    pub(crate) still: Vec<usize>,
 }
 
 /// The equations for one structure of answers, ready for evaluation. Variables: states, time,
@@ -323,6 +325,7 @@ impl Equation {
             sides: vec![1.0; self.guards.len()],
             pieces: Vec::new(),
             slid: Vec::new(),
+            still: Vec::new(),
         };
         Tape::record(self.variables(), |v| {
             let mut writer = Writer {
@@ -982,8 +985,9 @@ impl Equation {
         let numbers = |guards: &[usize]| -> Vec<i8> {
             guards.iter().flat_map(|g| (*g as u32).to_le_bytes()).map(|b| b as i8).collect()
         };
-        let mut key = numbers(&[at.mode, at.slid.len()]);
+        let mut key = numbers(&[at.mode, at.slid.len(), at.still.len()]);
         key.extend(numbers(&at.slid));
+        key.extend(numbers(&at.still));
         key.extend(
             self.guards.iter().zip(&at.sides).filter(|(g, _)| g.chooses).map(|(_, s)| *s as i8),
         );
@@ -1022,8 +1026,13 @@ impl Equation {
                 guards: BTreeMap::new(),
                 positive: Vec::new(),
             };
-            let mut outputs: Vec<Recorded> =
-                self.definition.modes[at.mode].field.iter().map(|e| writer.number(e)).collect();
+            let fields = self.definition.modes[at.mode].field.iter().enumerate();
+            let mut outputs: Vec<Recorded> = fields
+                .map(|(i, e)| match at.still.contains(&i) {
+                    true => Recorded::zero(),
+                    false => writer.number(e),
+                })
+                .collect();
             writer.write_guards();
             deciding.extend(writer.guards.keys());
             let watched: Vec<Recorded> = self.watched.iter().map(|e| writer.number(e)).collect();

@@ -940,6 +940,7 @@ impl<'a> Follower<'a> {
             sides: vec![1.0; equation.guards.len()],
             pieces: equation.tables.iter().map(|t| t.piece(t0)).collect(),
             slid: Vec::new(),
+            still: Vec::new(),
         };
         let order = order(&equation, &options.intersection)?;
         let guards = equation.guards.len();

@@ -610,6 +610,7 @@ impl Search<'_> {
             sides: self.equation.guards.iter().enumerate().map(side).collect(),
             pieces: Vec::new(),
             slid: Vec::new(),
+            still: Vec::new(),
         }
     }
 

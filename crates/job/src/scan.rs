@@ -506,7 +506,7 @@ fn handed_on(cell: &Cell) -> Option<End> {
     cell.as_ref().and_then(|(_, found)| found.as_ref().ok()?.end.clone())
 }
 
-/// A scan as a question: the table that [`Scan::compute`] makes. It rests on [`ScanPart`]s, so that
+/// A scan as a question: the table that [`Scan::compute`] makes. It rests on `ScanPart`s, so that
 /// one that was stopped goes on where it was. Over one setting a run that fails is an error, since
 /// its place in the diagram would be empty; over two it is a row.
 #[derive(Clone, Debug)]

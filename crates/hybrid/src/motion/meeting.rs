@@ -1289,22 +1289,23 @@ impl Follower<'_> {
             self.adopt(self.config.clone(), self.sliding.clone());
             return true;
         }
-        // The others move on, as the equations say where these functions are zero, if they do not
-        // see on which sides of them the motion has been.
-        let mut config = self.config.clone();
-        guards.iter().for_each(|guard| config.sides[*guard] = 0.0);
-        let still = velocity(&config, &x, self);
-        let goes_on = (0..n).all(|i| match core[i] {
-            true => still[i].abs() * left <= 1e-8 * self.size[i].max(largest),
-            false => fields.iter().all(|field| field[i] == still[i]),
-        });
-        if !goes_on {
+        // The others move on, if they do not see on which sides of these functions the motion has
+        // been.
+        let others = |i: &usize| !core[*i];
+        let alike =
+            |i: usize| fields.iter().all(|field| field[i] == fields[0][i] && field[i].is_finite());
+        if !(0..n).filter(others).all(alike) {
             return false;
         }
+        let mut config = self.config.clone();
+        config.still.extend((0..n).filter(|i| core[*i]));
+        config.still.sort_unstable();
+        config.still.dedup();
+        let moved = velocity(&config, &x, self);
         let sliding: Vec<usize> =
             self.sliding.iter().copied().filter(|guard| !guards.contains(guard)).collect();
         let brief = t - self.t;
-        self.x = (0..n).map(|i| if core[i] { x[i] } else { x[i] + brief * still[i] }).collect();
+        self.x = (0..n).map(|i| x[i] + brief * moved[i]).collect();
         self.t = t;
         self.part_rests = true;
         self.adopt(config, sliding);

@@ -159,6 +159,11 @@ impl Follower<'_> {
 
     /// Finds all sides anew; those in `zero` are zero.
     pub(super) fn settle_afresh(&mut self, zero: &[usize]) -> Result<(), HybridError> {
+        if !self.config.still.is_empty() {
+            let mut config = self.config.clone();
+            config.still.clear();
+            self.adopt(config, self.sliding.clone());
+        }
         let mut at_zero = zero.to_vec();
         for guard in 0..self.equation.guards.len() {
             if zero.contains(&guard) {
