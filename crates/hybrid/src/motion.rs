@@ -528,6 +528,8 @@ struct Follower<'a> {
     unmade: Vec<usize>,
     /// When each watched expression was passed last.
     passed_at: Vec<f64>,
+    /// Whether the fields on the sides of several surfaces slid upon are no sums of what each adds.
+    is_no_sum: bool,
     /// Whether a part of the states has come to rest, where neighbours have no common linear
     /// motion.
     part_rests: bool,
@@ -983,6 +985,7 @@ impl<'a> Follower<'a> {
             at_start: Vec::new(),
             unmade: Vec::new(),
             passed_at: vec![f64::NEG_INFINITY; watched],
+            is_no_sum: false,
             part_rests: false,
             watched_before: Vec::new(),
             tables_step: false,
@@ -1141,6 +1144,9 @@ impl<'a> Follower<'a> {
                 continue;
             }
             self.open_pulled()?;
+            if self.is_no_sum {
+                return Err(self.no_sum());
+            }
             if let Some((event, error)) = self.pressed_without_rest() {
                 let event = definition.events()[event].name.clone();
                 let quiet = matches!(self.options.record, Record::Section(_));

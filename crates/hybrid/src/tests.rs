@@ -5253,3 +5253,44 @@ fn events_without_end_in_no_time_end_a_run() {
         }
     }
 }
+
+/// Functions of signs have a value on each side; on two surfaces slid upon at once the mean over
+/// the four fields counts, and if that is not decided the motion is refused.
+#[test]
+fn functions_of_signs_on_two_surfaces_are_mixed() {
+    // The weights of the positive sides.
+    let (x, y) = (0.5 * 1.25, 0.5 * 1.15);
+    for (function, want) in [
+        ("abs(sign(x))", 1.0),
+        ("max(sign(x), 0)", x),
+        ("min(sign(x), 0) + max(sign(y), 0)", x - 1.0 + y),
+        ("2*heaviside(x) - clip(sign(y), -0.5, 0.5)", 2.0 * x - (y - 0.5)),
+        ("abs(heaviside(x) - 0.5)", 0.5),
+        ("if(x > 0, 1, 0) + if(y > 0, 2, 0)", x + 2.0 * y),
+    ] {
+        let text = format!(
+            "states = ['x', 'y', 'z']\nstart = [0, 0, 0]\n\
+             f = ['0.5 - 2*sign(x)', '0.3 - 2*sign(y)', '{function}']"
+        );
+        for method in Method::ALL {
+            let end = end_of(&text, 10.0, method).unwrap_or_else(|e| panic!("{method:?}: {e}"));
+            near(end[2], 10.0 * want, 1e-9);
+        }
+        let both = text.replace(function, "max(sign(x), sign(y))");
+        assert!(end_of(&both, 10.0, Method::Dopri5).unwrap_err().contains("different velocities"));
+    }
+    // Beside a control that has come to rest, by whatever function it switches.
+    for control in ["-sign(u)", "if(u > 0, -1, 1)", "1 - 2*heaviside(u)"] {
+        let text = format!(
+            "states = ['x', 'v', 'y', 'z', 'J']\nstart = [1, 0, 0.5, 0, 0]\n\
+             f = ['v', '{control}', '0.5 - 2*sign(y)', 'max(sign(y), 0)', 'abs({control})']\n\
+             [let]\nu = 'x + 0.5*v*abs(v)'"
+        );
+        for method in Method::ALL {
+            let end = end_of(&text, 10.0, method).unwrap_or_else(|e| panic!("{method:?}: {e}"));
+            let landing = 0.5 / 1.5;
+            near(end[3], landing + x * (10.0 - landing), 1e-9);
+            near(end[4], 10.0, 1e-9);
+        }
+    }
+}

@@ -1218,13 +1218,6 @@ impl Follower<'_> {
         let known: Vec<(usize, usize)> =
             near.iter().copied().filter(|(place, _)| values[*place].is_finite()).collect();
         let x = self.nearest_meeting(&known, values);
-        let of_sides = |vertex: usize, follower: &Self| {
-            let mut config = follower.config.clone();
-            for (i, (_, guard)) in near.iter().enumerate() {
-                config.sides[*guard] = if vertex >> i & 1 == 1 { 1.0 } else { -1.0 };
-            }
-            config
-        };
         let velocity = |config: &Configuration, x: &[f64], follower: &Self| {
             let mut v = follower.load(config);
             v[..n].copy_from_slice(x);
@@ -1233,9 +1226,19 @@ impl Follower<'_> {
             f
         };
         let cells = self.cells_of(&guards);
-        let vertices = cells.map_or((0..1 << near.len()).collect(), |cells| cells.patterns);
+        let vertices: Vec<usize> =
+            cells.map_or((0..1 << near.len()).collect(), |cells| cells.patterns);
+        let of_sides = |vertex: usize| {
+            let mut config = self.config.clone();
+            for (i, guard) in guards.iter().enumerate() {
+                config.sides[*guard] = if vertex >> i & 1 == 1 { 1.0 } else { -1.0 };
+            }
+            self.follow_sides(&mut config, &guards);
+            config
+        };
+        let configs: Vec<Configuration> = vertices.into_iter().map(of_sides).collect();
         let fields: Vec<Vec<f64>> =
-            vertices.iter().map(|vertex| velocity(&of_sides(*vertex, self), &x, self)).collect();
+            configs.iter().map(|config| velocity(config, &x, self)).collect();
         let left = self.options.t_end - t;
         if no_way && self.stops_at_equality(t, &x, near, &fields, left) {
             return true;
@@ -1267,8 +1270,7 @@ impl Follower<'_> {
         }
         // A field that leads to its own side for a short time leads away.
         let brief = 1e-4 * moves.iter().map(|i| self.size[*i] / fastest[*i]).fold(left, f64::min);
-        for vertex in vertices {
-            let config = of_sides(vertex, self);
+        for config in configs {
             let there = a_little_later(&mut |_, x| velocity(&config, x, self), t, &x, brief);
             let mut v = self.load(&config);
             v[..n].copy_from_slice(&there);

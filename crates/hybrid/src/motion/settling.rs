@@ -1575,6 +1575,16 @@ impl Follower<'_> {
         self.undecided(guards, &why)
     }
 
+    /// The error of surfaces slid upon whose fields are no sums of what each side adds, as of
+    /// max(sign(x), sign(y)).
+    pub(super) fn no_sum(&self) -> HybridError {
+        let why = match self.options.intersection {
+            Intersection::Undecided => SEVERAL_VELOCITIES,
+            _ => "functions of several signs, which no rule of --intersection mixes",
+        };
+        self.undecided(&self.sliding, why)
+    }
+
     /// Functions that were zero with these values, and that a switch or a table has made jump away
     /// from it, are on the side where they arrive, and nothing slides on them any more: which they
     /// are.

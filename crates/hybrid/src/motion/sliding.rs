@@ -57,7 +57,7 @@ impl Follower<'_> {
         self.variables = self.load(&config);
         self.config = config;
         self.separate = self.separate();
-        self.dependent = false;
+        (self.dependent, self.is_no_sum) = (false, false);
         self.base = Vec::new();
         self.beyond.clear();
         // Surfaces that are left leave the others with the mixture of their corners.
@@ -81,6 +81,7 @@ impl Follower<'_> {
             if self.sliding.len() > 1 {
                 let (t, x, mut low) = (self.t, self.x.clone(), vec![0.0; self.n]);
                 self.compiled.field.evaluate(&self.variables, &mut low);
+                self.is_no_sum = self.has_functions_of_sides() && !self.is_sum_of_sides(&low);
                 let (a, matrix) = self.sliding_equations(t, &x, &low);
                 let b: Vec<f64> = a.iter().map(|v| -v).collect();
                 self.dependent =
@@ -191,6 +192,45 @@ impl Follower<'_> {
         also
     }
 
+    /// Whether functions of the sides of what is slid upon, as abs(sign(x)), decide anything: they
+    /// have sides of their own on each.
+    fn has_functions_of_sides(&self) -> bool {
+        let n = self.n;
+        let of_sides = |(place, guard): (usize, &usize)| {
+            let slid = |slid: &usize| self.compiled.depends(n + place, n + 1 + slid);
+            !self.slides[*guard] && self.sliding.iter().any(slid)
+        };
+        self.compiled.active.iter().enumerate().any(of_sides)
+    }
+
+    /// Whether the field on two positive sides is the sum of what each adds to that on none, for
+    /// each two of the surfaces slid upon.
+    fn is_sum_of_sides(&mut self, low: &[f64]) -> bool {
+        const SAME: f64 = 1e-9;
+        let (n, sliding) = (self.n, self.sliding.clone());
+        let mut field = |positive: &[usize]| {
+            let mut config = self.config.clone();
+            for guard in positive {
+                config.sides[*guard] = self.high(*guard);
+            }
+            self.follow_sides(&mut config, &sliding);
+            let (compiled, mut out) = (self.equation.compiled(&config), vec![0.0; n]);
+            compiled.field.evaluate(&self.load(&config), &mut out);
+            out
+        };
+        let alone: Vec<Vec<f64>> = sliding.iter().map(|guard| field(&[*guard])).collect();
+        (0..sliding.len()).all(|b| {
+            (0..b).all(|a| {
+                let both = field(&[sliding[a], sliding[b]]);
+                (0..n).all(|i| {
+                    let [a, b, both, none] = [alone[a][i], alone[b][i], both[i], low[i]];
+                    let size = a.abs() + b.abs() + both.abs() + none.abs();
+                    (both + none - a - b).abs() <= SAME * size
+                })
+            })
+        })
+    }
+
     /// For several surfaces slid upon of which none changes another's speed: which of them each
     /// derivative depends on.
     pub(super) fn separate(&self) -> Option<Vec<Option<usize>>> {
@@ -200,6 +240,9 @@ impl Follower<'_> {
         }
         let n = self.n;
         let variable = |place: usize| n + 1 + self.sliding[place];
+        if self.has_functions_of_sides() {
+            return None;
+        }
         let mut owner = vec![None; n];
         for (i, owner) in owner.iter_mut().enumerate() {
             let mut owners = (0..k).filter(|place| self.compiled.depends(i, variable(*place)));
