@@ -680,9 +680,11 @@ fn error_of_accumulation(
     let finer = Options { method, rtol: FINE, atol: None, ..quiet.clone() };
     let atol = options.atol.map(|atol| 10.0 * atol);
     let coarser = Options { rtol: 10.0 * options.rtol, atol, ..quiet };
+    // None where a run comes to its end without it, and nothing is known where one does not.
     let moved = |other: &Options| match follow_once(model, other, &mut |_| true, reached) {
         Ok(Outcome { ending: Ending::Zeno { t: other, .. }, .. })
         | Err(HybridError::Accumulation { t: other, .. }) => Some((t - other).abs()),
+        Ok(Outcome { ending: Ending::Finished | Ending::Stopped(_), .. }) => Some(f64::NAN),
         _ => None,
     };
     let integration =
@@ -690,6 +692,7 @@ fn error_of_accumulation(
     if integration.is_none() && !reached(t) {
         return Some(f64::INFINITY);
     }
+    let integration = integration.filter(|by| !by.is_nan());
     Some(integration? + 8.0 * f64::EPSILON * t.abs() * events as f64)
 }
 

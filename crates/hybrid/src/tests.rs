@@ -5294,3 +5294,19 @@ fn functions_of_signs_on_two_surfaces_are_mixed() {
         }
     }
 }
+
+/// Sliding control under a disturbance decays to rounding, where kinks of its gain or of a cost are
+/// all zero and change nothing any more.
+#[test]
+fn kinks_that_change_nothing_do_not_end_sliding() {
+    let gain = "states = ['x', 'v']\nstart = [1, 0]\n\
+        f = ['v', '0.3*sin(t) - (2*abs(x) + abs(v) + 0.5)*sign(v + 2*x)']";
+    let cost = "states = ['x', 'v', 'z']\nstart = [1, 0, 0]\n\
+        f = ['v', '0.3*sin(1.7*t) - 2*sign(v + 1.4*x)', 'x^2 + abs(v) - z']";
+    for method in Method::ALL {
+        for text in [gain, cost] {
+            let end = end_of(text, 100.0, method).unwrap_or_else(|e| panic!("{method:?}: {e}"));
+            assert!(end.iter().all(|x| x.abs() < 1e-9), "{method:?} {end:?}");
+        }
+    }
+}

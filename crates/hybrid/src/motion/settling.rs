@@ -1165,6 +1165,12 @@ impl Follower<'_> {
                 {
                     return Ok(());
                 }
+                [] if !self.idle_kinks(&zero).is_empty() => {
+                    let idle = self.idle_kinks(&zero);
+                    let rest: Vec<usize> =
+                        zero.iter().copied().filter(|guard| !idle.contains(guard)).collect();
+                    return self.decide(&rest, kept);
+                }
                 [] => {
                     let names: Vec<usize> = set.iter().map(|i| zero[*i]).collect();
                     let here = self.rates(&self.config.clone()).1.field;
@@ -1344,6 +1350,50 @@ impl Follower<'_> {
             return if undecided && self.comes_to_rest(self.t, true) { Ok(()) } else { Err(open) };
         }
         self.follow_jumps(&zero)
+    }
+
+    /// The kinks among functions that are zero whose sides change nothing until the run ends: both
+    /// have one field here, as those of abs(v) where v has decayed to rounding.
+    fn idle_kinks(&mut self, zero: &[usize]) -> Vec<usize> {
+        /// Of a state's size.
+        const NOTHING: f64 = 1e-8;
+        let left = self.options.t_end - self.t;
+        let largest = self.size.iter().fold(0.0_f64, |most, size| most.max(*size));
+        let others = |guard: usize| -> Vec<usize> {
+            zero.iter().copied().filter(|other| *other != guard).collect()
+        };
+        let mut idle = Vec::new();
+        for guard in zero.iter().copied() {
+            let is_kink = self.equation.guards[guard].kink && !self.equation.guards[guard].whole;
+            if !is_kink || self.slides[guard] || zero.len() < 2 {
+                continue;
+            }
+            let mut field = |positive: Option<usize>, side: f64| {
+                let mut config = self.config.clone();
+                for other in others(guard) {
+                    let high = positive == Some(other);
+                    config.sides[other] = if high { self.high(other) } else { self.low(other) };
+                }
+                config.sides[guard] = side;
+                self.follow_sides(&mut config, zero);
+                let (compiled, mut out) = (self.equation.compiled(&config), vec![0.0; self.n]);
+                let mut variables = self.load(&config);
+                variables[..self.n].copy_from_slice(&self.x);
+                variables[self.n] = self.t;
+                compiled.field.evaluate(&variables, &mut out);
+                out
+            };
+            let places = others(guard).into_iter().map(Some).chain([None]);
+            let pairs: Vec<[Vec<f64>; 2]> =
+                places.map(|positive| [field(positive, -1.0), field(positive, 1.0)]).collect();
+            let nothing =
+                |i: usize, by: f64| by.abs() * left <= NOTHING * self.size[i].max(1e-3 * largest);
+            let same = |[a, b]: &[Vec<f64>; 2]| (0..self.n).all(|i| nothing(i, a[i] - b[i]));
+            if pairs.iter().all(same) {
+                idle.push(guard);
+            }
+        }
+        idle
     }
 
     /// Whether the motion slides on several surfaces that may act on each other, and no rule says
