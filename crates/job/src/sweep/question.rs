@@ -131,7 +131,7 @@ mod tests {
             system: Caricature::with_reinjection(1e-1, 1e-5).into(),
             switch: SwitchSpec::tanh(1e-3),
             start: vec![0.2, 0.0, -1.0],
-            t_end: 60.0,
+            t_end: 3.0,
             method: MethodSpec::ndsolve_defaults(Method::Dopri5),
             schedule: Schedule::default(),
             observe: Observation::Section { coordinate: 1, value: 0.0 },
