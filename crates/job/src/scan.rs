@@ -691,7 +691,7 @@ impl Question for ScanPart {
                 return Err(JobError::Interrupted);
             }
             let cell = self.plan.scan.cell(row, before.as_ref(), &asked);
-            before = handed_on(&cell);
+            before = handed_on(&cell).filter(|_| self.plan.scan.follow.is_some());
             let (_, found) = cell.ok_or(JobError::Interrupted)?;
             finished.fetch_add(1, Ordering::Relaxed);
             if self.plan.scan.is_map() {
