@@ -409,13 +409,7 @@ mod tests {
         let sphere = system("\"x\", \"y\", \"z\"", "x^2 + y^2 + z^2 - 1", "\"1\", \"0\", \"0\"");
         let level = Level::new(&sphere, &[0, 1, 2], &[]).unwrap();
         let patches = level.patches(&[(-1.2, 1.25), (-1.1, 1.1), (-1.3, 1.3)]);
-        let area: f64 = patches
-            .iter()
-            .map(|p| {
-                let [a, b, c] = [0, 1, 2].map(|i| SVector::<f64, 3>::from(p.corners[i]));
-                0.5 * (b - a).cross(&(c - a)).norm()
-            })
-            .sum();
+        let area: f64 = patches.iter().map(|p| 0.5 * super::area(&p.corners).sqrt()).sum();
         // An inscribed polyhedron has a little less: about (cell/radius)^2.
         let share = area / (2.0 * std::f64::consts::TAU);
         assert!((0.985..1.0).contains(&share), "{share}");
