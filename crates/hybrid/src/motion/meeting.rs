@@ -21,8 +21,9 @@ impl Follower<'_> {
     ) -> Result<Option<Ending>, HybridError> {
         let mut zero = self.sliding.clone();
         let mut fired = due.to_vec();
+        let passes = |sought: &Sought| matches!(sought, Sought::Watched(_) | Sought::Pole(_));
         let before = match std::mem::take(&mut self.watched_before) {
-            known if !known.is_empty() => known,
+            known if !known.is_empty() || met.iter().all(passes) => known,
             _ => self.watched_values().split_off(self.compiled.active.len()),
         };
         let mut passed = Vec::new();
@@ -559,8 +560,10 @@ impl Follower<'_> {
                 _ => true,
             });
             newly.extend(struck);
-            let ends = [vec![old.clone()], left_behind.clone(), vec![self.x.clone()]];
-            newly.extend(self.true_again(definition, &fired, &ends.concat()));
+            if self.equation.of_events.iter().any(|asked| !asked.is_empty()) {
+                let ends = [vec![old.clone()], left_behind.clone(), vec![self.x.clone()]];
+                newly.extend(self.true_again(definition, &fired, &ends.concat()));
+            }
             if let Some(event) = self.endless(definition, &fired) {
                 zeno = Some((event, self.t, 4.0 * f64::EPSILON * self.t.abs()));
                 newly.retain(|i| *i != event);

@@ -1165,13 +1165,13 @@ impl Follower<'_> {
                 {
                     return Ok(());
                 }
-                [] if !self.idle_kinks(&zero).is_empty() => {
-                    let idle = self.idle_kinks(&zero);
-                    let rest: Vec<usize> =
-                        zero.iter().copied().filter(|guard| !idle.contains(guard)).collect();
-                    return self.decide(&rest, kept);
-                }
                 [] => {
+                    let idle = self.idle_kinks(&zero);
+                    if !idle.is_empty() {
+                        let rest: Vec<usize> =
+                            zero.iter().copied().filter(|guard| !idle.contains(guard)).collect();
+                        return self.decide(&rest, kept);
+                    }
                     let names: Vec<usize> = set.iter().map(|i| zero[*i]).collect();
                     let here = self.rates(&self.config.clone()).1.field;
                     if !here.iter().all(|f| f.is_finite()) {
@@ -1726,7 +1726,8 @@ impl Follower<'_> {
                 && !self.contacts.iter().any(|contact| contact.watched == *i)
         };
         let zero: Vec<usize> = (0..self.held.len()).filter(is_zero).collect();
-        if zero.is_empty() {
+        if self.sliding.is_empty() && self.contacts.is_empty() {
+            zero.iter().for_each(|i| self.held[*i] = self.compiled.touches[active + i].is_empty());
             return;
         }
         let gradients = self.compiled.gradients(&self.variables);
