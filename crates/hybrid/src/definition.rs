@@ -890,13 +890,12 @@ impl Definition {
             let mode = mode_named(inside(&place, "mode"), &entry.mode)?;
             let from = mode_named(inside(&place, "from"), &entry.from)?;
             let sticks = entry.after_zeno == Some(AfterZeno::Stick);
-            if sticks && (set.len() != 1 || !matches!(when, When::Zero(..))) {
+            if sticks && (set.is_empty() || !matches!(when, When::Zero(..))) {
                 let help = "give when = \"x\" (its zero is the surface) and set = { v = \"-r*v\" \
-                    }; where two bodies strike each other leave after_zeno out: the run ends where \
-                    impacts accumulate";
+                    }; where two bodies strike each other, the speeds of both";
                 return problem(
                     inside(&place, "after_zeno"),
-                    "only an event that sets one state where an expression is zero can stick",
+                    "only an event that sets speeds where an expression is zero can stick",
                     Some(help),
                 );
             }

@@ -342,8 +342,13 @@ impl Equation {
     }
 
     fn reset(&self, set: &[(usize, Expression)]) -> Option<Program> {
+        self.reset_tape(set).map(|tape| Program::new(&tape))
+    }
+
+    /// The new values that an event sets as a tape, where no switching function decides them.
+    pub(crate) fn reset_tape(&self, set: &[(usize, Expression)]) -> Option<Tape> {
         let values: Vec<&Expression> = set.iter().map(|(_, e)| e).collect();
-        values.iter().all(|e| self.is_plain(e)).then(|| Program::new(&self.record(&values)))
+        values.iter().all(|e| self.is_plain(e)).then(|| self.record(&values))
     }
 
     /// Number of states.

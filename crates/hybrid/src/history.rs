@@ -13,8 +13,8 @@ pub(crate) struct Branch {
     pub x: Vec<f64>,
     pub config: Configuration,
     pub sliding: Vec<usize>,
-    /// Of each contact its state and its watched expression.
-    pub contacts: Vec<(usize, usize)>,
+    /// Of each contact its watched expression.
+    pub contacts: Vec<usize>,
 }
 
 /// The multistep method between two steps, and the step that it made.

@@ -377,6 +377,16 @@ impl Train {
         }
     }
 
+    /// The time at which infinitely many are over, by Aitken's extrapolation, and the last time
+    /// between two, where these shrink.
+    fn limit(&self, t: f64) -> Option<(f64, f64)> {
+        let n = self.times.len();
+        self.shrinks(t).then(|| {
+            let gap = |i: usize| self.times[n - i] - self.times[n - i - 1];
+            (self.times[n - 1] + gap(1) * gap(1) / (gap(2) - gap(1)), gap(1))
+        })
+    }
+
     /// Notes one more; gives the time at which infinitely many are over, with a bound on its error,
     /// once that is known. Times that are less than `grain` apart are not told apart reliably.
     fn note(&mut self, t: f64, grain: f64) -> Option<(f64, f64)> {
@@ -419,11 +429,13 @@ impl Train {
 }
 
 /// A contact: motion rests on an event's surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 struct Contact {
     event: usize,
     watched: usize,
-    state: usize,
+    /// A direction by which the event's reset is differentiated for that in which the contact acts;
+    /// of one state that is set, this itself.
+    along: Rc<[f64]>,
     /// +1 if the surface is met from above.
     above: f64,
 }

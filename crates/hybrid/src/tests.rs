@@ -447,7 +447,7 @@ fn errors_point_into_the_file() {
         (
             "states = ['x']\nf = ['1']\n[[event]]\nwhen = 'x'\nafter_zeno = 'stick'",
             "5:14",
-            "sets one state",
+            "sets speeds",
             "",
         ),
         ("states = ['x']\nf = [true]", "2:5", "a number is wanted", ""),
@@ -5307,6 +5307,98 @@ fn kinks_that_change_nothing_do_not_end_sliding() {
         for text in [gain, cost] {
             let end = end_of(text, 100.0, method).unwrap_or_else(|e| panic!("{method:?}: {e}"));
             assert!(end.iter().all(|x| x.abs() < 1e-9), "{method:?} {end:?}");
+        }
+    }
+}
+
+/// Bodies that strike each other until their impacts accumulate move on together: by the law of
+/// momentum, whatever their restitution, until they are drawn apart.
+#[test]
+fn two_bodies_stick_to_each_other() {
+    // Masses 1 and 2; the force on the second one holds both, and falls from t = 3 on.
+    let text = |r: f64, set: &str, start: &str| {
+        format!(
+            "states = ['x', 'u', 'y', 'v', 'n']\nstart = [{start}, 0]\nf = ['u', '-9.81', 'v', \
+             '-9.81 + 1.5*(9.81 - 5*max(t - 3, 0))', '0']\n[[event]]\nname = 'hit'\n\
+             when = 'x - y'\ndirection = 'down'\nafter_zeno = 'stick'\n\
+             set = {{ {set}u = '(u + 2*v - {r}*2*(u - v))/3', v = '(u + 2*v + {r}*(u - v))/3' }}"
+        )
+    };
+    let (c, since) = (0.2, 9.81 / 5.0);
+    let together = |t: f64| 1.0 / 3.0 + c * t - 5.0 * (t - 3.0_f64).max(0.0).powi(3) / 6.0;
+    let apart = 3.0 + since;
+    let speed = c - 2.5 * since * since;
+    for method in Method::ALL {
+        for r in [0.2, 0.5] {
+            for set in ["", "x = 'y', "] {
+                let end = |t: f64| {
+                    end_of(&text(r, set, "1, 0, 0, 0.3"), t, method)
+                        .unwrap_or_else(|e| panic!("{method:?} {r}: {e}"))
+                };
+                for t in [2.8, 4.5] {
+                    let x = end(t);
+                    near(x[0], together(t), 1e-8);
+                    near(x[2], x[0], 1e-12);
+                    near(x[1], x[3], 1e-12);
+                }
+                let (x, s) = (end(6.0), 6.0 - apart);
+                let fallen = together(apart) + speed * s - 0.5 * 9.81 * s * s;
+                near(x[0], fallen, 1e-7);
+                near(x[2], fallen - 1.25 * s.powi(3), 1e-7);
+            }
+        }
+        // They lie together from the start.
+        near(end_of(&text(0.5, "", "1, 0.2, 1, 0.2"), 2.0, method).unwrap()[0], 1.4, 1e-12);
+        // Nobody knows what infinitely many impacts count to.
+        let counts = end_of(&text(0.5, "n = 'n + 1', ", "1, 0, 0, 0.3"), 4.0, method);
+        assert!(counts.as_ref().is_err_and(|e| e.contains("changes n")), "{method:?} {counts:?}");
+    }
+    // Neighbours do not come to rest at one time.
+    let options = Options { t_end: 4.0, ..Options::default() };
+    let model = model(&text(0.5, "", "1, 0, 0, 0.3"));
+    let found = crate::motion::sensitivity::sensitivities(&model, &options, &[]);
+    assert!(found.is_err_and(|e| e.to_string().contains("impacts accumulate")));
+}
+
+/// A rope that goes taut holds a pendulum, whose direction turns; its energy is kept from then on.
+#[test]
+fn a_rope_goes_taut_and_holds() {
+    let text = "states = ['x', 'y', 'u', 'v']\nstart = [0.6, 0.1, 0.5, 1]\n\
+        f = ['u', 'v', '0', '-9.81']\n[let]\ns = '(x*u + y*v)/(x^2 + y^2)'\n[[event]]\n\
+        when = 'x^2 + y^2 - 1'\ndirection = 'up'\nafter_zeno = 'stick'\n\
+        set = { u = 'u - 1.3*s*x', v = 'v - 1.3*s*y' }";
+    let energy = |x: &[f64]| 0.5 * (x[2] * x[2] + x[3] * x[3]) + 9.81 * x[1];
+    for method in Method::ALL {
+        let [early, late] = [1.0, 7.0].map(|t| end_of(text, t, method).unwrap());
+        near(energy(&late), energy(&early), 1e-7);
+        near(late[0] * late[0] + late[1] * late[1], 1.0, 1e-12);
+        near(late[0] * late[2] + late[1] * late[3], 0.0, 1e-9);
+    }
+}
+
+/// A body on another one that lies on its floor: both accumulations end together, and both bodies
+/// lie until a force draws them up.
+#[test]
+fn a_body_comes_to_rest_on_one_that_lies() {
+    let text = |r: f64, floor: f64| {
+        format!(
+            "states = ['x', 'u', 'y', 'v']\nstart = [1, 0, 2, 0]\n\
+             f = ['u', '-9.81 + if(t > 8, 40, 0)', 'v', '-9.81']\n[[event]]\nname = 'floor'\n\
+             when = 'x'\ndirection = 'down'\nafter_zeno = 'stick'\nset = {{ u = '-{floor}*u' }}\n\
+             [[event]]\nname = 'pair'\nwhen = 'y - x - 0.1'\ndirection = 'down'\n\
+             after_zeno = 'stick'\n\
+             set = {{ u = '(u + 2*v - 2*{r}*(u - v))/3', v = '(u + 2*v + {r}*(u - v))/3' }}"
+        )
+    };
+    for method in [Method::Dopri5, Method::Radau5, Method::Taylor] {
+        for (r, floor) in [(0.1, 0.2), (0.5, 0.5), (0.3, 0.7), (0.8, 0.2)] {
+            let end = |t: f64| {
+                end_of(&text(r, floor), t, method).unwrap_or_else(|e| panic!("{method:?}: {e}"))
+            };
+            near(end(7.0)[2], 0.1, 1e-12);
+            let x = end(9.0);
+            near(x[0], 0.5 * (40.0 / 3.0 - 9.81), 1e-9);
+            near(x[2], x[0] + 0.1, 1e-12);
         }
     }
 }

@@ -1,5 +1,7 @@
 //! Actions at a point that is met: crossings, events, resets, contacts.
 
+use std::borrow::Cow;
+
 use super::*;
 
 /// Smaller values of what is held at zero, and smaller speeds, relative to their sizes, are drift.
@@ -65,7 +67,7 @@ impl Follower<'_> {
                     let (t, x) = (self.t, self.x.clone());
                     self.watched_values();
                     self.contacts[place].above = self.push(place, t, &x).1;
-                    opened.push(self.contacts[place]);
+                    opened.push(self.contacts[place].clone());
                 }
                 Sought::Beyond(at) => self.pass_beyond(at),
             }
@@ -263,9 +265,10 @@ impl Follower<'_> {
             let span = self.options.t_end - self.options.t_start;
             if speed * contact.above < 0.0 && speed.abs() <= SPEED * rates.second[i].abs() * span {
                 let place = self.compiled.active.len() + contact.watched;
-                let by = self.second_along(&rates.field, Some(contact.state))[place];
+                let direction = self.direction_of(&contact, &self.variables);
+                let by = self.second_in(&rates.field, &direction)[place];
                 if by != 0.0 {
-                    self.x[contact.state] -= speed / by;
+                    self.x.iter_mut().zip(direction.iter()).for_each(|(x, d)| *x -= speed / by * d);
                 }
             }
             self.release(contact.watched, speeds);
@@ -308,9 +311,10 @@ impl Follower<'_> {
             let e = &self.equation.watched[contact.watched];
             let place = compiled.active.len() + contact.watched;
             let off = self.equation.value(e, self.t, &self.x).abs() > DRIFT * self.magnitude(e);
-            let moves = rates.first[place].abs() > DRIFT * rates.terms[place];
+            let speeds = self.speeds(&rates.field, self.compiled.active.len() + contact.watched);
+            let moves = rates.first[place].abs() > (DRIFT * rates.terms[place]).max(1e-14 * speeds);
             if off || moves {
-                parted.push(*contact);
+                parted.push(contact.clone());
                 // A place that jumps over the body is seen with the other expressions.
                 if !off && rates.first[place] * contact.above < 0.0 {
                     struck.push(contact.watched);
@@ -339,7 +343,7 @@ impl Follower<'_> {
         let largest = field.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
         let pulled =
             self.contacts.iter().zip(&pushes).filter(|(_, push)| **push < -PULLS * largest);
-        let pulled: Vec<Contact> = pulled.map(|(contact, _)| *contact).collect();
+        let pulled: Vec<Contact> = pulled.map(|(contact, _)| contact.clone()).collect();
         self.open(pulled.clone())?;
         // A force that jumps leads away to second order.
         for Contact { watched, above, .. } in pulled {
@@ -395,7 +399,7 @@ impl Follower<'_> {
         // Of several events, the states that each leaves behind.
         let mut left_behind = Vec::new();
         let unmade = std::mem::take(&mut self.unmade);
-        let mut happened = Vec::new();
+        let (mut happened, mut with) = (Vec::new(), Vec::new());
         for i in &fired {
             let event = &definition.events()[*i];
             self.x.copy_from_slice(&new);
@@ -552,6 +556,13 @@ impl Follower<'_> {
                     }
                 }
             }
+            if zeno.is_none()
+                && let Some((all, time)) = self.bounce_in_rounding(definition, &fired)
+            {
+                through = None;
+                zeno = Some((all[0], self.t, time + 4.0 * f64::EPSILON * self.t.abs()));
+                with = all[1..].to_vec();
+            }
             newly = self.new_conditions(definition);
             // A condition that a switch of this moment would have made false is true anew if it is
             // false here.
@@ -568,7 +579,7 @@ impl Follower<'_> {
                 zeno = Some((event, self.t, 4.0 * f64::EPSILON * self.t.abs()));
                 newly.retain(|i| *i != event);
             }
-            if changed {
+            if changed && with.is_empty() {
                 let blown = self.blown(definition, &old, &fired, &left_behind)?;
                 newly.extend(blown);
             }
@@ -617,7 +628,10 @@ impl Follower<'_> {
                     self.next_record = ((self.next_record / every).round() + 1.0) * every;
                 }
             }
-            let sticks = event.sticks && self.stick(definition, i, t);
+            if with.is_empty() {
+                with = self.accumulate_with(definition, i, t);
+            }
+            let sticks = event.sticks && self.stick(definition, &[&[i], &with[..]].concat(), t)?;
             if sticks {
                 self.hold_guards()?;
                 newly.extend(self.new_conditions(definition));
@@ -777,6 +791,56 @@ impl Follower<'_> {
         (bend * self.watch_side[i] > 0.0 && hidden).then_some(2.0 * speed / bend.abs())
     }
 
+    /// Events that set states in common, on whose surfaces the motion may rest, and between which
+    /// it bounces in heights that rounding hides, one of them in `fired` first; with a bound on the
+    /// time that it does so.
+    fn bounce_in_rounding(
+        &mut self,
+        definition: &crate::Definition,
+        fired: &[usize],
+    ) -> Option<(Vec<usize>, f64)> {
+        const ROUNDINGS: f64 = 1e4;
+        let events = definition.events();
+        let first = *fired.iter().find(|i| events[**i].sticks)?;
+        let rests = |i: usize| self.contacts.iter().any(|c| c.watched == i);
+        let watched = |event: usize| self.event_of.iter().position(|e| *e == Some(event));
+        let sets = |event: usize| events[event].set.iter().map(|(state, _)| *state);
+        let may = |event: usize| {
+            events[event].sticks && watched(event).is_some_and(|i| self.is_asked(i) && !rests(i))
+        };
+        let mut all = vec![first];
+        let mut known = 0;
+        while known < all.len() {
+            let states: Vec<usize> = sets(all[known]).collect();
+            let touches = |event: &usize| sets(*event).any(|state| states.contains(&state));
+            let new = |event: &usize| !all.contains(event) && may(*event) && touches(event);
+            let new: Vec<usize> = (0..events.len()).filter(new).collect();
+            all.extend(new);
+            known += 1;
+        }
+        let is_zero = |event: &usize| {
+            let e = watched(*event).map(|i| &self.equation.watched[i]);
+            e.is_some_and(|e| {
+                self.equation.value(e, self.t, &self.x).abs() <= 1e-12 * self.magnitude(e)
+            })
+        };
+        all.retain(is_zero);
+        if all.len() < 2 || all[0] != first {
+            return None;
+        }
+        let places: Vec<usize> = all.iter().filter_map(|event| watched(*event)).collect();
+        let (compiled, rates) = self.rates_of_second_order(&self.config.clone());
+        let at = |i: usize| (i, compiled.active.len() + i);
+        let places: Vec<(usize, usize)> = places.into_iter().map(at).collect();
+        let bend = places.iter().fold(0.0_f64, |most, (_, p)| most.max(rates.second[*p].abs()));
+        let fastest = places.iter().fold(0.0_f64, |most, (_, p)| most.max(rates.first[*p].abs()));
+        // What rounding hides of one flight it hides of the order of all.
+        let grain = |(i, place): &(usize, usize)| self.grain_of(*i, rates.terms[*place]);
+        let grain = places.iter().map(grain).fold(0.0, f64::max);
+        let hidden = 0.5 * fastest * fastest / bend <= ROUNDINGS * grain;
+        (bend > 0.0 && hidden).then_some((all, 2.0 * fastest / bend))
+    }
+
     /// The events at whose surfaces the motion lies, and that a reset turns into them: they are met
     /// at this moment. One that has just happened is so if what happened after it turns it.
     fn blown(
@@ -824,7 +888,10 @@ impl Follower<'_> {
             self.x = now;
             let place = compiled.active.len() + i;
             let small = ROUNDING * after.first_or_zero(place).abs();
-            if rates.direction(place) == side && !(rates.first[place].abs() < small) {
+            let went_so = rates.direction(place) == side && !(rates.first[place].abs() < small);
+            // Nothing goes through a surface on which it may rest, as what touched there and whose
+            // speed was rounding.
+            if went_so && !definition.events()[event].sticks {
                 continue;
             }
             // An event that does not turn the speed is none of a contact: what leaves its zero has
@@ -904,7 +971,7 @@ impl Follower<'_> {
     pub(super) fn rest_on_stops(&mut self) -> Result<(), HybridError> {
         let definition = self.model.definition().clone();
         while let Some(event) = (0..self.watch_side.len()).find_map(|i| self.lies(&definition, i)) {
-            if !self.stick(&definition, event, self.t) {
+            if !self.stick(&definition, &[event], self.t)? {
                 break;
             }
             self.hold_guards()?;
@@ -927,11 +994,13 @@ impl Follower<'_> {
             return None;
         }
         // Functions that are zero with it are so on neither side, or beside it.
-        let state = definition.events()[event].set.first().map(|(state, _)| *state)?;
+        let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; self.n]);
+        self.rhs(t, &x, &mut field);
+        let along = self.direction_of_reset(event, i, &field).0;
         let active = self.compiled.active.iter().copied();
         let zero = active.filter(|g| !self.equation.guards[*g].whole && !self.slides[*g]);
         let zero: Vec<usize> = zero.filter(|g| self.side_of(*g).is_none()).collect();
-        let mut off = self.sides_off(i, state, -into, &zero);
+        let mut off = self.sides_off(i, &along, -into, &zero);
         self.ask_new(&mut off);
         let here = self.config.clone();
         (self.is_pressed(here.clone(), i, into) || off != here && self.is_pressed(off, i, into))
@@ -950,7 +1019,8 @@ impl Follower<'_> {
         if !self.contacts.is_empty() {
             let forces = self.contact_forces(&rates.field);
             for (contact, force) in self.contacts.iter().zip(forces) {
-                push += force * self.second_along(&rates.field, Some(contact.state))[own];
+                let direction = self.direction_of(contact, &self.variables);
+                push += force * self.second_in(&rates.field, &direction)[own];
             }
         }
         if rests && push == 0.0 && self.contacts.is_empty() && config == self.config {
@@ -997,14 +1067,199 @@ impl Follower<'_> {
         struck
     }
 
-    /// Puts motion at rest on an event's surface from `t` on; false if the set state does not move
-    /// the expression's derivative.
-    pub(super) fn stick(&mut self, definition: &crate::Definition, event: usize, t: f64) -> bool {
-        let Some(watched) = self.event_of.iter().position(|e| *e == Some(event)) else {
-            return false;
+    /// The direction in which an event's reset changes the state by what the speed of the event's
+    /// expression is, at a point where both are zero; and a state that it changes otherwise, too.
+    fn direction_of_reset(
+        &self,
+        event: usize,
+        watched: usize,
+        field: &[f64],
+    ) -> (Vec<f64>, Option<usize>) {
+        const NONE: f64 = 1e-9;
+        let (n, set) = (self.n, &self.model.definition().events()[event].set);
+        let mut unit = vec![0.0; n];
+        if let [(state, _)] = set.as_slice() {
+            unit[*state] = 1.0;
+            return (unit, None);
+        }
+        // In units of the states' sizes.
+        let size = |i: usize| if self.size[i] > 0.0 { self.size[i] } else { 1.0 };
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let less = |v: &mut Vec<f64>, unit: &[f64]| {
+            let share = dot(v, unit);
+            v.iter_mut().zip(unit).for_each(|(v, unit)| *v -= share * unit);
         };
-        let When::Zero(_, direction) = definition.events()[event].when else { return false };
-        let Some((state, _)) = definition.events()[event].set.first() else { return false };
+        let normed = |mut v: Vec<f64>| {
+            let length = dot(&v, &v).sqrt();
+            v.iter_mut().for_each(|v| *v /= length);
+            v
+        };
+        let place = self.compiled.active.len() + watched;
+        let across = self.gradients_of(&[(place, 0)]).swap_remove(0);
+        let across = normed((0..n).map(|i| across[i] * size(i)).collect());
+        let by_state = |i| self.second_along(field, Some(i))[place] * size(i);
+        let mut approach: Vec<f64> = (0..n).map(by_state).collect();
+        less(&mut approach, &across);
+        let approach = normed(approach);
+        let change = |v: &[f64]| -> Vec<f64> {
+            let along: Vec<f64> = (0..n).map(|i| v[i] * size(i)).collect();
+            let change = self.change_by_reset(event, &self.variables, &along);
+            (0..n).map(|i| change[i] / size(i)).collect()
+        };
+        let found = change(&approach);
+        let largest = found.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+        let otherwise = (0..n).find_map(|i| {
+            let mut other = vec![0.0; n];
+            other[i] = 1.0;
+            less(&mut other, &across);
+            less(&mut other, &approach);
+            let changed = change(&other);
+            (0..n).find(|i| !(changed[*i].abs() <= NONE * largest))
+        });
+        ((0..n).map(|i| found[i] * size(i) / largest).collect(), otherwise)
+    }
+
+    /// The event of a contact changes a state even where the motion rests, or by something else
+    /// than the speed of approach: nobody knows what infinitely many such changes make of it.
+    fn changes_at_rest(&self, event: usize, state: usize) -> HybridError {
+        let definition = self.model.definition();
+        let (name, state) = (&definition.events()[event].name, &definition.states()[state].name);
+        let why = format!(
+            "{name} may stick (after_zeno = \"stick\"), but its `set` changes {state} otherwise \
+                than by the speed at which bodies meet, infinitely often: let it set there only \
+                speeds, by laws of restitution, or leave after_zeno out"
+        );
+        HybridError::Stuck { t: self.t, x: self.x.clone(), why }
+    }
+
+    /// Whether the reset of a contact of several states changes them by the speed of approach
+    /// alone, at rest nothing.
+    fn leaves_rest_alone(&mut self, event: usize) -> Result<(), HybridError> {
+        const NONE: f64 = 1e-9;
+        let set = &self.model.definition().events()[event].set;
+        let Some(watched) = self.event_of.iter().position(|e| *e == Some(event)) else {
+            return Ok(());
+        };
+        if set.len() < 2 {
+            return Ok(());
+        }
+        let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; self.n]);
+        self.rhs(t, &x, &mut field);
+        self.watched_values();
+        if let (_, Some(state)) = self.direction_of_reset(event, watched, &field) {
+            return Err(self.changes_at_rest(event, state));
+        }
+        let set = &self.model.definition().events()[event].set;
+        let moved = |(state, e): &&(usize, Expression)| {
+            let after = self.equation.value(e, self.t, &self.x);
+            !((after - self.x[*state]).abs() <= NONE * self.size[*state])
+        };
+        match set.iter().find(moved) {
+            Some((state, _)) => Err(self.changes_at_rest(event, *state)),
+            None => Ok(()),
+        }
+    }
+
+    /// Turns the directions by which resets are differentiated to those in which contacts act,
+    /// where these have turned away from them.
+    fn turn_directions(&mut self) {
+        /// Square of a cosine.
+        const TURNED: f64 = 0.99;
+        for place in 0..self.contacts.len() {
+            let contact = &self.contacts[place];
+            let Cow::Owned(now) = self.direction_of(contact, &self.variables) else { continue };
+            let size = |i: usize| if self.size[i] > 0.0 { self.size[i] } else { 1.0 };
+            let dot = |a: &[f64], b: &[f64]| -> f64 {
+                (0..self.n).map(|i| (a[i] / size(i)) * (b[i] / size(i))).sum()
+            };
+            let along = &contact.along;
+            let (own, both) = (dot(&now, &now), dot(&now, along));
+            if both * both < TURNED * own * dot(along, along) {
+                let largest = (0..self.n).fold(0.0_f64, |most, i| most.max(now[i].abs() / size(i)));
+                self.contacts[place].along = now.iter().map(|v| v / largest).collect();
+            }
+        }
+    }
+
+    /// Other events on whose surfaces the motion may rest and that accumulate at the same time as
+    /// one does, as those of a body between two others.
+    fn accumulate_with(
+        &mut self,
+        definition: &crate::Definition,
+        event: usize,
+        t: f64,
+    ) -> Vec<usize> {
+        let events = definition.events();
+        let with = |i: usize| {
+            let other = self.event_of[i]?;
+            let contact = self.contacts.iter().any(|c| c.watched == i);
+            if other == event || contact || !events[other].sticks || !self.is_asked(i) {
+                return None;
+            }
+            let (limit, gap) = self.trains[other].limit(self.t)?;
+            let e = &self.equation.watched[i];
+            let is_near =
+                self.equation.value(e, self.t, &self.x).abs() <= DRIFT * self.magnitude(e);
+            (is_near && (limit - t).abs() <= gap).then_some(other)
+        };
+        (0..self.event_of.len()).filter_map(with).collect()
+    }
+
+    /// Puts motion at rest on the surfaces of events from `t` on; false if what they set does not
+    /// move the expressions' derivatives.
+    ///
+    /// # Errors
+    /// If an event changes something else, too.
+    pub(super) fn stick(
+        &mut self,
+        definition: &crate::Definition,
+        events: &[usize],
+        t: f64,
+    ) -> Result<bool, HybridError> {
+        let before = self.contacts.clone();
+        let (config, sliding) = (self.config.clone(), self.sliding.clone());
+        self.adopt(config, sliding);
+        let mut field = vec![0.0; self.n];
+        self.compiled.field.evaluate(&self.variables, &mut field);
+        for event in events {
+            let Some(contact) = self.contact_of(definition, *event, &field) else {
+                self.contacts = before;
+                return Ok(false);
+            };
+            self.contacts.retain(|c| c.watched != contact.watched);
+            self.contacts.push(contact);
+        }
+        if !self.contact_forces(&field).iter().all(|f| f.is_finite()) {
+            self.contacts = before;
+            return Ok(false);
+        }
+        self.project();
+        for event in events {
+            self.leaves_rest_alone(*event)?;
+        }
+        // The remaining time of the infinitely many events.
+        let (now, x, mut rate) = (self.t, self.x.clone(), vec![0.0; self.n]);
+        self.rhs(now, &x, &mut rate);
+        for i in 0..self.n {
+            self.x[i] += (t - now) * rate[i];
+        }
+        self.t = t;
+        self.project();
+        Ok(true)
+    }
+
+    /// The contact in which the motion rests on an event's surface.
+    fn contact_of(
+        &mut self,
+        definition: &crate::Definition,
+        event: usize,
+        field: &[f64],
+    ) -> Option<Contact> {
+        let watched = self.event_of.iter().position(|e| *e == Some(event))?;
+        let When::Zero(_, direction) = definition.events()[event].when else { return None };
+        if definition.events()[event].set.is_empty() {
+            return None;
+        }
         let above = match direction {
             Direction::Up => -1.0,
             Direction::Down => 1.0,
@@ -1016,27 +1271,8 @@ impl Follower<'_> {
                 }
             }
         };
-        let contact = Contact { event, watched, state: *state, above };
-        let (config, sliding) = (self.config.clone(), self.sliding.clone());
-        self.adopt(config, sliding);
-        let mut field = vec![0.0; self.n];
-        self.compiled.field.evaluate(&self.variables, &mut field);
-        self.contacts.retain(|c| c.watched != watched);
-        self.contacts.push(contact);
-        if !self.contact_forces(&field).iter().all(|f| f.is_finite()) {
-            self.contacts.pop();
-            return false;
-        }
-        self.project();
-        // The remaining time of the infinitely many events.
-        let (now, x, mut rate) = (self.t, self.x.clone(), vec![0.0; self.n]);
-        self.rhs(now, &x, &mut rate);
-        for i in 0..self.n {
-            self.x[i] += (t - now) * rate[i];
-        }
-        self.t = t;
-        self.project();
-        true
+        let along = self.direction_of_reset(event, watched, field).0.into();
+        Some(Contact { event, watched, along, above })
     }
 
     /// Puts the positions of contacts back onto their surfaces: else a moving one would be above
@@ -1067,6 +1303,7 @@ impl Follower<'_> {
             self.place_contacts();
             self.variables[..self.n].copy_from_slice(&self.x);
             self.variables[self.n] = self.t;
+            self.turn_directions();
             let mut field = vec![0.0; self.n];
             self.compiled.field.evaluate(&self.variables, &mut field);
             let all = Self::along(&self.compiled, &self.variables, &field);
@@ -1080,7 +1317,8 @@ impl Follower<'_> {
                 .iter()
                 .zip(solve_any(&self.grips(&field), &slopes, 0.0).unwrap_or_default())
             {
-                self.x[contact.state] += change;
+                let direction = self.direction_of(contact, &self.variables);
+                self.x.iter_mut().zip(direction.iter()).for_each(|(x, d)| *x += change * d);
             }
         }
         if self.sliding.is_empty() {

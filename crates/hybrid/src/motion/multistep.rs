@@ -56,7 +56,7 @@ impl Follower<'_> {
             x: self.x.clone(),
             config: self.config.clone(),
             sliding: self.sliding.clone(),
-            contacts: self.contacts.iter().map(|c| (c.state, c.watched)).collect(),
+            contacts: self.contacts.iter().map(|c| c.watched).collect(),
         }
     }
 

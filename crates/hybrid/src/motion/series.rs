@@ -34,7 +34,8 @@ struct Key {
     /// The answers of signs; whole parts are variables.
     signs: Vec<bool>,
     sliding: Vec<usize>,
-    contacts: Vec<(usize, usize)>,
+    /// Of each contact its watched expression and the bits of the direction that it keeps.
+    contacts: Vec<(usize, Vec<u64>)>,
     pivots: Vec<usize>,
 }
 
@@ -113,6 +114,18 @@ impl Follower<'_> {
                     .into(),
             ));
         }
+        let is_rough = |c: &Contact| {
+            self.model.definition().events()[c.event].set.len() > 1
+                && self.equation.resets[c.event].is_none()
+        };
+        if self.contacts.iter().any(is_rough) {
+            return Err(stuck(
+                "`set` of the event of a contact has switching functions or tables, and its \
+                derivative, by which the contact acts on several states, is not written as a \
+                Taylor series: follow it by --method dopri5 or radau5"
+                    .into(),
+            ));
+        }
         let mut orders = Vec::new();
         if self.separate.is_none() && !self.sliding.is_empty() {
             let (_, matrix) = self.sliding_equations(step.t, &step.x, &low);
@@ -135,7 +148,7 @@ impl Follower<'_> {
             compiled: Rc::as_ptr(&self.compiled) as usize,
             signs: signs.map(|(side, guard)| guard.whole || *side > 0.0).collect(),
             sliding: self.sliding.clone(),
-            contacts: self.contacts.iter().map(|c| (c.state, c.watched)).collect(),
+            contacts: self.contacts.iter().map(direction_kept).collect(),
             pivots: orders,
         };
         if !self.expansions.known.contains_key(&key) {
@@ -590,23 +603,57 @@ impl Follower<'_> {
             found.into_iter().map(|s| s.unwrap_or(Recorded::zero())).collect()
         };
         let pulls = second(direction(out)).into_iter().map(|r| -r).collect();
-        let mut grips = vec![Recorded::zero(); k * k];
+        let (mut grips, mut directions) = (vec![Recorded::zero(); k * k], Vec::new());
         for (column, contact) in self.contacts.iter().enumerate() {
-            let mut unit = vec![None; v.len()];
-            unit[contact.state] = Some(Recorded::one());
-            for (row, grip) in second(unit).into_iter().enumerate() {
+            let mut direction = self.written_direction(contact, v);
+            directions.push(direction.clone());
+            direction.resize(v.len(), None);
+            for (row, grip) in second(direction).into_iter().enumerate() {
                 grips[row * k + column] = grip;
             }
         }
         let own: Vec<Recorded> = (0..k).map(|place| grips[place * k + place]).collect();
         let (forces, _) = solved(grips, pulls, &pivots[pivots.len() - k..]);
-        self.contacts.iter().zip(&forces).for_each(|(contact, force)| out[contact.state] += *force);
+        for (direction, force) in directions.iter().zip(&forces) {
+            let acts = out.iter_mut().zip(direction);
+            acts.filter_map(|(out, by)| by.map(|by| (out, by))).for_each(|(out, by)| {
+                *out += if by == Recorded::one() { *force } else { by * *force };
+            });
+        }
         // The grip counts by its sign, and that does not change while there is a contact.
         let push = |((contact, force), own): ((&Contact, Recorded), Recorded)| {
             Recorded::from_f64(contact.above) * (own / (own * own).sqrt()) * force
         };
         self.contacts.iter().zip(forces).zip(own).map(push).collect()
     }
+
+    /// The direction in which a contact acts, as [`Follower::direction_of`].
+    fn written_direction(&self, contact: &Contact, v: &[Recorded]) -> Vec<Option<Recorded>> {
+        let set = &self.model.definition().events()[contact.event].set;
+        let one = |v: &f64| if *v == 1.0 { Recorded::one() } else { Recorded::from_f64(*v) };
+        let mut along: Vec<Option<Recorded>> =
+            contact.along.iter().map(|v| (*v != 0.0).then(|| one(v))).collect();
+        if set.len() == 1 {
+            return along;
+        }
+        let Some(tape) = self.equation.reset_tape(set) else { return along };
+        let mut direction = vec![None; self.n];
+        along.resize(v.len(), None);
+        let slopes = Replay::new(&tape, v).derivatives(&along);
+        for ((state, _), slope) in set.iter().zip(slopes) {
+            direction[*state] = match (slope, along[*state]) {
+                (Some(slope), Some(along)) => Some(slope - along),
+                (None, Some(along)) => Some(-along),
+                (slope, None) => slope,
+            };
+        }
+        direction
+    }
+}
+
+/// Of a contact its watched expression and the bits of the direction that it keeps.
+fn direction_kept(contact: &Contact) -> (usize, Vec<u64>) {
+    (contact.watched, contact.along.iter().map(|v| v.to_bits()).collect())
 }
 
 /// The rows that elimination with pivots takes.

@@ -2124,12 +2124,12 @@ impl Follower<'_> {
     /// Lets a watched expression that leaves zero be beyond it by what it is now, and by rounding.
     pub(super) fn release(&mut self, i: usize, speeds: f64) {
         /// In units of the tolerance, the error of the multistep method's first steps, which are of
-        /// first order.
+        /// first order, and of the implicit one's polynomial within a step.
         const ERRORS: f64 = 10.0;
         let e = &self.equation.watched[i];
         let beyond = -self.equation.value(e, self.t, &self.x) * self.watch_side[i];
         let error = match self.options.method {
-            Method::Lsoda => ERRORS * self.options.rtol,
+            Method::Lsoda | Method::Radau5 => ERRORS * self.options.rtol,
             _ => 64.0 * f64::EPSILON,
         };
         self.released[i] =

@@ -1,6 +1,7 @@
 //! The field that moves a state: one side's, a mixture on surfaces that are slid upon, or that of a
 //! contact; and its derivatives.
 
+use std::borrow::Cow;
 use std::rc::Rc;
 
 use super::settling::MOST_CORNERS;
@@ -25,6 +26,17 @@ const LITTLE: f64 = 1e-9;
 /// So far back in a step that speeds which vanish at its end are no rounding, and two places give
 /// the limit of weights by a line.
 const BACK: f64 = 1e-5;
+
+/// By which numbers speeds are differentiated.
+#[derive(Clone, Copy)]
+enum By<'a> {
+    /// States and time along the field.
+    Field,
+    /// One variable.
+    Variable(usize),
+    /// States in a direction.
+    Direction(&'a [f64]),
+}
 
 impl Follower<'_> {
     pub(super) fn load(&self, config: &Configuration) -> Vec<f64> {
@@ -318,10 +330,7 @@ impl Follower<'_> {
         self.mixed(t, x, out);
         if !self.contacts.is_empty() {
             let forces = self.contact_forces(out);
-            self.contacts
-                .iter()
-                .zip(forces)
-                .for_each(|(contact, force)| out[contact.state] += force);
+            self.add_forces(&self.contacts, &self.variables, &forces, out);
         }
     }
 
@@ -434,7 +443,10 @@ impl Follower<'_> {
             self.rhs(t, x, &mut out);
             let forces = self.contact_forces(&out);
             for (contact, force) in self.contacts.iter().zip(forces) {
-                noise[contact.state] += rounding * (out[contact.state].abs() + force.abs());
+                let direction = self.direction_of(contact, &self.variables);
+                for (i, by) in direction.iter().enumerate().filter(|(_, by)| **by != 0.0) {
+                    noise[i] += rounding * (out[i].abs() + (by * force).abs());
+                }
             }
         }
         noise
@@ -584,9 +596,8 @@ impl Follower<'_> {
             return Self::along(compiled, variables, field);
         }
         let mut held = field.to_vec();
-        let forces = Self::contact_forces_in(&self.contacts, compiled, variables, field);
-        let all = self.contacts.iter().zip(forces);
-        all.for_each(|(contact, force)| held[contact.state] += force);
+        let forces = self.contact_forces_in(&self.contacts, compiled, variables, field);
+        self.add_forces(&self.contacts, variables, &forces, &mut held);
         Self::along(compiled, variables, &held)
     }
 
@@ -606,15 +617,15 @@ impl Follower<'_> {
     fn hold(&self, compiled: &Compiled, variables: &[f64], field: &mut [f64]) {
         let mut contacts = self.contacts.clone();
         while !contacts.is_empty() {
-            let forces = Self::contact_forces_in(&contacts, compiled, variables, field);
-            let grips = Self::grips_in(&contacts, compiled, variables, field);
+            let forces = self.contact_forces_in(&contacts, compiled, variables, field);
+            let grips = self.grips_in(&contacts, compiled, variables, field);
             let k = contacts.len();
             let pushes =
                 |i: &usize| contacts[*i].above * grips[i * k + i].signum() * forces[*i] >= 0.0;
-            let pushing: Vec<Contact> = (0..k).filter(pushes).map(|i| contacts[i]).collect();
+            let pushing: Vec<Contact> =
+                (0..k).filter(pushes).map(|i| contacts[i].clone()).collect();
             if pushing.len() == k {
-                let all = contacts.iter().zip(forces);
-                all.for_each(|(contact, force)| field[contact.state] += force);
+                self.add_forces(&contacts, variables, &forces, field);
                 return;
             }
             contacts = pushing;
@@ -744,13 +755,67 @@ impl Follower<'_> {
         (a, matrix)
     }
 
-    /// Matrix of the contacts, row by row: effect of each contact's state on the derivative of each
-    /// contact's expression.
+    /// The direction in which a contact acts: that in which its event's reset changes the state by
+    /// what the speed of approach is, as where two bodies exchange momentum.
+    pub(super) fn direction_of<'c>(
+        &self,
+        contact: &'c Contact,
+        variables: &[f64],
+    ) -> Cow<'c, [f64]> {
+        let set = &self.model.definition().events()[contact.event].set;
+        if set.len() == 1 {
+            return Cow::Borrowed(&contact.along);
+        }
+        Cow::Owned(self.change_by_reset(contact.event, variables, &contact.along))
+    }
+
+    /// The derivative, along a direction, of what an event's reset adds to the state.
+    pub(super) fn change_by_reset(
+        &self,
+        event: usize,
+        variables: &[f64],
+        along: &[f64],
+    ) -> Vec<f64> {
+        let (n, set) = (self.n, &self.model.definition().events()[event].set);
+        let mut at: Vec<Dual<f64, 1>> = variables.iter().map(|v| Dual::constant(*v)).collect();
+        at.iter_mut().zip(along).for_each(|(at, along)| at.partials = [*along]);
+        let mut values = vec![Dual::constant(0.0); set.len()];
+        match &self.equation.resets[event] {
+            Some(program) => program.evaluate(&at, &mut values),
+            None => values.iter_mut().zip(set).for_each(|(value, (_, e))| {
+                *value = self.equation.value(e, at[n], &at[..n]);
+            }),
+        }
+        let mut change = vec![0.0; n];
+        for ((state, _), value) in set.iter().zip(&values) {
+            change[*state] = value.partials[0] - along[*state];
+        }
+        change
+    }
+
+    /// Adds what contacts do to a field, with the variables at which the forces were found.
+    fn add_forces(
+        &self,
+        contacts: &[Contact],
+        variables: &[f64],
+        forces: &[f64],
+        field: &mut [f64],
+    ) {
+        for (contact, force) in contacts.iter().zip(forces) {
+            let direction = self.direction_of(contact, variables);
+            let acts = field.iter_mut().zip(direction.iter()).filter(|(_, by)| **by != 0.0);
+            acts.for_each(|(field, by)| *field += by * force);
+        }
+    }
+
+    /// Matrix of the contacts, row by row: effect of a change in the direction of each contact on
+    /// the derivative of each contact's expression.
     pub(super) fn grips(&self, field: &[f64]) -> Vec<f64> {
-        Self::grips_in(&self.contacts, &self.compiled, &self.variables, field)
+        self.grips_in(&self.contacts, &self.compiled, &self.variables, field)
     }
 
     fn grips_in(
+        &self,
         contacts: &[Contact],
         compiled: &Compiled,
         variables: &[f64],
@@ -758,7 +823,10 @@ impl Follower<'_> {
     ) -> Vec<f64> {
         let columns: Vec<Vec<f64>> = contacts
             .iter()
-            .map(|c| Self::second_along_in(compiled, variables, field, Some(c.state)))
+            .map(|c| {
+                let direction = self.direction_of(c, variables);
+                Self::second_along_in(compiled, variables, field, By::Direction(&direction))
+            })
             .collect();
         let place = |c: &Contact| compiled.active.len() + c.watched;
         contacts
@@ -767,22 +835,23 @@ impl Follower<'_> {
             .collect()
     }
 
-    /// Rates added to each contact's state under `field` so that its expression stays at zero;
-    /// not-a-number if there are none.
+    /// What is added to `field` in each contact's direction so that its expression stays at zero;
+    /// not-a-number if there is nothing.
     pub(super) fn contact_forces(&self, field: &[f64]) -> Vec<f64> {
-        Self::contact_forces_in(&self.contacts, &self.compiled, &self.variables, field)
+        self.contact_forces_in(&self.contacts, &self.compiled, &self.variables, field)
     }
 
     fn contact_forces_in(
+        &self,
         contacts: &[Contact],
         compiled: &Compiled,
         variables: &[f64],
         field: &[f64],
     ) -> Vec<f64> {
-        let rates = Self::second_along_in(compiled, variables, field, None);
+        let rates = Self::second_along_in(compiled, variables, field, By::Field);
         let pulls: Vec<f64> =
             contacts.iter().map(|c| -rates[compiled.active.len() + c.watched]).collect();
-        let grips = Self::grips_in(contacts, compiled, variables, field);
+        let grips = self.grips_in(contacts, compiled, variables, field);
         solve_any(&grips, &pulls, 0.0).unwrap_or_else(|| vec![f64::NAN; pulls.len()])
     }
 
@@ -802,8 +871,9 @@ impl Follower<'_> {
                 }
                 let held: Vec<usize> =
                     (0..self.guard_held.len()).filter(|guard| self.guard_held[*guard]).collect();
-                let Contact { watched, state, .. } = self.contacts[place];
-                let config = self.sides_off(watched, state, way, &held);
+                let contact = &self.contacts[place];
+                let direction = self.direction_of(contact, &self.variables);
+                let config = self.sides_off(contact.watched, &direction, way, &held);
                 let (compiled, variables) = (self.equation.compiled(&config), self.load(&config));
                 self.off.push(Off { place, way, config, compiled, variables });
             }
@@ -812,23 +882,33 @@ impl Follower<'_> {
 
     /// Whether the event of a contact lets what moves pass to the other side, slower.
     fn lets_through(&self, place: usize) -> bool {
-        let Contact { event, state, .. } = self.contacts[place];
-        let event = &self.model.definition().events()[event];
-        let mut x = self.x.clone();
-        let change = if self.size[state] > 0.0 { self.size[state] } else { 1.0 };
-        x[state] += change;
-        let set = event.set.iter().find(|(set, _)| *set == state);
-        let after = set.map(|(_, e)| self.equation.value(e, self.t, &x) - self.x[state]);
-        matches!(event.when, When::Zero(_, Direction::Both)) && after.is_some_and(|a| a > 0.0)
+        let contact = &self.contacts[place];
+        let event = &self.model.definition().events()[contact.event];
+        let direction = self.direction_of(contact, &self.variables);
+        let change = self.size_along(&direction);
+        let x: Vec<f64> =
+            self.x.iter().zip(direction.iter()).map(|(x, d)| x + change * d).collect();
+        let after = |(state, e): &(usize, Expression)| {
+            direction[*state] * (self.equation.value(e, self.t, &x) - self.x[*state])
+        };
+        matches!(event.when, When::Zero(_, Direction::Both))
+            && event.set.iter().map(after).sum::<f64>() > 0.0
+    }
+
+    /// So many times a direction is the size of a state that it changes.
+    fn size_along(&self, direction: &[f64]) -> f64 {
+        let size = |i: usize| if self.size[i] > 0.0 { self.size[i] } else { 1.0 };
+        let all = direction.iter().enumerate().filter(|(_, by)| **by != 0.0);
+        all.map(|(i, by)| size(i) / by.abs()).fold(f64::INFINITY, f64::min)
     }
 
     /// The configuration in which these functions have the sides that they get as soon as the
-    /// motion, moved by a state, leaves the zero of a watched expression to a side: first by its
+    /// motion, moved in a direction, leaves the zero of a watched expression to a side: first by its
     /// speed, then by its place. The others keep theirs.
     pub(super) fn sides_off(
         &self,
         watched: usize,
-        state: usize,
+        direction: &[f64],
         way: f64,
         guards: &[usize],
     ) -> Configuration {
@@ -846,20 +926,22 @@ impl Follower<'_> {
             field
         };
         let rest = velocity(&self.x);
-        let by = self.second_along(&rest, Some(state))[self.compiled.active.len() + watched];
+        let own = self.compiled.active.len() + watched;
+        let by = self.second_in(&rest, direction)[own];
         let size = |i: usize| if self.size[i] > 0.0 { self.size[i] } else { 1.0 };
-        let mut faster = self.x.clone();
-        faster[state] += way * by.signum() * SPEED * size(state);
+        let step = way * by.signum() * SPEED * self.size_along(direction);
+        let faster: Vec<f64> = self.x.iter().zip(direction).map(|(x, by)| x + step * by).collect();
         let change: Vec<f64> =
             velocity(&faster).iter().zip(&rest).map(|(fast, rest)| fast - rest).collect();
         let time = (0..self.n)
-            .filter(|i| *i != state && change[*i] != 0.0)
+            .filter(|i| direction[*i] == 0.0 && change[*i] != 0.0)
             .map(|i| PLACE * size(i) / change[i].abs())
             .fold(f64::INFINITY, f64::min);
         let mut moved = self.x.clone();
         if time.is_finite() {
             moved.iter_mut().zip(&change).for_each(|(x, change)| *x += time * change);
-            moved[state] = self.x[state];
+            let set = (0..self.n).filter(|i| direction[*i] != 0.0);
+            set.for_each(|i| moved[i] = self.x[i]);
         }
         let mut config = self.config.clone();
         for guard in guards {
@@ -922,20 +1004,23 @@ impl Follower<'_> {
     /// Second derivatives of the watched values along the field; or the derivatives of their first
     /// ones by a state.
     pub(super) fn second_along(&self, field: &[f64], by: Option<usize>) -> Vec<f64> {
+        let by = by.map_or(By::Field, By::Variable);
         Self::second_along_in(&self.compiled, &self.variables, field, by)
     }
 
-    fn second_along_in(
-        compiled: &Compiled,
-        variables: &[f64],
-        field: &[f64],
-        by: Option<usize>,
-    ) -> Vec<f64> {
+    /// The derivatives of the watched values' first ones in a direction of the states.
+    pub(super) fn second_in(&self, field: &[f64], direction: &[f64]) -> Vec<f64> {
+        let by = By::Direction(direction);
+        Self::second_along_in(&self.compiled, &self.variables, field, by)
+    }
+
+    fn second_along_in(compiled: &Compiled, variables: &[f64], field: &[f64], by: By) -> Vec<f64> {
         let n = field.len();
         let mut direction = vec![0.0; variables.len()];
         match by {
-            Some(state) => direction[state] = 1.0,
-            None => {
+            By::Variable(i) => direction[i] = 1.0,
+            By::Direction(states) => direction[..n].copy_from_slice(states),
+            By::Field => {
                 direction[..n].copy_from_slice(field);
                 direction[n] = 1.0;
             }
