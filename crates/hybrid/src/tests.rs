@@ -5402,3 +5402,63 @@ fn a_body_comes_to_rest_on_one_that_lies() {
         }
     }
 }
+
+/// Two rooms whose saturated thermostats hold them from one moment or two on.
+#[test]
+fn saturated_thermostats_hold_two_rooms() {
+    for heat in ["clip(4*heaviside(X), 0, 3)", "min(4*heaviside(X), 3)"] {
+        for (start, targets) in [([19, 21], [20.0, 21.0]), ([19, 19], [20.0, 20.0])] {
+            let p = [0, 1].map(|i| heat.replace('X', &format!("{} - T{i}", targets[i])));
+            let text = format!(
+                "states = ['T0', 'T1', 'E']\nstart = [{}, {}, 0]\n\
+                 f = ['-0.1*T0 + 0.02*(T1 - T0) + {2}', '-0.1*T1 + 0.02*(T0 - T1) + {3}', \
+                 'max({2}, 0)']",
+                start[0], start[1], p[0], p[1]
+            );
+            // The second room is held all along, or as the first one is.
+            let (k, gain) = if start[1] == 21 { (0.12, 3.42) } else { (0.1, 3.0) };
+            let landing = ((gain / k - 19.0) / (gain / k - 20.0_f64)).ln() / k;
+            let held = 2.0 - 0.02 * (targets[1] - 20.0);
+            for method in Method::ALL {
+                let end = end_of(&text, 10.0, method).unwrap_or_else(|e| panic!("{method:?}: {e}"));
+                near(end[2], 3.0 * landing + held * (10.0 - landing), 1e-7);
+            }
+        }
+    }
+}
+
+/// A tank runs empty while the motion slides, rests on a stop, or has just been filled again.
+#[test]
+fn a_tank_runs_empty_beside_what_slides() {
+    let text = |tank: &str, cost: &str| {
+        format!(
+            "states = ['h', 'y', 'J']\nstart = [1, 0.5, 0]\n\
+             f = ['{tank}', '0.5 - 2*sign(y)', '{cost}']"
+        )
+    };
+    // The weight of the positive side from y's landing on.
+    let (landing, weight) = (0.5 / 1.5, 0.5 * 1.25);
+    let slid = landing + weight * (8.0 - landing);
+    for method in Method::ALL {
+        let end = |text: &str| {
+            end_of(text, 8.0, method).unwrap_or_else(|e| panic!("{method:?}: {e}\n{text}"))
+        };
+        for tank in ["-sqrt(h)", "-sqrt(max(h, 0))", "if(h > 0, -sqrt(h), 0)", "-h^0.5"] {
+            let x = end(&text(tank, "max(sign(y), 0)"));
+            assert!(x[0] == 0.0 && x[1].abs() < 1e-15, "{method:?} {tank} {x:?}");
+            near(x[2], slid, 1e-9);
+        }
+        // It is full for two units of time.
+        let x = end(&text("-sqrt(max(h, 0))", "if(h > 0, 1, 0)"));
+        near(x[2], 2.0, 1e-7);
+        // It fills again from t = 5 on: 2*(-s - ln(1 - s)) is the time since then, with s its root.
+        let x = end(&text("1*if(t > 5, 1, 0) - sqrt(h)", "0"));
+        let s = x[0].sqrt();
+        near(2.0 * (-s - (1.0 - s).ln()), 3.0, 1e-7);
+        let ball = "states = ['h', 'x', 'v']\nstart = [1, 0.1, 0]\nf = ['-sqrt(h)', 'v', \
+            '-9.81 + h']\n[[event]]\nwhen = 'x'\ndirection = 'down'\nafter_zeno = 'stick'\n\
+            set = { v = '-0.4*v' }";
+        let x = end(ball);
+        assert!(x[0] == 0.0 && x[1].abs() < 1e-15, "{method:?} {x:?}");
+    }
+}

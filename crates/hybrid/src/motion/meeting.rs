@@ -1436,6 +1436,31 @@ impl Follower<'_> {
         }
         parts.len() > 1
             && parts.iter().any(|part| self.rest_where_zero(t, no_way, &part.near, &values))
+            || no_way && near.iter().any(|one| self.stops_alone(t, *one, &values))
+    }
+
+    /// Whether one function, by place and guard, stops at its zero whatever others do, on all sides
+    /// of those that are slid upon, and the motion goes on so.
+    fn stops_alone(&mut self, t: f64, one: (usize, usize), values: &[f64]) -> bool {
+        if self.slides[one.1] {
+            return false;
+        }
+        let x = self.nearest_meeting(&[one], values);
+        let mut fields = Vec::new();
+        for high in self.sliding.iter().copied().map(Some).chain([None]) {
+            for side in [-1.0, 1.0] {
+                let mut config = self.config.clone();
+                high.iter().for_each(|guard| config.sides[*guard] = self.high(*guard));
+                config.sides[one.1] = side;
+                let mut variables = self.load(&config);
+                variables[..self.n].copy_from_slice(&x);
+                let mut field = vec![0.0; self.n];
+                self.equation.compiled(&config).field.evaluate(&variables, &mut field);
+                fields.push(field);
+            }
+        }
+        let left = self.options.t_end - t;
+        self.stops_at_equality(t, &x, &[one], &fields, left)
     }
 
     /// Whether the motion rests where the functions `near`, by place and guard, are zero: a mixture

@@ -943,8 +943,7 @@ impl Follower<'_> {
         /// about ten.
         const ERRORS: f64 = 20.0;
         let compiled = self.compiled.clone();
-        let free = self.sliding.is_empty() && self.contacts.is_empty() && self.tangents.is_none();
-        if !free || !compiled.gates.contains(&Gate::Scale) {
+        if self.tangents.is_some() || !compiled.gates.contains(&Gate::Scale) {
             return None;
         }
         let (n, t, x) = (self.n, self.t, self.x.clone());
@@ -1018,26 +1017,76 @@ impl Follower<'_> {
             let mut values = vec![0.0; compiled.outputs];
             compiled.watched.evaluate(&self.variables, &mut values);
             let (guards, watched) = values.split_at(compiled.active.len());
+            // Functions with that argument's zero are come to from their sides.
+            let active = || compiled.active.iter().zip(guards);
+            let comes_to = |(guard, value): &(&usize, &f64)| {
+                let whole = self.equation.guards[**guard].whole;
+                **value == 0.0 && !whole && !self.slides[**guard]
+            };
+            let come_to: Vec<usize> = active().filter(comes_to).map(|(guard, _)| *guard).collect();
             let keeps = |(guard, value): (&usize, &f64)| {
                 let side = self.config.sides[*guard];
                 let whole = self.equation.guards[*guard].whole;
-                if whole { value.floor() == side } else { value * side > 0.0 || side == 0.0 }
+                if self.slides[*guard] || come_to.contains(guard) {
+                    true
+                } else if whole {
+                    value.floor() == side
+                } else {
+                    value * side > 0.0 || side == 0.0
+                }
             };
-            if !compiled.active.iter().zip(guards).all(keeps) {
+            if !active().all(keeps) {
                 return None;
             }
             let before = self.watched_values().split_off(guards.len());
             let met = before.iter().zip(watched).zip(&self.watch_side).enumerate();
-            let met: Vec<Sought> = met
+            let free = |i: &usize| !self.held[*i] && !self.contacts.iter().any(|c| c.watched == *i);
+            let mut met: Vec<Sought> = met
+                .filter(|(i, _)| free(i))
                 .filter(|(_, ((from, to), side))| **from * **side > 0.0 && !(**to * **side > 0.0))
                 .map(|(i, _)| Sought::Watched(i))
                 .collect();
+            let passes = self.changes_nothing(&come_to, end, &there);
+            // Of a switch all but series come nearer to the moment.
+            if !passes && options.method != Method::Taylor {
+                return None;
+            }
             (self.t, self.x) = (end, there);
+            self.project();
+            if arguments(self, end, &self.x, &unit, 0.0)[gate].value != 0.0 {
+                (self.t, self.x) = (t, x);
+                return None;
+            }
+            if passes {
+                come_to.iter().for_each(|guard| self.fresh_guard[*guard] = true);
+            } else {
+                met.extend(come_to.iter().map(|g| Sought::Guard { guard: *g, upper: false }));
+            }
             let sees_time = self.equation.depends_on_time() || self.equation.events_see_time();
             self.rests = !sees_time && stays.iter().all(|f| *f == 0.0);
             return Some(met);
         }
         None
+    }
+
+    /// Whether the fields at a point, on each side of the surfaces slid upon, are the same on both
+    /// sides of each of these functions.
+    fn changes_nothing(&self, guards: &[usize], t: f64, x: &[f64]) -> bool {
+        let field = |other: Option<usize>, high: Option<usize>| {
+            let mut config = self.config.clone();
+            other.iter().for_each(|guard| config.sides[*guard] = -config.sides[*guard]);
+            high.iter().for_each(|guard| config.sides[*guard] = self.high(*guard));
+            let mut variables = self.load(&config);
+            variables[..self.n].copy_from_slice(x);
+            variables[self.n] = t;
+            let mut out = vec![0.0; self.n];
+            self.equation.compiled(&config).field.evaluate(&variables, &mut out);
+            out
+        };
+        let places = || self.sliding.iter().copied().map(Some).chain([None]);
+        let same =
+            |guard: &usize| places().all(|high| field(Some(*guard), high) == field(None, high));
+        guards.iter().all(same)
     }
 
     /// The gradient of a watched expression in the states, at those that the variables hold.
