@@ -520,6 +520,8 @@ struct Follower<'a> {
     /// Whether each watched expression had no speed where it left zero, and each guard.
     tangent: Vec<bool>,
     tangent_guard: Vec<bool>,
+    /// Kinks that follow from what is decided, and are not decided with it.
+    left_out: Vec<usize>,
     /// Guards that are zero to rounding where motion begins: their speeds are known to rounding,
     /// too.
     touching: Vec<bool>,
@@ -990,6 +992,7 @@ impl<'a> Follower<'a> {
             touches: vec![false; watched],
             tangent: vec![false; watched],
             tangent_guard: vec![false; guards],
+            left_out: Vec::new(),
             touching: vec![false; guards],
             released: vec![0.0; watched],
             leaves: None,
@@ -1429,12 +1432,15 @@ impl<'a> Follower<'a> {
         let mut values = vec![0.0; self.compiled.outputs];
         self.compiled.watched.evaluate(&self.variables, &mut values);
         let mut config = self.config.clone();
+        // What follows from a surface that has just been left leaves zero as it does.
+        let left = self.left.iter().fold(0.0_f64, |most, left| most.max(*left));
         for (place, guard) in resting {
             let small = 1e-13 * self.magnitude(&self.equation.guards[guard].expression);
             if values[place].abs() > small {
                 config.sides[guard] = values[place].signum();
                 self.fresh_guard[guard] = true;
                 self.tangent_guard[guard] = false;
+                self.left[guard] = left;
             }
         }
         let leaves = config != self.config;

@@ -5462,3 +5462,47 @@ fn a_tank_runs_empty_beside_what_slides() {
         assert!(x[0] == 0.0 && x[1].abs() < 1e-15, "{method:?} {x:?}");
     }
 }
+
+/// Costs with kinks where two states meet that are both slid upon: they are zero as long as both
+/// are, and the motion leaves them with either.
+#[test]
+fn kinks_that_follow_from_what_is_slid_upon_rest() {
+    let text = |gain: f64, push: &str, cost: &str| {
+        format!(
+            "states = ['x', 'y', 'J']\nstart = [1, -0.8, 0]\nf = ['-{gain}*sign(x) + {push}*sin(t)', \
+             '-1.5*sign(y) + 0.5*cos(t)', '{cost}']"
+        )
+    };
+    let x = |t: f64| 2.0 - 2.0 * t - t.cos();
+    let y = |t: f64| -0.8 + 1.5 * t + 0.5 * t.sin();
+    let zero = |f: &dyn Fn(f64) -> f64| {
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if f(middle) * f(0.0) > 0.0 { low = middle } else { high = middle }
+        }
+        low
+    };
+    let (tx, ty) = (zero(&x), zero(&y));
+    let of_x = 2.0 * tx - tx * tx - tx.sin();
+    let of_y = -0.8 * ty + 0.75 * ty * ty - 0.5 * ty.cos() + 0.5;
+    for method in Method::ALL {
+        let end = |text: &str, t: f64| {
+            end_of(text, t, method).unwrap_or_else(|e| panic!("{method:?}: {e}\n{text}"))
+        };
+        for (cost, want) in [
+            ("abs(x - y)", of_x - of_y),
+            ("max(x - y, 0)", of_x - of_y),
+            ("abs(x - y) + abs(3*x + 2*y) - abs(3*x + 2*y)", of_x - of_y),
+            ("max(x, y)", of_x),
+            ("if(x > y, x, y)", of_x),
+            ("min(x, y)", of_y),
+        ] {
+            near(end(&text(2.0, "1", cost), 20.0)[2], want, 1e-9);
+        }
+        // x is driven off by a force that grows: by steps of 2e-5 in which speeds are constant.
+        let x = end(&text(1.0, "(0.8 + 0.05*t)", "abs(x - y)"), 20.0);
+        near(x[0], 0.19531262, 1e-7);
+        near(x[2], 3.89889839, 1e-6);
+    }
+}

@@ -661,6 +661,10 @@ impl Follower<'_> {
         self.add_what_is_zero(&mut zero);
         zero.retain(|guard| !self.guard_held[*guard]);
         self.add_what_follows(&mut zero);
+        zero.retain(|guard| !self.left_out.contains(guard));
+        if self.decide_without_kinks(&zero, kept) {
+            return Ok(());
+        }
         // Functions that only others' sides move follow those.
         if !zero.iter().all(|guard| self.equation.guards[*guard].of_sides) {
             zero.retain(|guard| !self.equation.guards[*guard].of_sides);
@@ -1350,6 +1354,49 @@ impl Follower<'_> {
             return if undecided && self.comes_to_rest(self.t, true) { Ok(()) } else { Err(open) };
         }
         self.follow_jumps(&zero)
+    }
+
+    /// Decides without those kinks among functions that are zero that follow from the others, as
+    /// that of abs(x - y) where x and y are zero: as long as these are slid upon it stays at zero,
+    /// and the fields of both its sides are one there. False, and nothing is changed, if there are
+    /// none or the others do not stay.
+    fn decide_without_kinks(&mut self, zero: &[usize], kept: &[bool]) -> bool {
+        if zero.len() < 3 || !self.left_out.is_empty() {
+            return false;
+        }
+        let is_kink = |follower: &mut Self, guard: usize| {
+            !follower.equation.guards[guard].whole
+                && !follower.slides[guard]
+                && follower.is_kink(guard)
+        };
+        let mut kinks: Vec<usize> =
+            zero.iter().copied().filter(|guard| is_kink(self, *guard)).collect();
+        let others: Vec<usize> = zero.iter().copied().filter(|g| !kinks.contains(g)).collect();
+        let follows = |follower: &Self, kink: usize, from: &[usize]| {
+            let all = [from, &[kink]].concat();
+            follower.values_around(&all).is_some_and(|values| cells::last_follows(&values))
+        };
+        kinks.retain(|kink| others.len() > 1 && follows(self, *kink, &others));
+        if kinks.is_empty() {
+            return false;
+        }
+        let rest: Vec<usize> = zero.iter().copied().filter(|g| !kinks.contains(g)).collect();
+        let before = (self.config.clone(), self.sliding.clone(), self.x.clone(), self.t);
+        let marks = (self.along.clone(), self.fresh_guard.clone(), self.tangent_guard.clone());
+        let mut config = self.config.clone();
+        kinks.iter().for_each(|kink| config.sides[*kink] = 0.0);
+        self.adopt(config, self.sliding.clone());
+        self.left_out = kinks.clone();
+        let decided = self.decide(&rest, kept);
+        self.left_out.clear();
+        let stay: Vec<usize> = rest.into_iter().filter(|guard| self.slides[*guard]).collect();
+        if decided.is_ok() && stay.len() > 1 && kinks.iter().all(|k| follows(self, *k, &stay)) {
+            return true;
+        }
+        (self.x, self.t) = (before.2, before.3);
+        self.adopt(before.0, before.1);
+        (self.along, self.fresh_guard, self.tangent_guard) = marks;
+        false
     }
 
     /// The kinks among functions that are zero whose sides change nothing until the run ends: both
