@@ -10,7 +10,7 @@
 
 use twofold_num::Dual;
 use twofold_num::elementary::sqrt;
-use twofold_num::linear::{balance, eigenvalues, solve_any};
+use twofold_num::linear::{eigenvalues, solve_any};
 use twofold_system::Expression;
 
 use crate::definition::{Direction, Event, When};
@@ -57,7 +57,8 @@ pub struct Rest {
     pub tangent: bool,
     /// The set of rests to which it belongs, if it is not isolated.
     pub family: Option<Family>,
-    /// Eigenvalues of the linearised motion, on surfaces along them: real and imaginary parts.
+    /// Eigenvalues of the linearised motion, on surfaces along them: real and imaginary parts, by
+    /// falling real part.
     pub eigenvalues: Vec<[f64; 2]>,
     /// By how much an eigenvalue may be off, the state being known to 1e-9 of the box: at a double
     /// root none has a sign.
@@ -144,6 +145,10 @@ pub enum RestError {
     Box(String),
 }
 
+/// Part of the box's width by which a state on its face may seem to be outside.
+const ON_A_FACE: f64 = 1e-12;
+/// Part of the box's width to which a state is taken to be known where its stability is judged.
+const KNOWN_TO: f64 = 1e-9;
 /// Starts of Newton's method in a field and on each surface.
 const STARTS: usize = 400;
 /// Sets of several surfaces share as many; each has so many at least.
@@ -365,8 +370,13 @@ impl Search<'_> {
         a.iter().zip(b).zip(&self.widths).all(|((a, b), w)| (a - b).abs() <= 1e-7 * w)
     }
 
+    /// Whether a state is in the box, or beyond its face by no more than rounding: populations and
+    /// amounts rest on the face zero.
     fn is_inside(&self, x: &[f64]) -> bool {
-        x.iter().zip(self.within).all(|(v, (a, b))| (a..=b).contains(&v))
+        let is_in = |(v, ((a, b), w)): (&f64, (&(f64, f64), &f64))| {
+            (a - ON_A_FACE * w..=b + ON_A_FACE * w).contains(v)
+        };
+        x.iter().zip(self.within.iter().zip(&self.widths)).all(is_in)
     }
 
     /// A place of the box to start from: the middle, then Halton's points.
@@ -861,16 +871,8 @@ impl Search<'_> {
                 .min_by(|i, j| modulus(&eigenvalues[*i]).total_cmp(&modulus(&eigenvalues[*j])))?;
             eigenvalues.remove(smallest);
         }
-        let moved: Vec<f64> = x.iter().zip(&self.widths).map(|(x, w)| x + 1e-9 * w).collect();
-        let blur = if k == 0 {
-            let other = self.local(config, &moved).jacobian;
-            let units = balance(&m.local.jacobian, n);
-            let unit = |at: usize| units[at % n] / units[at / n];
-            let changes = m.local.jacobian.iter().zip(&other).map(|(a, b)| (a - b).abs());
-            changes.enumerate().map(|(at, change)| change * unit(at)).fold(0.0, f64::max)
-        } else {
-            0.0
-        };
+        eigenvalues.sort_by(|a, b| b[0].total_cmp(&a[0]).then(b[1].total_cmp(&a[1])));
+        let blur = if k == 0 { self.blur(config, &x, &eigenvalues) } else { 0.0 };
         let boundary = self.boundary(config, on, &x);
         let on = on.iter().zip(&weights);
         let on = on.map(|(s, w)| On { surface: self.name(s), weight: *w }).collect();
@@ -890,6 +892,26 @@ impl Search<'_> {
             behind,
             moved,
         })
+    }
+
+    /// By how much the eigenvalues of a field's rest change within what the state is known to. (How
+    /// much entries of its Jacobian change says less: states have units.)
+    fn blur(&self, config: &Configuration, x: &[f64], own: &[[f64; 2]]) -> f64 {
+        let apart = |a: &[f64; 2], b: &[f64; 2]| {
+            let [re, im] = [a[0] - b[0], a[1] - b[1]];
+            sqrt(re * re + im * im)
+        };
+        // Together, and every second one the other way: what two states change may cancel.
+        let shifted = [1.0, -1.0].map(|second| {
+            let shift =
+                |(i, w): (usize, &f64)| KNOWN_TO * w * if i % 2 == 0 { 1.0 } else { second };
+            let moved = self.widths.iter().enumerate().map(shift).zip(x).map(|(d, x)| x + d);
+            let there = self.local(config, &moved.collect::<Vec<_>>()).jacobian;
+            let there = eigenvalues(&there, self.n).unwrap_or_default();
+            let nearest = |e| there.iter().map(|other| apart(e, other)).reduce(f64::min);
+            own.iter().filter_map(nearest).fold(0.0, f64::max)
+        });
+        shifted[0].max(shifted[1])
     }
 
     /// Whether all fields around a rest on `k` surfaces are tangent to one of them, to rounding:

@@ -2883,6 +2883,31 @@ fn a_rest_has_no_units() {
     }
 }
 
+/// Populations rest where one of them is zero, on the face of the box: an equilibrium of two that
+/// compete, x' = x (r - x - a y), has the eigenvalues -r and s - b r at y = 0.
+#[test]
+fn populations_rest_on_the_face_of_the_box() {
+    let ([r, a], [s, b]) = ([0.76, 1.45], [0.92, 0.35]);
+    let text = format!("states = ['x', 'y']\nf = ['x*({r} - x - {a}*y)', 'y*({s} - {b}*x - y)']");
+    for within in [(0.0, 3.0), (-0.7, 3.0)] {
+        let found = crate::rests::rests(&model(&text), &[within; 2]).unwrap();
+        // Together they would need a negative number of the first.
+        let right = [
+            ([0.0, 0.0], [s, r], "unstable node"),
+            ([0.0, s], [r - a * s, -s], "stable node"),
+            ([r, 0.0], [s - b * r, -r], "saddle"),
+        ];
+        assert_eq!(found.len(), 3, "{within:?} {found:?}");
+        for (rest, (x, eigenvalues, kind)) in found.iter().zip(right) {
+            for i in 0..2 {
+                near(rest.x[i], x[i], 1e-12);
+                near(rest.eigenvalues[i][0], eigenvalues[i], 1e-9);
+            }
+            assert_eq!(rest.kind(), kind, "{rest:?}");
+        }
+    }
+}
+
 /// Pseudo-equilibria on a circle on which equal weights of the fields cancel: the sliding field is
 /// (1 - x^2)/2, -x y/2.
 #[test]

@@ -269,7 +269,10 @@ impl GeneralOrbit {
         }
         let there = Options { start: Some(end.x.clone()), mode: end.mode, ..options };
         let rest = if rests { rest_near(model, &there)? } else { None };
-        Ok((Some(end), rest.filter(|rest| rest.stability == Stability::Attracts)))
+        Ok((
+            Some(end),
+            rest.filter(|rest| matches!(rest.stability, Stability::Attracts | Stability::ToASet)),
+        ))
     }
 
     /// The unit of each state, a power of two: its size on a way with these bounds, or at the start
@@ -331,6 +334,7 @@ fn rest_near(model: &Model, options: &Options) -> Result<Option<Rest>, HybridErr
     Ok(nearest.map(|rest| {
         let kind = rest.kind();
         let stability = match () {
+            () if kind.starts_with("stable") && rest.family.is_some() => Stability::ToASet,
             () if kind.starts_with("stable") => Stability::Attracts,
             () if kind.starts_with("unstable") || kind.ends_with("saddle") => Stability::Repels,
             () => Stability::Neutral,
@@ -584,6 +588,17 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// The slowest neighbours say how fast a rest attracts; of a set of rests each comes to its own.
+    #[test]
+    fn the_rate_of_a_rest_is_that_of_the_slowest() {
+        let text = "states = ['x', 'y']\nstart = [1, 1]\nf = ['-3*x', '-0.5*y']";
+        let rest: Rest = orbit(text, 100.0, Return::Crossings(1)).unwrap().fact("rest").unwrap();
+        assert!((rest.rate().unwrap() - 0.5).abs() < 1e-9, "{rest:?}");
+        let text = "states = ['x', 'y']\nstart = [1, 1]\nf = ['-3*x + 0.1*y', '0*x']";
+        let rest: Rest = orbit(text, 100.0, Return::Crossings(1)).unwrap().fact("rest").unwrap();
+        assert_eq!(rest.stability, Stability::ToASet, "{rest:?}");
     }
 
     /// Motion that drifts for ever is on no orbit, however far away what it drifts by is rounding.

@@ -41,6 +41,8 @@ pub enum Stability {
     /// The largest real part of an eigenvalue is zero within its rounding: linear terms do not
     /// decide.
     Neutral,
+    /// Its neighbours come to rest too, each at a place of its own: rests fill a curve, or more.
+    ToASet,
 }
 
 /// A rest.

@@ -553,6 +553,9 @@ fn at_rest(names: &[&str], rest: &Rest) -> String {
         }
         (RestStability::Repels, _) => "repels".into(),
         (RestStability::Neutral, _) => "neutral: linear terms do not decide".into(),
+        (RestStability::ToASet, _) => {
+            "one of a set of rests, to which its neighbours come, each to a rest of its own".into()
+        }
     };
     let numbers = if rest.eigenvalues.is_empty() {
         "none".into()
@@ -560,7 +563,9 @@ fn at_rest(names: &[&str], rest: &Rest) -> String {
         complex(&rest.eigenvalues, f64::NAN)
     };
     let end = match rest.stability {
-        RestStability::Attracts => "The motion comes to rest: there is no closed orbit near.",
+        RestStability::Attracts | RestStability::ToASet => {
+            "The motion comes to rest: there is no closed orbit near."
+        }
         RestStability::Repels | RestStability::Neutral => {
             "The search ends at this point: no closed orbit was found. Give another --start."
         }
