@@ -156,7 +156,10 @@ pub fn store(bytes: &[u8]) -> String {
 /// those).
 pub fn certificate(bytes: &[u8]) -> String {
     match text(bytes) {
-        Some(text) => said(&twofold::verify::Checker::of_reader().verify(text)),
+        Some(text) => {
+            let theorems = twofold::paper::code::theorems();
+            said(&twofold::verify::Checker::of_reader(theorems).verify(text))
+        }
         None => "no text".into(),
     }
 }

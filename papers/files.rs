@@ -5,6 +5,7 @@
 pub const JEFFREY_2013: &[(&str, &str)] = &[
     ("paper.toml", include_str!("jeffrey-2013/paper.toml")),
     ("sentences.toml", include_str!("jeffrey-2013/sentences.toml")),
+    ("theorems.toml", include_str!("jeffrey-2013/theorems.toml")),
     ("figures/fig2.toml", include_str!("jeffrey-2013/figures/fig2.toml")),
     ("figures/fig5.toml", include_str!("jeffrey-2013/figures/fig5.toml")),
     ("figures/fig6.toml", include_str!("jeffrey-2013/figures/fig6.toml")),

@@ -9,15 +9,11 @@
 use serde_json::json;
 use twofold::rigor::cycle::Search;
 use twofold::rigor::{FlowOptions, prove_cycle};
-use twofold_proofs::{SECTION, cycle, equation, print_cycle, refuse, write};
-
-const STATEMENT: &str = "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the \
-    smoothed caricature has two different closed \
-orbits that both attract: one crosses y = 0 upwards once a turn, the other three times.";
+use twofold_proofs::{SECTION, cycle, equation, print_cycle, refuse, statement, write};
 
 fn main() {
     let alpha = 0.1;
-    println!("{STATEMENT}");
+    println!("{}", statement("coexistence"));
     let search =
         |near, crossings| Search { plane: SECTION, near, radius: 1e-10, crossings, longest: 40.0 };
     let mut found = Vec::new();
@@ -50,7 +46,6 @@ fn main() {
     println!("PROVED: both exist and attract.");
     write(
         "coexistence",
-        STATEMENT,
         json!({ "period one": cycle(one, alpha), "period three": cycle(three, alpha) }),
     );
 }

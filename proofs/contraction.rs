@@ -12,19 +12,16 @@ use nalgebra::SVector;
 use serde_json::{Value, json};
 use twofold::num::{Arithmetic, Ball, Elementary, Enclosure, FromDecimal, Interval};
 use twofold::rigor::{Flow, FlowOptions, Set};
-use twofold_proofs::{SECTION, ball, bounds, digits, equation, parameters, refuse, write};
-
-const STATEMENT: &str = "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the \
-    orbits of the smoothed caricature from (0.2, 0, -1), (0.21, 0, -1) and (0.2, 0, -0.99) \
-pass the two-fold singularity at their third crossing of y = 0, and the fourth crossings of the \
-second and third are less than 0.0005 from that of the first.";
+use twofold_proofs::{
+    SECTION, ball, bounds, digits, equation, parameters, refuse, statement, write,
+};
 
 /// Starts of the orbits: x and z on y = 0, as decimal numbers.
 const STARTS: [[f64; 2]; 3] = [[0.2, -1.0], [0.21, -1.0], [0.2, -0.99]];
 
 fn main() {
     let alpha = 0.1;
-    println!("{STATEMENT}");
+    println!("{}", statement("contraction"));
     let decimal = |x: f64| Ball::from_decimal(&x.into());
     let mut ends: Vec<[Ball; 2]> = Vec::new();
     let mut rows: Vec<Value> = Vec::new();
@@ -77,7 +74,6 @@ fn main() {
     let distances: Vec<Value> = distances.into_iter().map(bounds).collect();
     write(
         "contraction",
-        STATEMENT,
         json!({ "equation": parameters(alpha), "orbits": rows, "distances": distances }),
     );
 }

@@ -12,12 +12,7 @@ use nalgebra::SVector;
 use serde_json::{Value, json};
 use twofold::num::{Arithmetic, Ball, Enclosure, FromDecimal, Interval};
 use twofold::rigor::{Flow, FlowOptions, Set};
-use twofold_proofs::{SECTION, ball, equation, parameters, refuse, write};
-
-const STATEMENT: &str = "For beta = 1e-5, eps = 1e-3, the tanh transition and alpha = 1e-3 or 0.1, \
-    the first crossings of y = 0 by the orbit \
-of the smoothed caricature from (0.2, 0, -1) are those listed, each within its radius; there are \
-no others between them.";
+use twofold_proofs::{SECTION, ball, equation, parameters, refuse, statement, write};
 
 const PRINTED: &str = include_str!("../crates/verify/data/crossings-printed.csv");
 const RECONSTRUCTED: &str = include_str!("../crates/verify/data/crossings-reconstructed.csv");
@@ -67,7 +62,7 @@ fn table(alpha: f64, text: &str) -> Result<(String, Vec<Value>), String> {
 }
 
 fn main() {
-    println!("{STATEMENT}");
+    println!("{}", statement("crossings"));
     // Two independent jobs, collected in order.
     let (printed, reconstructed) = std::thread::scope(|s| {
         let first = s.spawn(|| table(1e-3, PRINTED));
@@ -90,5 +85,5 @@ fn main() {
         }
     }
     println!("PROVED: every row of both tables lies in its enclosure.");
-    write("crossings", STATEMENT, Value::Object(data));
+    write("crossings", Value::Object(data));
 }

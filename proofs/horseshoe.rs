@@ -25,16 +25,7 @@ use serde_json::{Value, json};
 use twofold::num::{Arithmetic, Ball, Enclosure, Interval, elementary};
 use twofold::rigor::covering::Image;
 use twofold::rigor::{Covering, Flow, FlowOptions, HSet, Return, Set, prove_covering};
-use twofold_proofs::{SECTION, bounds, equation, parameters, refuse, write};
-
-const STATEMENT: &str = "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the \
-    return map of the smoothed caricature from a downward crossing of \
-y = 0 to the fourth next has a horseshoe: two loops of covering relations between parallelograms, \
-of 2 and of 14 sets, that have one set in common and go on from \
-it to disjoint ones. Each return passes the two-fold singularity, at a crossing with |x| and |z| \
-below 1e-4. So for every sequence of the two loops there is an \
-orbit that runs through them in this order, for every periodic sequence a periodic one, and the \
-topological entropy of the return map is more than log(1.12).";
+use twofold_proofs::{SECTION, bounds, equation, parameters, refuse, statement, write};
 
 /// The saddle orbit at the hub, in two parts each (double-double).
 const HUB: [[f64; 2]; 2] = [
@@ -112,7 +103,7 @@ fn piece(image: &Image) -> Value {
 
 fn main() {
     let alpha = 0.1;
-    println!("{STATEMENT}");
+    println!("{}", statement("horseshoe"));
     let tape = equation(alpha);
     let mut flow = Flow::<Ball, 3>::new(&tape, FlowOptions::EXTENDED);
     let hub = HUB.map(|[high, low]| Ball::from_f64(high) + Ball::from_f64(low));
@@ -189,7 +180,6 @@ fn main() {
         .collect();
     write(
         "horseshoe",
-        STATEMENT,
         json!({ "equation": parameters(alpha), "sets": sets, "coverings": coverings }),
     );
 }

@@ -71,16 +71,7 @@ use serde_json::json;
 use twofold::num::tape::Recorded;
 use twofold::num::{Arithmetic, Elementary, FromDecimal, Interval, Tape};
 use twofold::rigor::{AxisPlane, Flow, FlowOptions, Set};
-use twofold_proofs::{bounds, digits, refuse, write};
-
-const STATEMENT: &str = "In the inner problem of the two-fold with v+ = -1.2, v- = -1.4 and the \
-    tanh transition, let p = phi - phi* and q = (1 - phi*) Z - phi* Y, phi* being \
-the value of phi on the canard. Every orbit that comes in along the sliding surface at s = Y + Z = \
-S, beyond a bound S0, with 0 < |p| <= 0.05 and q/p \
-between S - c1/S and S, first leaves |p| <= 0.05 at an s = -x with f x^2/2 - ln(x)/mu = (1/mu - 1) \
-ln S - ln|p| + C, and the derivatives of x by p and \
-by q at s = 0 are exp(K) S^(1/mu - 1)/(|p| x) in absolute value, with C and both K in given \
-intervals that do not depend on the orbit or on S.";
+use twofold_proofs::{bounds, digits, refuse, statement, write};
 
 /// s at which the first part ends.
 const S0: f64 = 8.0;
@@ -131,7 +122,7 @@ struct Near {
 }
 
 fn main() {
-    println!("{STATEMENT}");
+    println!("{}", statement("inner-law"));
     let (one, two) = (Interval::one(), decimal(2.0));
     let (g, root) = (decimal(0.2), decimal(1.01).sqrt());
     let (w, l) = (decimal(1.3) - root, decimal(1.3) + root);
@@ -302,5 +293,5 @@ fn main() {
         "mu_inverse": bounds(inverse_mu), "f": bounds(f), "exit": bounds(c),
             "growth": growth.map(bounds),
     });
-    write("inner-law", STATEMENT, data);
+    write("inner-law", data);
 }

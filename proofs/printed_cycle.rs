@@ -8,12 +8,7 @@
 
 use twofold::rigor::cycle::Search;
 use twofold::rigor::{FlowOptions, prove_cycle};
-use twofold_proofs::{SECTION, cycle, equation, print_cycle, refuse, write};
-
-const STATEMENT: &str = "For alpha = 1e-3, beta = 1e-5, eps = 1e-3 and the tanh transition, the \
-    smoothed caricature has exactly one \
-closed orbit that crosses y = 0 upwards in the candidate box and returns to it at its first upward \
-crossing. It attracts.";
+use twofold_proofs::{SECTION, cycle, equation, print_cycle, refuse, statement, write};
 
 fn main() {
     let alpha = 1e-3;
@@ -24,7 +19,7 @@ fn main() {
         crossings: 2,
         longest: 40.0,
     };
-    println!("{STATEMENT}");
+    println!("{}", statement("printed-cycle"));
     let found = prove_cycle(&equation(alpha), FlowOptions::PLAIN, &search)
         .unwrap_or_else(|e| refuse(&e.to_string()));
     print_cycle(&found);
@@ -35,5 +30,5 @@ fn main() {
         refuse("the enclosures are wider than the statement says");
     }
     println!("PROVED: it exists, is unique there, and attracts.");
-    write("printed-cycle", STATEMENT, cycle(&found, alpha));
+    write("printed-cycle", cycle(&found, alpha));
 }

@@ -12,12 +12,7 @@ use serde_json::{Map, Value};
 use twofold::num::{Arithmetic, Elementary, Interval};
 use twofold::rigor::cycle::Search;
 use twofold::rigor::{Cycle, FlowOptions, prove_cycle};
-use twofold_proofs::{SECTION, cycle, digits, equation, print_cycle, refuse, write};
-
-const STATEMENT: &str = "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the \
-    smoothed caricature has four different closed orbits of saddle type, one \
-multiplier of each inside the unit circle and one outside: they cross y = 0 upwards three, four, \
-four and five times a turn.";
+use twofold_proofs::{SECTION, cycle, digits, equation, print_cycle, refuse, statement, write};
 
 /// Names, places near the orbits on y = 0, crossings a turn.
 const ORBITS: [(&str, [f64; 2], usize); 4] = [
@@ -33,7 +28,7 @@ fn upward(c: &Cycle) -> impl Iterator<Item = [Interval; 2]> {
 
 fn main() {
     let alpha = 0.1;
-    println!("{STATEMENT}");
+    println!("{}", statement("saddles"));
     let mut points: Vec<[Interval; 2]> = Vec::new();
     let mut data = Map::<String, Value>::new();
     for (name, near, crossings) in ORBITS {
@@ -63,5 +58,5 @@ fn main() {
         data.insert(name.into(), cycle(&c, alpha));
     }
     println!("PROVED: all four exist and are saddles.");
-    write("saddles", STATEMENT, Value::Object(data));
+    write("saddles", Value::Object(data));
 }

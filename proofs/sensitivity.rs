@@ -13,12 +13,9 @@ use nalgebra::SVector;
 use serde_json::{Value, json};
 use twofold::num::{Arithmetic, Ball, Elementary, Enclosure, FromDecimal};
 use twofold::rigor::{Flow, FlowOptions, Set};
-use twofold_proofs::{SECTION, ball, bounds, digits, equation, parameters, refuse, write};
-
-const STATEMENT: &str = "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the \
-    orbits of the smoothed caricature from the two \
-states, which are less than 1e-12 apart at the two-fold singularity, are more than 0.3 apart at \
-their second crossing of y = 0.";
+use twofold_proofs::{
+    SECTION, ball, bounds, digits, equation, parameters, refuse, statement, write,
+};
 
 const Z: f64 = 8.14695211321934e-14;
 const STATES: [f64; 2] = [4.99176529062235e-5, 4.99176538962235e-5];
@@ -26,7 +23,7 @@ const CROSSINGS: usize = 3;
 
 fn main() {
     let alpha = 0.1;
-    println!("{STATEMENT}");
+    println!("{}", statement("sensitivity"));
     println!("  states: (x, 0, z) with z = {Z:e} and x = {:e} or {:e}", STATES[0], STATES[1]);
     let decimal = |x: f64| Ball::from_decimal(&x.into());
     let apart = (decimal(STATES[1]) - decimal(STATES[0])).interval();
@@ -94,5 +91,5 @@ fn main() {
             "z": format!("{Z:e}") },
         "crossings": rows, "growth_until_first_crossing": derivative,
     });
-    write("sensitivity", STATEMENT, data);
+    write("sensitivity", data);
 }

@@ -95,9 +95,23 @@ pub fn print_cycle(c: &Cycle) {
     println!("  1 + det - tr   >= {:.4e}", (one + c.determinant - c.trace).lower());
 }
 
+/// A theorem's statement, as the paper's folder has it.
+///
+/// # Panics
+/// If the folder has no such theorem.
+pub fn statement(name: &str) -> String {
+    let file: toml::Table =
+        twofold_papers::jeffrey_2013("theorems.toml").parse().expect("the file is TOML");
+    let mut theorems = file["theorem"].as_array().into_iter().flatten();
+    let found = theorems.find(|theorem| theorem["name"].as_str() == Some(name));
+    let text = found.and_then(|theorem| theorem["statement"].as_str());
+    let text = text.unwrap_or_else(|| panic!("theorems.toml has no {name}"));
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
 /// Writes a certificate to proofs/certificates, or says why not and ends the program.
-pub fn write(name: &str, statement: &str, data: Value) {
-    let certificate = json!({ "theorem": name, "statement": statement, "data": data });
+pub fn write(name: &str, data: Value) {
+    let certificate = json!({ "theorem": name, "statement": statement(name), "data": data });
     let path =
         Path::new(env!("CARGO_MANIFEST_DIR")).join("certificates").join(format!("{name}.json"));
     let text = format!("{certificate:#}\n");

@@ -1,6 +1,7 @@
 //! The paper that has code of its own beside its folder: the only module that names one.
 
 use super::{Count, Figure, ParameterReading};
+use crate::verify::Theorem;
 use twofold_jeffrey_2013::{Reading, all, counts};
 
 pub use twofold_jeffrey_2013::data;
@@ -19,6 +20,17 @@ pub fn readings(system: &str) -> Vec<ParameterReading> {
         "caricature" | "caricature-as-printed" => Reading::ALL.map(Into::into).into(),
         _ => Vec::new(),
     }
+}
+
+/// The theorems about the paper's equation, which `twofold verify` checks certificates against.
+pub fn theorems() -> Vec<Theorem> {
+    #[derive(serde::Deserialize)]
+    struct File {
+        theorem: Vec<Theorem>,
+    }
+    toml::from_str::<File>(twofold_papers::jeffrey_2013("theorems.toml"))
+        .expect("the embedded theorems are well formed: a test reads them")
+        .theorem
 }
 
 /// Code of a paper.

@@ -1,9 +1,10 @@
 //! The certificates, one kind a theorem, and what must hold in them.
 
+use std::collections::BTreeMap;
 use std::rc::Rc;
 
 use serde::Deserialize;
-use serde::de::DeserializeOwned;
+use serde::de::{DeserializeOwned, IgnoredAny};
 
 use super::check::{Bounds, Check, decimal, exactly, holds, need, range, tight};
 use super::inner::inner_law;
@@ -11,6 +12,10 @@ use super::orbit::{Caricature, Crossing, FlowSettings};
 use super::rational::{Range, Rational};
 use super::recompute::{Known, PLANE, Patch, krawczyk};
 use super::strict::without_repeats;
+use super::theorem::{
+    Contraction as ContractionShown, Cycle as CycleShown, Cycles, Horseshoe as HorseshoeShown,
+    Parameters, Sensitivity as SensitivityShown, Shows, Stability, Tables, Theorem,
+};
 use super::{Refused, Verified};
 
 #[derive(Deserialize)]
@@ -19,18 +24,6 @@ struct Certificate<T> {
     theorem: String,
     statement: String,
     data: T,
-}
-
-#[derive(Deserialize, PartialEq)]
-#[serde(deny_unknown_fields)]
-struct Parameters {
-    system: String,
-    transition: String,
-    alpha: String,
-    beta: String,
-    eps: String,
-    v_plus: String,
-    v_minus: String,
 }
 
 #[derive(Deserialize)]
@@ -56,28 +49,6 @@ struct Cycle {
     trace: Bounds,
     determinant: Bounds,
     crossings: Vec<CycleCrossing>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Coexistence {
-    #[serde(rename = "period one")]
-    one: Cycle,
-    #[serde(rename = "period three")]
-    three: Cycle,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Saddles {
-    #[serde(rename = "period three")]
-    three: Cycle,
-    #[serde(rename = "period four, inverting")]
-    inverting: Cycle,
-    #[serde(rename = "period four")]
-    four: Cycle,
-    #[serde(rename = "period five")]
-    five: Cycle,
 }
 
 #[derive(Clone, Copy, Deserialize)]
@@ -135,13 +106,6 @@ struct TableRow {
 struct CrossingTable {
     equation: Parameters,
     crossings: Vec<TableRow>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Crossings {
-    printed: CrossingTable,
-    reconstructed: CrossingTable,
 }
 
 impl OrbitPoint {
@@ -204,8 +168,8 @@ struct OrbitFrom {
 #[serde(deny_unknown_fields)]
 struct Contraction {
     equation: Parameters,
-    orbits: [OrbitFrom; 3],
-    distances: [Bounds; 2],
+    orbits: Vec<OrbitFrom>,
+    distances: Vec<Bounds>,
 }
 
 #[derive(Deserialize)]
@@ -216,81 +180,22 @@ struct Horseshoe {
     coverings: Vec<Covering>,
 }
 
-/// The statements, word for word: a certificate proves these and no others.
-const STATEMENTS: [(&str, &str); 8] = [
-    (
-        "printed-cycle",
-        "For alpha = 1e-3, beta = 1e-5, eps = 1e-3 and the tanh transition, the smoothed \
-            caricature has exactly one closed orbit that crosses y = 0 upwards in the \
-         candidate box and returns to it at its first upward crossing. It attracts.",
-    ),
-    (
-        "coexistence",
-        "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the smoothed caricature \
-            has two different closed orbits that both attract: one crosses \
-         y = 0 upwards once a turn, the other three times.",
-    ),
-    (
-        "saddles",
-        "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the smoothed caricature \
-            has four different closed orbits of saddle type, one multiplier of \
-         each inside the unit circle and one outside: they cross y = 0 upwards three, four, four \
-         and five times a turn.",
-    ),
-    (
-        "sensitivity",
-        "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the orbits of the \
-            smoothed caricature from the two states, which are less than 1e-12 apart \
-         at the two-fold singularity, are more than 0.3 apart at their second crossing of y = 0.",
-    ),
-    (
-        "contraction",
-        "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the orbits of the \
-            smoothed caricature from (0.2, 0, -1), (0.21, 0, -1) and (0.2, 0, -0.99) pass \
-         the two-fold singularity at their third crossing of y = 0, and the fourth crossings of \
-         the second and third are less than 0.0005 from that of the first.",
-    ),
-    (
-        "horseshoe",
-        "For alpha = 0.1, beta = 1e-5, eps = 1e-3 and the tanh transition, the return map of the \
-            smoothed caricature from a downward crossing of y = 0 to the fourth \
-         next has a horseshoe: two loops of covering relations between parallelograms, of 2 and of \
-         14 sets, that have one set in common and go on from it to disjoint \
-         ones. Each return passes the two-fold singularity, at a crossing with |x| and |z| below \
-         1e-4. So for every sequence of the two loops there is an orbit that \
-         runs through them in this order, for every periodic sequence a periodic one, and the \
-         topological entropy of the return map is more than log(1.12).",
-    ),
-    (
-        "inner-law",
-        "In the inner problem of the two-fold with v+ = -1.2, v- = -1.4 and the tanh transition, \
-            let p = phi - phi* and q = (1 - phi*) Z - phi* Y, phi* being \
-         the value of phi on the canard. Every orbit that comes in along the sliding surface at s \
-         = Y + Z = S, beyond a bound S0, with 0 < |p| <= 0.05 and q/p \
-         between S - c1/S and S, first leaves |p| <= 0.05 at an s = -x with f x^2/2 - ln(x)/mu = \
-         (1/mu - 1) ln S - ln|p| + C, and the derivatives of x by p and \
-         by q at s = 0 are exp(K) S^(1/mu - 1)/(|p| x) in absolute value, with C and both K in \
-         given intervals that do not depend on the orbit or on S.",
-    ),
-    (
-        "crossings",
-        "For beta = 1e-5, eps = 1e-3, the tanh transition and alpha = 1e-3 or 0.1, the first \
-            crossings of y = 0 by the orbit of the smoothed caricature from (0.2, 0, \
-         -1) are those listed, each within its radius; there are no others between them.",
-    ),
-];
-
 /// Checks certificates. What it computes for one it keeps for the next.
-#[derive(Default)]
 pub struct Checker {
+    theorems: Vec<Theorem>,
     known: Known,
 }
 
 impl Checker {
+    /// One that knows these theorems.
+    pub fn new(theorems: Vec<Theorem>) -> Self {
+        Self { theorems, known: Known::default() }
+    }
+
     /// One that looks at all that needs no orbit and then refuses: for those who try readers with a
     /// great many texts.
-    pub fn of_reader() -> Self {
-        Self { known: Known::of_reader() }
+    pub fn of_reader(theorems: Vec<Theorem>) -> Self {
+        Self { theorems, known: Known::of_reader() }
     }
 
     /// Verifies a certificate.
@@ -302,23 +207,27 @@ impl Checker {
         let unreadable = |e: serde_json::Error| Refused::Unreadable(e.to_string());
         without_repeats(text).map_err(unreadable)?;
         let Certificate { theorem, statement, .. } =
-            serde_json::from_str::<Certificate<serde::de::IgnoredAny>>(text).map_err(unreadable)?;
-        let Some((_, known)) = STATEMENTS.iter().find(|(name, _)| *name == theorem) else {
+            serde_json::from_str::<Certificate<IgnoredAny>>(text).map_err(unreadable)?;
+        let Some(of) = self.theorems.iter().find(|t| t.name == theorem) else {
             return Err(Refused::Unreadable(format!("there is no theorem {theorem:?}")));
         };
         let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
-        let findings = if words(&statement) != words(known) {
+        let known = &self.known;
+        let findings = if words(&statement) != words(&of.statement) {
             Err("the statement is the one that is checked".to_owned())
         } else {
-            match theorem.as_str() {
-                "printed-cycle" => printed_cycle(&self.known, &data(text)?),
-                "coexistence" => coexistence(&self.known, &data(text)?),
-                "inner-law" => inner_law(&self.known, &data(text)?),
-                "saddles" => saddles(&self.known, &data(text)?),
-                "contraction" => contraction(&self.known, &data(text)?),
-                "horseshoe" => horseshoe(&self.known, &data(text)?),
-                "sensitivity" => sensitivity(&self.known, &data(text)?),
-                _ => crossings(&self.known, &data(text)?),
+            match &of.shows {
+                Shows::Cycle(shown) => one_cycle(known, shown, &data(text)?),
+                Shows::Cycles(shown) => {
+                    cycles(known, shown, &parts(text, shown.orbits.iter().map(|o| &*o.0))?)
+                }
+                Shows::InnerLaw(shown) => inner_law(known, shown, &data(text)?),
+                Shows::Contraction(shown) => contraction(known, shown, &data(text)?),
+                Shows::Horseshoe(shown) => horseshoe(known, shown, &data(text)?),
+                Shows::Sensitivity(shown) => sensitivity(known, shown, &data(text)?),
+                Shows::Tables(shown) => {
+                    tables(known, shown, &parts(text, shown.tables.iter().map(|t| &*t.name))?)
+                }
             }
         };
         match findings {
@@ -328,19 +237,28 @@ impl Checker {
     }
 }
 
-/// Verifies one certificate: see [`Checker::verify`].
-///
-/// # Errors
-/// The same.
-pub fn verify(text: &str) -> Result<Verified, Refused> {
-    Checker::default().verify(text)
-}
-
 /// A certificate's data; errors say the line.
 fn data<T: DeserializeOwned>(text: &str) -> Result<T, Refused> {
     serde_json::from_str::<Certificate<T>>(text)
         .map(|c| c.data)
         .map_err(|e| Refused::Unreadable(e.to_string()))
+}
+
+/// A certificate's data in parts, which have the names that the theorem gives them.
+fn parts<'a, T: DeserializeOwned>(
+    text: &str,
+    names: impl Iterator<Item = &'a str>,
+) -> Result<BTreeMap<String, T>, Refused> {
+    let mut given = data::<BTreeMap<String, IgnoredAny>>(text)?;
+    for name in names {
+        if given.remove(name).is_none() {
+            return Err(Refused::Unreadable(format!("missing field `{name}` in data")));
+        }
+    }
+    match given.keys().next() {
+        Some(name) => Err(Refused::Unreadable(format!("unknown field `{name}` in data"))),
+        None => data(text),
+    }
 }
 
 fn ranges<const N: usize>(bounds: [Bounds; N]) -> Check<[Range; N]> {
@@ -359,44 +277,39 @@ fn ball(b: &Ball, name: &str) -> Check<Range> {
     Ok(Range::point(&centre).widened(&radius))
 }
 
-/// The equation, which must be the one that the statement names.
-fn equation(p: &Parameters, alpha: &str) -> Check<Caricature> {
-    need(
-        p.system == "caricature" && p.transition == "tanh",
-        "the equation is the caricature with tanh",
-    )?;
-    let is = |text: &str, want: &str, name: &str| -> Check<Rational> {
+/// The equation, which must be the theorem's.
+fn equation(given: &Parameters, wanted: &Parameters) -> Check<Caricature> {
+    for p in [given, wanted] {
+        need(
+            p.system == "caricature" && p.transition == "tanh",
+            "the equation is the caricature with tanh",
+        )?;
+    }
+    let is = |given: &str, want: &str, name: &str| -> Check<Rational> {
         let wanted = decimal(want)?;
-        need(decimal(text)? == wanted, format!("{name} = {want}"))?;
+        need(decimal(given)? == wanted, format!("{name} = {want}"))?;
         Ok(wanted)
     };
     Ok(Caricature {
-        alpha: is(&p.alpha, alpha, "alpha")?,
-        beta: is(&p.beta, "1e-5", "beta")?,
-        eps: is(&p.eps, "1e-3", "eps")?,
-        v_plus: is(&p.v_plus, "-1.2", "v+")?,
-        v_minus: is(&p.v_minus, "-1.4", "v-")?,
+        alpha: is(&given.alpha, &wanted.alpha, "alpha")?,
+        beta: is(&given.beta, &wanted.beta, "beta")?,
+        eps: is(&given.eps, &wanted.eps, "eps")?,
+        v_plus: is(&given.v_plus, &wanted.v_plus, "v+")?,
+        v_minus: is(&given.v_minus, &wanted.v_minus, "v-")?,
     })
-}
-
-/// Stability that a certificate claims of a closed orbit.
-#[derive(Clone, Copy, PartialEq)]
-enum CycleStability {
-    Attracts,
-    Saddle,
 }
 
 /// Krawczyk's inclusion and stability.
 fn cycle(
     known: &Known,
     c: &Cycle,
-    alpha: &str,
+    wanted: &Parameters,
     crossings: usize,
-    kind: CycleStability,
+    kind: Stability,
     name: &str,
 ) -> Check<(Vec<String>, Rc<Vec<Crossing>>)> {
     let named = |what: &str| format!("{name}: {what}");
-    let equation = equation(&c.equation, alpha)?;
+    let equation = equation(&c.equation, wanted)?;
     let unit = |i: usize, j: usize| Range::point(&Rational::whole(i64::from(i == j)));
     let candidate = ranges(c.candidate)?;
     // The prover evaluates the map at the midpoint as its f64 arithmetic gives it.
@@ -424,8 +337,8 @@ fn cycle(
     // The preconditioner is near the inverse of D - 1: that is what makes the inclusion sharp. (A
     // saddle's derivative is known less well.)
     let near = match kind {
-        CycleStability::Attracts => Rational::tenth_to(2),
-        CycleStability::Saddle => decimal("0.05")?,
+        Stability::Attracts => Rational::tenth_to(2),
+        Stability::Saddle => &Rational::whole(5) * &Rational::tenth_to(2),
     };
     for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
         let df = |k: usize| &slope[k][j] - &unit(k, j);
@@ -496,7 +409,7 @@ fn cycle(
     let (above, below) = (&(&one + &determinant) - &trace, &(&one + &determinant) + &trace);
     let zero = Rational::whole(0);
     let stability = match kind {
-        CycleStability::Attracts => {
+        Stability::Attracts => {
             need(determinant.high < one.low, named("the determinant is below 1"))?;
             need(
                 above.low > zero && below.low > zero,
@@ -508,7 +421,7 @@ fn cycle(
                 above.low.clone().min(below.low.clone()).approximately()
             )
         }
-        CycleStability::Saddle => {
+        Stability::Saddle => {
             need(
                 above.low > zero && below.high < zero || above.high < zero && below.low > zero,
                 named("the characteristic polynomial has different signs at 1 and -1"),
@@ -533,22 +446,21 @@ fn number(r: &Range) -> String {
     format!("{:.15}", (0.5 * (r.low.approximately() + r.high.approximately())))
 }
 
-fn printed_cycle(known: &Known, c: &Cycle) -> Check<Vec<String>> {
+fn one_cycle(known: &Known, shown: &CycleShown, c: &Cycle) -> Check<Vec<String>> {
+    let widest = decimal(&shown.narrower)?;
     for b in ranges(c.candidate)? {
-        need(b.width() < Rational::tenth_to(8), "the candidate is narrower than 1e-8")?;
+        let what = format!("the candidate is narrower than {}", shown.narrower);
+        need(b.width() < widest, what)?;
     }
-    Ok(cycle(known, c, "1e-3", 2, CycleStability::Attracts, "the cycle")?.0)
+    Ok(cycle(known, c, &shown.equation, shown.crossings, shown.stability, "the cycle")?.0)
 }
 
-/// Several closed orbits at alpha = 0.1, which must all be different, with their crossings a turn.
-fn cycles(
-    known: &Known,
-    orbits: &[(&Cycle, usize, &str)],
-    kind: CycleStability,
-) -> Check<Vec<String>> {
+/// Several closed orbits, which must all be different.
+fn cycles(known: &Known, shown: &Cycles, c: &BTreeMap<String, Cycle>) -> Check<Vec<String>> {
     let (mut said, mut points) = (Vec::new(), Vec::<[Range; 2]>::new());
-    for (orbit, crossings, name) in orbits {
-        let (findings, rows) = cycle(known, orbit, "0.1", *crossings, kind, name)?;
+    for (name, crossings) in &shown.orbits {
+        let (findings, rows) =
+            cycle(known, &c[name], &shown.equation, *crossings, shown.stability, name)?;
         said.extend(findings);
         points.extend(rows.iter().filter(|r| r.upward).map(|r| PLANE.map(|i| r.states[i].clone())));
     }
@@ -563,27 +475,9 @@ fn cycles(
     said.push(format!(
         "the {} upward crossings are all different: {} orbits, and all returns are needed",
         points.len(),
-        orbits.len()
+        shown.orbits.len()
     ));
     Ok(said)
-}
-
-fn coexistence(known: &Known, c: &Coexistence) -> Check<Vec<String>> {
-    cycles(
-        known,
-        &[(&c.one, 2, "period one"), (&c.three, 6, "period three")],
-        CycleStability::Attracts,
-    )
-}
-
-fn saddles(known: &Known, c: &Saddles) -> Check<Vec<String>> {
-    let orbits = [
-        (&c.three, 6, "period three"),
-        (&c.inverting, 8, "period four, inverting"),
-        (&c.four, 8, "period four"),
-        (&c.five, 10, "period five"),
-    ];
-    cycles(known, &orbits, CycleStability::Saddle)
 }
 
 /// Compares claimed crossings of the orbit from (x, 0, z) with the checker's own, and returns
@@ -638,26 +532,27 @@ fn distance(claimed: Bounds, squared: &Range, widest: &Rational, name: &str) -> 
     squared.sqrt().ok_or_else(|| format!("{name}: a distance is known"))
 }
 
-fn sensitivity(known: &Known, c: &Sensitivity) -> Check<Vec<String>> {
+fn sensitivity(known: &Known, shown: &SensitivityShown, c: &Sensitivity) -> Check<Vec<String>> {
     /// Half the distances in x and z of states whose quotients are the growth: 2^-72 and 2^-66, so
     /// that neither the third derivative nor the radii are seen.
     const APART: [f64; 2] =
         [1.0 / 4_722_366_482_869_645_213_696.0, 1.0 / 73_786_976_294_838_206_464.0];
-    let equation = equation(&c.equation, "0.1")?;
+    let equation = equation(&c.equation, &shown.equation)?;
     let (a, b, z) = (decimal(&c.states.x[0])?, decimal(&c.states.x[1])?, decimal(&c.states.z)?);
     let apart = (&a - &b).abs();
     need(
-        apart > Rational::whole(0) && apart < Rational::tenth_to(12),
-        "the states differ by less than 1e-12",
+        apart > Rational::whole(0) && apart < decimal(&shown.apart)?,
+        format!("the states differ by less than {}", shown.apart),
     )?;
     need(decimal(&c.states.y)? == Rational::whole(0), "the states lie on y = 0")?;
     // At the singularity: within a few eps across, and on it along the layer.
     need(z.abs() < Rational::tenth_to(12), "the states lie at the singularity (z)")?;
     need(
-        a.abs() < Rational::tenth_to(4) && b.abs() < Rational::tenth_to(4),
+        a.abs() < decimal(&shown.near)? && b.abs() < decimal(&shown.near)?,
         "the states lie at the singularity (x)",
     )?;
-    need(c.crossings.len() == 3, "three crossings")?;
+    need(c.crossings.len() == shown.crossings, format!("{} crossings", shown.crossings))?;
+    need((1..=shown.crossings).contains(&shown.at), "the crossing is one of them")?;
     let mut orbits = Vec::new();
     for (k, x) in [&a, &b].into_iter().enumerate() {
         let rows: Vec<TableRow> =
@@ -670,8 +565,9 @@ fn sensitivity(known: &Known, c: &Sensitivity) -> Check<Vec<String>> {
         let squared = squared_distance(&orbits[0][n], &orbits[1][n]);
         let name = format!("the distance of crossings {}", n + 1);
         let ours = distance(crossing.distance, &squared, &Rational::tenth_to(12), &name)?;
-        if n == 1 {
-            need(ours.low > decimal("0.3")?, "the second crossings are more than 0.3 apart")?;
+        if n + 1 == shown.at {
+            let what = format!("crossings {} are more than {} apart", shown.at, shown.farther);
+            need(ours.low > decimal(&shown.farther)?, what)?;
         }
         said.push(format!("crossings {}: {} apart", n + 1, number(&ours)));
     }
@@ -693,16 +589,20 @@ fn sensitivity(known: &Known, c: &Sensitivity) -> Check<Vec<String>> {
     Ok(said)
 }
 
-fn crossings(known: &Known, c: &Crossings) -> Check<Vec<String>> {
+/// Tables of an orbit's first crossings.
+fn tables(
+    known: &Known,
+    shown: &Tables,
+    c: &BTreeMap<String, CrossingTable>,
+) -> Check<Vec<String>> {
     let mut said = Vec::new();
-    let start = [&decimal("0.2")?, &Rational::whole(-1)];
-    for (name, alpha, table, count) in
-        [("printed", "1e-3", &c.printed, 24), ("reconstructed", "0.1", &c.reconstructed, 61)]
-    {
-        let equation = equation(&table.equation, alpha)?;
+    let [x, z] = [decimal(&shown.start[0])?, decimal(&shown.start[1])?];
+    for of in &shown.tables {
+        let (name, table, count) = (of.name.as_str(), &c[&of.name], of.rows);
+        let equation = equation(&table.equation, &of.equation)?;
         need(table.crossings.len() == count, format!("{name}: {count} rows"))?;
         let ours =
-            orbit(known, &equation, start, &table.crossings.iter().collect::<Vec<_>>(), name)?;
+            orbit(known, &equation, [&x, &z], &table.crossings.iter().collect::<Vec<_>>(), name)?;
         let widest = ours
             .iter()
             .flat_map(|r| PLANE.map(|i| r.states[i].width()))
@@ -716,12 +616,15 @@ fn crossings(known: &Known, c: &Crossings) -> Check<Vec<String>> {
     Ok(said)
 }
 
-fn contraction(known: &Known, c: &Contraction) -> Check<Vec<String>> {
-    let equation = equation(&c.equation, "0.1")?;
+fn contraction(known: &Known, shown: &ContractionShown, c: &Contraction) -> Check<Vec<String>> {
+    let equation = equation(&c.equation, &shown.equation)?;
+    need(
+        c.orbits.len() == shown.starts.len() && c.distances.len() + 1 == c.orbits.len(),
+        format!("{} orbits, and the distances of all others from the first", shown.starts.len()),
+    )?;
+    need((1..=shown.crossings).contains(&shown.passes), "the singularity is passed on the way")?;
     let mut ours = Vec::new();
-    for (orbit_from, [x, z]) in
-        c.orbits.iter().zip([["0.2", "-1"], ["0.21", "-1"], ["0.2", "-0.99"]])
-    {
+    for (orbit_from, [x, z]) in c.orbits.iter().zip(&shown.starts) {
         let name = format!("the orbit from ({x}, 0, {z})");
         let (x, z) = (decimal(x)?, decimal(z)?);
         let start = [
@@ -730,7 +633,8 @@ fn contraction(known: &Known, c: &Contraction) -> Check<Vec<String>> {
             decimal(&orbit_from.start.z)?,
         ];
         need(start == [x.clone(), Rational::whole(0), z.clone()], format!("{name} starts there"))?;
-        need(orbit_from.crossings.len() == 4, format!("{name}: four crossings"))?;
+        let count = shown.crossings;
+        need(orbit_from.crossings.len() == count, format!("{name}: {count} crossings"))?;
         let rows = orbit(
             known,
             &equation,
@@ -739,18 +643,29 @@ fn contraction(known: &Known, c: &Contraction) -> Check<Vec<String>> {
             &name,
         )?;
         for i in PLANE {
-            let near = rows[2].states[i].magnitude() < Rational::tenth_to(4);
-            need(near, format!("{name} passes the singularity within 1e-4"))?;
+            let near = rows[shown.passes - 1].states[i].magnitude() < decimal(&shown.near)?;
+            need(near, format!("{name} passes the singularity within {}", shown.near))?;
         }
         ours.push(rows);
     }
     let mut said = Vec::new();
     for (k, claimed) in c.distances.iter().enumerate() {
-        let squared = squared_distance(&ours[0][3], &ours[k + 1][3]);
+        let last = shown.crossings - 1;
+        let squared = squared_distance(&ours[0][last], &ours[k + 1][last]);
         let name = format!("the distance of orbits 1 and {}", k + 2);
         let found = distance(*claimed, &squared, &Rational::tenth_to(12), &name)?;
-        need(found.high < decimal("0.0005")?, format!("{name} is below 0.0005"))?;
-        said.push(format!("starts 0.01 apart, fourth crossings {} apart", number(&found)));
+        let what = format!("{name} is below {}", shown.nearer);
+        need(found.high < decimal(&shown.nearer)?, what)?;
+        let [a, b] = [&shown.starts[0], &shown.starts[k + 1]];
+        said.push(format!(
+            "starts ({}, 0, {}) and ({}, 0, {}), crossings {} {} apart",
+            a[0],
+            a[1],
+            b[0],
+            b[1],
+            shown.crossings,
+            number(&found)
+        ));
     }
     Ok(said)
 }
@@ -797,25 +712,23 @@ impl Parallelogram {
     }
 }
 
-/// Crossings of y = 0 in a return: four downward ones.
-const RETURN: usize = 8;
-
 /// One covering relation (Zgliczynski & Gidea 2004, Definition 2): the ends come to either side of
 /// the sets that are covered, no part meets their edges v = -1, 1. Whether the certificate's
 /// numbers hold what is found comes first: the parts take longest.
 fn covering(
     known: &Known,
+    shown: &HorseshoeShown,
     equation: &Caricature,
     sets: &[Parallelogram],
     c: &Covering,
 ) -> Check<Rational> {
+    let (turn, within) = (shown.crossings, decimal(&shown.near)?);
     /// Parts shorter than this are not tried.
     const SHORTEST: f64 = 1.0 / 64.0;
     let from = &sets[c.from];
     let to: Vec<&Parallelogram> = c.to.iter().map(|k| &sets[*k]).collect();
     let image = |low: f64, high: f64| -> Check<Rc<Vec<Crossing>>> {
-        let rows =
-            known.crossings(equation, &from.part(low, high)?, RETURN, FlowSettings::NARROW)?;
+        let rows = known.crossings(equation, &from.part(low, high)?, turn, FlowSettings::NARROW)?;
         let alternate = rows.iter().enumerate().all(|(n, r)| r.upward == (n % 2 == 0));
         need(alternate, "directions alternate, the first is upward")?;
         Ok(rows)
@@ -844,18 +757,18 @@ fn covering(
         }
     }
     let passage = &c.passage;
-    need((1..=RETURN).contains(&passage.crossing), "the singularity is passed on the way")?;
+    need((1..=turn).contains(&passage.crossing), "the singularity is passed on the way")?;
     let passes = [range(passage.x)?, range(passage.z)?];
     for claimed in &passes {
-        need(claimed.magnitude() < Rational::tenth_to(4), "the passage claimed is within 1e-4")?;
+        let what = format!("the passage claimed is within {}", shown.near);
+        need(claimed.magnitude() < within, what)?;
     }
 
     for (claimed, _) in &claimed {
         for u in claimed.part {
             let rows = image(u, u)?;
             for (seen, to) in claimed.seen.iter().zip(&to) {
-                for (claimed, ours) in ranges(*seen)?.iter().zip(to.see(&rows[RETURN - 1], false)?)
-                {
+                for (claimed, ours) in ranges(*seen)?.iter().zip(to.see(&rows[turn - 1], false)?) {
                     holds(claimed, &ours, &format!("the image of u = {u}"))?;
                 }
             }
@@ -866,7 +779,7 @@ fn covering(
         let crossing = &rows[passage.crossing - 1];
         for (axis, claimed) in PLANE.into_iter().zip(&passes) {
             let size = crossing.states[axis].magnitude();
-            need(size < Rational::tenth_to(4), "the singularity is passed within 1e-4")?;
+            need(size < within, format!("the singularity is passed within {}", shown.near))?;
             nearest = nearest.clone().max(size);
             let middle = crossing.set.centre()[axis].range(0.0).ok_or("a crossing is bounded")?;
             holds(claimed, &middle, "the passage")?;
@@ -874,7 +787,7 @@ fn covering(
         Ok(())
     };
     let last = |rows: &[Crossing], to: &Parallelogram| -> Check<[Range; 2]> {
-        to.see(&rows[RETURN - 1], true)
+        to.see(&rows[turn - 1], true)
     };
     let ends = [image(-1.0, -1.0)?, image(1.0, 1.0)?];
     for to in &to {
@@ -912,19 +825,21 @@ fn extent(p: &Parallelogram) -> Check<[Range; 2]> {
     Ok([of(0)?, of(1)?])
 }
 
-fn horseshoe(known: &Known, c: &Horseshoe) -> Check<Vec<String>> {
-    /// Sets of the longer loop.
-    const LONG: usize = 14;
-    let equation = equation(&c.equation, "0.1")?;
+fn horseshoe(known: &Known, shown: &HorseshoeShown, c: &Horseshoe) -> Check<Vec<String>> {
+    let long = shown.long_loop;
+    let equation = equation(&c.equation, &shown.equation)?;
+    // Shorter, the two sets that follow the common one could be one.
+    need(long > 2 && shown.crossings > 0, "two loops of returns")?;
     need(
-        c.sets.len() == LONG + 1 && c.coverings.len() == c.sets.len(),
-        "fifteen sets, each of which covers others",
+        c.sets.len() == long + 1 && c.coverings.len() == c.sets.len(),
+        format!("{} sets, each of which covers others", long + 1),
     )?;
+    let widest = decimal(&shown.smaller)?;
     for set in &c.sets {
         for side in extent(set)? {
             need(
-                side.width() < Rational::tenth_to(12),
-                "the parallelograms are smaller than 1e-12",
+                side.width() < widest,
+                format!("the parallelograms are smaller than {}", shown.smaller),
             )?;
         }
     }
@@ -933,10 +848,11 @@ fn horseshoe(known: &Known, c: &Horseshoe) -> Check<Vec<String>> {
         !(one[0].meets(&two[0]) && one[1].meets(&two[1])),
         "the sets that follow the common one are disjoint",
     )?;
-    // 0, 1, 0, ... and 0, 2, 3, ..., 14, 0, ...
+    // 0, 1, 0, ... and 0, 2, 3, ..., long, 0, ...
     let follows = |i: usize| match i {
         0 => vec![1, 2],
-        1 | LONG => vec![0],
+        1 => vec![0],
+        i if i == long => vec![0],
         i => vec![i + 1],
     };
     let mut nearest = Rational::whole(0);
@@ -946,24 +862,28 @@ fn horseshoe(known: &Known, c: &Horseshoe) -> Check<Vec<String>> {
             "the sets make two loops through the first",
         )?;
         nearest = nearest.max(
-            covering(known, &equation, &c.sets, relation).map_err(|e| format!("set {i}: {e}"))?,
+            covering(known, shown, &equation, &c.sets, relation)
+                .map_err(|e| format!("set {i}: {e}"))?,
         );
     }
-    // lambda^-2 + lambda^-14 falls with lambda: it is above 1 at 1.12, so that the growth rate of
-    // chains is beyond 1.12.
-    let base = decimal("1.12")?;
-    let power = |n: u32| (0..n).fold(Rational::whole(1), |p, _| &p * &base);
+    // lambda^-2 + lambda^-long falls with lambda: if it is above 1 at the growth that is claimed,
+    // the growth rate of chains is beyond it.
+    let base = decimal(&shown.growth)?;
+    let power = |n: usize| (0..n).fold(Rational::whole(1), |p, _| &p * &base);
     need(
-        power(14) < &power(12) + &Rational::whole(1),
-        "chains of sets grow by more than 1.12 a return",
+        base > Rational::whole(1) && power(long) < &power(long - 2) + &Rational::whole(1),
+        format!("chains of sets grow by more than {} a return", shown.growth),
     )?;
     Ok(vec![
         format!(
-            "{} covering relations, proved anew: loops of 2 and {LONG} sets through the first",
+            "{} covering relations, proved anew: loops of 2 and {long} sets through the first",
             c.sets.len() + 1
         ),
-        "the two sets that can follow the first are disjoint: entropy more than log(1.12) a return"
-            .to_owned(),
+        format!(
+            "the two sets that can follow the first are disjoint: entropy more than log({}) a \
+                return",
+            shown.growth
+        ),
         format!(
             "every return passes the singularity, within {:.1e} in x and z",
             nearest.approximately()

@@ -7,14 +7,7 @@ use super::check::{Bounds, Check, decimal, holds, need, range, tight};
 use super::orbit::Inner;
 use super::rational::{Range, Rational};
 use super::recompute::Known;
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Problem {
-    v_plus: String,
-    v_minus: String,
-    transition: String,
-}
+use super::theorem::{InnerLaw as Shown, Problem};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -94,17 +87,25 @@ impl X {
     }
 }
 
-pub(super) fn inner_law(known: &Known, c: &InnerLaw) -> Check<Vec<String>> {
+pub(super) fn inner_law(known: &Known, shown: &Shown, c: &InnerLaw) -> Check<Vec<String>> {
     let (zero, one, two) = (X::whole(0), X::whole(1), X::whole(2));
     let half = one.over(&two)?;
-    need(c.problem.transition == "tanh", "the transition is tanh")?;
+    let wanted = &shown.problem;
+    for problem in [&c.problem, wanted] {
+        need(problem.transition == "tanh", "the transition is tanh")?;
+    }
     let is = |text: &str, want: &str, name: &str| -> Check<X> {
         need(decimal(text)? == decimal(want)?, format!("{name} = {want}"))?;
         X::of(want)
     };
-    let v = [is(&c.problem.v_plus, "-1.2", "v+")?, is(&c.problem.v_minus, "-1.4", "v-")?];
-    let (p1, p2) =
-        (is(&c.p1, "0.05", "the largest |p| coming in")?, is(&c.p2, "0.05", "the exit's |p|")?);
+    let v = [
+        is(&c.problem.v_plus, &wanted.v_plus, "v+")?,
+        is(&c.problem.v_minus, &wanted.v_minus, "v-")?,
+    ];
+    let (p1, p2) = (
+        is(&c.p1, &shown.largest, "the largest |p| coming in")?,
+        is(&c.p2, &shown.largest, "the exit's |p|")?,
+    );
     let (s0, x0, least) = (X::of(&c.s0)?, X::of(&c.x0)?, X::of(&c.least_s)?);
     let q0 = X::of(&c.largest_q)?;
     let [c1, c2, k] = [X::of(&c.cones[0])?, X::of(&c.cones[1])?, X::of(&c.cones[2])?];
@@ -266,9 +267,10 @@ pub(super) fn inner_law(known: &Known, c: &InnerLaw) -> Check<Vec<String>> {
     said.insert(
         0,
         format!(
-            "holds from S = {} on, a distance of {:.2} from the two-fold at eps = 1e-3",
+            "holds from S = {} on, a distance of {:.2} from the two-fold at eps = {}",
             c.least_s,
-            least.0.high.approximately() * 1e-3_f64.sqrt()
+            least.0.high.approximately() * decimal(&shown.eps)?.approximately().sqrt(),
+            shown.eps
         ),
     );
     said.insert(

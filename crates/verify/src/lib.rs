@@ -7,14 +7,17 @@
 //! in fractions of whole numbers (`rational`). Nothing is shared with the prover: neither its
 //! intervals nor its integrator nor the equation.
 //!
+//! A theorem's words and numbers are data ([`Theorem`]). A certificate has to say the same ones.
+//!
 //! Everything on which a statement rests is rigorous. Two kinds of claimed numbers that no
 //! statement rests on, derivatives and images of whole sets, are wider than they need be; they are
 //! compared with quotients of differences and with images of points, to more digits than are
 //! claimed. See proofs/README.md.
 //!
 //! ```
-//! use twofold_verify::{Refused, verify};
-//! assert!(matches!(verify("{}"), Err(Refused::Unreadable(_))));
+//! use twofold_verify::{Checker, Refused};
+//! let checker = Checker::new(Vec::new());
+//! assert!(matches!(checker.verify("{}"), Err(Refused::Unreadable(_))));
 //! ```
 #![forbid(unsafe_code)]
 // tests compare with tolerances, not with hashes
@@ -28,8 +31,10 @@ mod orbit;
 mod rational;
 mod recompute;
 mod strict;
+mod theorem;
 
-pub use certificate::{Checker, verify};
+pub use certificate::Checker;
+pub use theorem::Theorem;
 
 /// Result of a verified certificate.
 #[derive(Clone, Debug, PartialEq, Eq)]

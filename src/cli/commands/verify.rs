@@ -6,8 +6,9 @@ use serde_json::json;
 
 use crate::cli::speak::{harmless, print_json};
 use crate::cli::{CliError, Exit, print};
+use crate::paper::code::theorems;
 use crate::record::files::read_text;
-use crate::verify::{Refused, verify};
+use crate::verify::{Checker, Refused};
 
 /// Check certificates of theorems (proofs/certificates) by computing what they claim anew.
 ///
@@ -33,10 +34,11 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     let mut exit = Exit::Fine;
     let mut rows = Vec::new();
+    let checker = Checker::new(theorems());
     for file in &arguments.files {
         let shown = file.display().to_string();
         let text = read_text(file)?;
-        match verify(&text) {
+        match checker.verify(&text) {
             Ok(v) => {
                 if !arguments.json {
                     print(&format!("{}: verified", v.theorem))?;
