@@ -18,7 +18,7 @@ use crate::job::sweep::{is_open, is_outcome};
 use crate::job::{Answer, AnyQuestion, Executor, JobError, Table};
 use crate::num::elementary::pow;
 use crate::num::random::RandomStream;
-use crate::paper::plots;
+use crate::paper::tables;
 use crate::record::Hash;
 use crate::system::diagnostic::nearest;
 
@@ -849,8 +849,8 @@ impl Read {
                 }
             }
             Read::Column { table, column, take, .. } => {
-                let table = plots::table(answer, table.as_deref())?;
-                let values = plots::column(table, column)?;
+                let table = tables::table(answer, table.as_deref())?;
+                let values = tables::column(table, column)?;
                 // Blank cells are no numbers.
                 let numbers: Vec<f64> = values.iter().copied().filter(|v| !v.is_nan()).collect();
                 let (low, high) = numbers
@@ -909,11 +909,11 @@ impl Read {
     fn measured(&self, answer: &Answer) -> Result<Measured, String> {
         let beside = match self {
             Read::Column { table, column, take: Take::Share, word } => {
-                let table = plots::table(answer, table.as_deref())?;
+                let table = tables::table(answer, table.as_deref())?;
                 return share(table, column, word.as_deref().unwrap_or_default());
             }
             Read::Column { table, column, take: Take::Onset, word } => {
-                let table = plots::table(answer, table.as_deref())?;
+                let table = tables::table(answer, table.as_deref())?;
                 let word = word.as_deref().unwrap_or_default();
                 let Onset::Between(a, b) = onset(table, column, word)? else {
                     return Err(format!("{word} does not begin in these rows"));
@@ -938,7 +938,7 @@ impl Read {
         let Read::Column { table, column, take: Take::Onset, word: Some(word) } = self else {
             return Ok(None);
         };
-        let table = plots::table(answer, table.as_deref())?;
+        let table = tables::table(answer, table.as_deref())?;
         let Onset::Never(a, b) = onset(table, column, word)? else { return Ok(None) };
         let said = format!("no {word} from {} to {} ({equals} claimed)", short(a), short(b));
         if a.min(b) <= equals - within && a.max(b) >= equals + within {
@@ -951,7 +951,7 @@ impl Read {
 /// The share of rows with this word, with the wider half of its 95 % interval (Wilson 1927), as if
 /// rows were drawn at random. Of rows whose outcome is open any number may have the word.
 fn share(table: &Table, column: &str, word: &str) -> Result<Measured, String> {
-    let words = plots::words(table, column)?;
+    let words = tables::words(table, column)?;
     let outcomes = outcomes(table).unwrap_or_else(|| words.clone());
     let rows = words.len() as u64;
     if rows == 0 {
@@ -969,7 +969,7 @@ fn share(table: &Table, column: &str, word: &str) -> Result<Measured, String> {
 
 /// Outcomes of a sweep's rows, or of a map's.
 fn outcomes(table: &Table) -> Option<Vec<&str>> {
-    ["outcome", "ending"].iter().find_map(|name| plots::words(table, name).ok())
+    ["outcome", "ending"].iter().find_map(|name| tables::words(table, name).ok())
 }
 
 /// Place of an onset.
@@ -984,7 +984,7 @@ enum Onset {
 /// Place where the outcome becomes this word, along a column whose values go one way. Rows whose
 /// outcome is open make it wider.
 fn onset(table: &Table, column: &str, word: &str) -> Result<Onset, String> {
-    let values = plots::column(table, column)?;
+    let values = tables::column(table, column)?;
     let rows: Vec<(f64, Option<bool>)> = match outcomes(table) {
         Some(outcomes) => {
             let is = |o: &&str| if is_open(o) { None } else { Some(*o == word) };

@@ -34,11 +34,14 @@ use toml::value::Datetime;
 
 use crate::cli::flags::Use;
 use crate::job::spec::RunSpec;
+use crate::job::sweep::{Axis, Values};
 use crate::job::{Answer, AnyQuestion};
 use crate::paper::code::{self, Code};
 use crate::paper::draw::plot::{self, Look, PictureKind, PlotError};
+use crate::paper::draw::scan::Scanned;
 use crate::paper::drawing::draft;
-use crate::paper::plots::{self, Columns, Drawing, Plot, Plots, Points, Recorded};
+use crate::paper::plots::{Columns, Drawing, Plot, Plots, Points, Recorded};
+use crate::paper::tables;
 use crate::paper::verdict::{Claim as PanelClaim, SectionClaim};
 use crate::paper::{Camera, Figure, FigurePanel, ParameterReading, Picture, Repeats, View};
 use crate::record::FileError;
@@ -113,11 +116,11 @@ impl ReadColumns {
         };
         for name in &self.columns {
             let at = self.table.as_ref().unwrap_or(name);
-            let table = plots::table(answer, self.table.as_ref().map(|t| t.get_ref().as_str()))
+            let table = tables::table(answer, self.table.as_ref().map(|t| t.get_ref().as_str()))
                 .map_err(|why| wrong(at, why))?;
             let found = match self.words {
-                true => plots::words(table, name.get_ref()).map(drop),
-                false => plots::column(table, name.get_ref()).map(drop),
+                true => tables::words(table, name.get_ref()).map(drop),
+                false => tables::column(table, name.get_ref()).map(drop),
             };
             found.map_err(|why| wrong(name, why))?;
         }
@@ -209,7 +212,8 @@ struct FigureFile {
     /// The readings of which it has a picture [default: all].
     readings: Option<Vec<Spanned<String>>>,
     /// Kind of drawing of panels that do not say it: `series`, `plane`, `space`, `section`,
-    /// `columns` (a measure's table), `halves` or `surface`.
+    /// `columns` (a measure's table), `map` (a measure's endings over two settings), `halves` or
+    /// `surface`.
     draw: Option<Spanned<Draw>>,
     /// States on the axes of panels that do not say it.
     axes: Option<Spanned<Vec<String>>>,
@@ -229,7 +233,7 @@ struct PanelFile {
     title: Option<Spanned<String>>,
     /// Kind of drawing, as for the figure [default: the figure's].
     draw: Option<Spanned<Draw>>,
-    /// The run that it shows; of `draw = "columns"` nothing.
+    /// The run that it shows; of `draw = "columns"` and `"map"` nothing.
     run: Option<Spanned<Words>>,
     /// Changes of the run in a reading.
     #[serde(default)]
@@ -245,7 +249,7 @@ struct PanelFile {
     axes: Option<Spanned<Vec<String>>>,
     /// Azimuth and elevation in degrees, of a panel in space.
     camera: Option<Spanned<[f64; 2]>>,
-    /// The measure whose table is drawn.
+    /// The measure whose table is drawn; of a map one with `scan` or `sweep` over two settings.
     of: Option<Spanned<String>>,
     /// Its table [default: the first].
     table: Option<Spanned<String>>,
@@ -255,7 +259,7 @@ struct PanelFile {
     y: Option<Spanned<Vec<Spanned<String>>>>,
     /// Dots instead of a line.
     dots: Option<Spanned<bool>>,
-    /// Titles of the two axes of columns [default: the columns' names].
+    /// Titles of the two axes of columns or a map [default: the columns' names].
     labels: Option<Spanned<[String; 2]>>,
     /// Names of the vertical columns in the legend [default: their own].
     names: Option<Spanned<Vec<String>>>,
@@ -271,6 +275,7 @@ enum Draw {
     Space,
     Section,
     Columns,
+    Map,
     /// A section: the later half, and below it the early half.
     Halves,
     /// A path in space with the surface where h = 0.
@@ -285,6 +290,7 @@ impl Draw {
             Draw::Space => "space",
             Draw::Section => "section",
             Draw::Columns => "columns",
+            Draw::Map => "map",
             Draw::Halves => "halves",
             Draw::Surface => "surface",
         }
@@ -351,21 +357,22 @@ impl PanelFile {
             value.map(Spanned::span)
         }
         let columns = draw == Draw::Columns;
+        let measured = columns || draw == Draw::Map;
         let scored = matches!(draw, Draw::Halves | Draw::Surface);
         let keys = [
-            ("run", at(self.run.as_ref()), !columns),
-            ("in", self.r#in.keys().next().map(Spanned::span), !columns),
-            ("axes", at(self.axes.as_ref()), !columns),
+            ("run", at(self.run.as_ref()), !measured),
+            ("in", self.r#in.keys().next().map(Spanned::span), !measured),
+            ("axes", at(self.axes.as_ref()), !measured),
             ("camera", at(self.camera.as_ref()), matches!(draw, Draw::Space | Draw::Surface)),
             ("says", at(self.says.as_ref()), scored),
             ("repeats", at(self.repeats.as_ref()), scored),
             ("points", at(self.points.as_ref()), !scored),
-            ("of", at(self.of.as_ref()), columns),
+            ("of", at(self.of.as_ref()), measured),
             ("table", at(self.table.as_ref()), columns),
             ("x", at(self.x.as_ref()), columns),
             ("y", at(self.y.as_ref()), columns),
             ("dots", at(self.dots.as_ref()), columns),
-            ("labels", at(self.labels.as_ref()), columns),
+            ("labels", at(self.labels.as_ref()), measured),
             ("names", at(self.names.as_ref()), columns),
         ];
         for (key, at, _) in keys.into_iter().filter(|(_, _, acts)| !acts) {
@@ -960,6 +967,16 @@ impl Folder {
                 points,
             });
         }
+        if draw == Draw::Map {
+            let (question, over) = self.mapped(origin, panel, drawn.draw)?;
+            return Ok(Plot {
+                label: panel.label.get_ref().clone(),
+                title: panel.title(),
+                question,
+                drawing: Drawing::Map(over.into()),
+                points,
+            });
+        }
         let Some(said) = said else {
             return Err(wrong(
                 place,
@@ -973,7 +990,9 @@ impl Folder {
             Draw::Series => PictureKind::Series,
             Draw::Plane => PictureKind::Plane,
             Draw::Space => PictureKind::Space,
-            Draw::Section | Draw::Columns | Draw::Halves | Draw::Surface => PictureKind::Section,
+            Draw::Section | Draw::Columns | Draw::Map | Draw::Halves | Draw::Surface => {
+                PictureKind::Section
+            }
         };
         let axes = drawn.axes.map_or(Ok(Vec::new()), |axes| states(origin, axes, &frame))?;
         let camera = match (drawn.camera, kind) {
@@ -999,6 +1018,48 @@ impl Folder {
             drawing: Drawing::Run(recorded.into(), look),
             points,
         })
+    }
+
+    /// The question of a map, and the two settings over which its runs vary.
+    fn mapped(
+        &self,
+        origin: &Origin,
+        panel: &PanelFile,
+        draw: &Spanned<Draw>,
+    ) -> Result<(AnyQuestion, [Scanned; 2]), FolderError> {
+        let wrong = |at: Range<usize>, why: String, help: &str| {
+            FolderError::at(origin, at, why, Some(help.to_owned()))
+        };
+        let Some(of) = &panel.of else {
+            return Err(wrong(draw.span(), "a map of which runs?".into(), "give of = \"MEASURE\""));
+        };
+        let source = self.source(origin, of)?;
+        let name = of.get_ref();
+        let over = source.question.json()["sweep"]["over"].clone();
+        let axes: Vec<Axis> = serde_json::from_value(over).unwrap_or_default();
+        let [x, y] = axes.as_slice() else {
+            let why = format!("`{name}` does not ask for runs over two settings");
+            return Err(wrong(
+                of.span(),
+                why,
+                "name a scan or sweep with over = [\"...\", \"...\"]",
+            ));
+        };
+        for axis in [x, y] {
+            if axis.is_random() {
+                let why = format!("`{name}` draws `{}` at random", axis.coordinate);
+                return Err(wrong(of.span(), why, "give FROM..TO:COUNT in its `over`"));
+            }
+            if matches!(axis.values, Values::Names(_)) {
+                let why = format!("`{name}` varies `{}` over names", axis.coordinate);
+                return Err(wrong(of.span(), why, "a map is drawn over numbers"));
+            }
+        }
+        let mut over = [Scanned::from(x), Scanned::from(y)];
+        for (of, title) in over.iter_mut().zip(panel.labels.iter().flat_map(|l| l.get_ref())) {
+            of.title = markup::literal(title);
+        }
+        Ok((source.question.clone(), over))
     }
 
     fn points(&self, origin: &Origin, points: &Spanned<PointsFile>) -> Result<Points, FolderError> {

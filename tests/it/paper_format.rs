@@ -144,7 +144,7 @@ fn typed(key: &Key) -> Value {
             json!({ "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 })
         }
         "Draw" => {
-            json!({ "enum": ["series", "plane", "space", "section", "columns", "halves",
+            json!({ "enum": ["series", "plane", "space", "section", "columns", "map", "halves",
                 "surface"] })
         }
         "Words" if ["orbit", "lyapunov", "rests", "scan", "sweep"].contains(&key.name.as_str()) => {

@@ -1315,6 +1315,43 @@ fn scored(root: &Path, rule: &str) -> (String, String) {
     (line.to_owned(), format!("{out}{said}"))
 }
 
+/// Period one below r = 3 and two above, whatever the start; two maps say which is whose.
+#[test]
+fn runs_over_two_settings_are_drawn_as_a_map() {
+    let place = with_runs();
+    let root = place.path().join("p");
+    let file = root.join("figures/fig1.toml");
+    let before = fs::read_to_string(&file).unwrap();
+    let with = |of: &str, more: &str| {
+        let panels = ["c", "d"].map(|label| {
+            format!("\n[[panel]]\nlabel = \"{label}\"\ndraw = \"map\"\nof = \"{of}\"\n{more}\n")
+        });
+        fs::write(&file, before.clone() + &panels.concat()).unwrap();
+    };
+    with("few", "labels = [\"growth\", \"first\"]\ntitle = \"two halves\"");
+    let (code, _, said) = paper(&["make", "--quiet"], &root);
+    assert_eq!(code, 0, "{said}");
+    let rows = fs::read_to_string(root.join("out/fig1/fig1-d-sweep.csv")).unwrap();
+    for (word, count) in [(",period-1,", 6), (",period-2,", 6)] {
+        assert_eq!(rows.matches(word).count(), count, "{rows}");
+    }
+    for (of, more, why) in [
+        ("turns", "", "does not ask for runs over two settings"),
+        ("cycle", "", "does not ask for runs over two settings"),
+        ("few", "x = \"params.r\"", "`x` has no effect on draw = \"map\""),
+        ("few", "run = { t-end = 1 }", "`run` has no effect on draw = \"map\""),
+    ] {
+        with(of, more);
+        let (code, _, said) = paper(&["make", "--quiet"], &root);
+        assert!(code == 2 && said.contains(why), "{of}, {more}: {said}");
+    }
+    with("few", "");
+    let random = "\"start.x=0.2..0.6\"], random = 4 }";
+    change(&root, "measures.toml", "\"start.x=0.2,0.4,0.6\"] }", random);
+    let (code, _, said) = paper(&["make", "--quiet"], &root);
+    assert!(code == 2 && said.contains("draws `start.x` at random"), "{said}");
+}
+
 /// An orbit diagram and a table of runs: drawn as columns, and read by claims.
 #[test]
 fn scans_and_sweeps_are_measures() {

@@ -43,24 +43,11 @@ pub struct Scan {
     alike: f64,
 }
 
-/// An ending and where it occurs.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Basin {
-    /// Its name as plain text.
-    pub name: String,
-    /// Whether it is an attractor.
-    pub attracts: bool,
-    /// Its cells, as (column, row).
-    pub cells: Vec<(usize, usize)>,
-}
-
 /// The result of a scan.
 #[derive(Debug)]
 pub struct Scanned {
     /// Over one setting `passages`, a row a crossing; over two `endings`, a row a run.
     pub table: Table,
-    /// Over two settings: the endings in the order of their first occurrence.
-    pub basins: Vec<Basin>,
     /// Finished runs: fewer than [`Scan::runs`] if the scan was stopped.
     pub finished: u64,
     /// Those that failed.
@@ -282,9 +269,8 @@ impl Scan {
         };
         let errors = || cells.iter().filter_map(|(_, c)| c.as_ref()?.1.as_ref().err());
         let (failed, first_error) = (errors().count() as u64, errors().next().cloned());
-        let (table, basins) =
-            if self.is_map() { self.endings(&cells) } else { (self.passages(&cells), Vec::new()) };
-        Scanned { table, basins, finished: finished.into_inner(), failed, first_error }
+        let table = if self.is_map() { self.endings(&cells) } else { self.passages(&cells) };
+        Scanned { table, finished: finished.into_inner(), failed, first_error }
     }
 
     /// The ways in which it goes over its settings.
@@ -421,8 +407,8 @@ impl Scan {
         table
     }
 
-    /// A row per run, and the endings in order of their first occurrence.
-    fn endings(&self, cells: &[(Option<&str>, Cell)]) -> (Table, Vec<Basin>) {
+    /// A row per run; endings have numbers in order of their first occurrence.
+    fn endings(&self, cells: &[(Option<&str>, Cell)]) -> Table {
         let mut columns = self.columns();
         columns.extend([
             Column::words("ending"),
@@ -430,8 +416,7 @@ impl Scan {
             Column::words("reason"),
         ]);
         let mut table = Table::new("endings", columns);
-        let mut known: Vec<(Landing, Basin)> = Vec::new();
-        let mut failed = Basin { name: "failed".into(), attracts: false, cells: Vec::new() };
+        let mut known: Vec<Landing> = Vec::new();
         let cells: Vec<&(Vec<Entry>, Result<Found, JobError>)> =
             cells.iter().filter_map(|(_, c)| c.as_ref()).collect();
         let landing =
@@ -446,45 +431,23 @@ impl Scan {
         let start = self.sweep.run().start();
         let near = self.alike
             * places.chain(start.into_iter().chain(given)).fold(0.0_f64, |a, x| a.max(x.abs()));
-        let height = self.axes().get(1).map_or(1, Axis::count).max(1) as usize;
-        for (row, cell) in cells.iter().enumerate() {
-            let at = (row / height, row % height);
+        for cell in cells {
             let (word, number, reason) = match (&cell.1, landing(cell)) {
                 (Ok(_), Some(landing)) => {
-                    let index = known
-                        .iter()
-                        .position(|(e, _)| e.is_like(&landing, near))
-                        .unwrap_or_else(|| {
-                            let attracts = !landing.place.is_empty();
-                            let basin =
-                                Basin { name: landing.word.clone(), attracts, cells: Vec::new() };
-                            known.push((landing.clone(), basin));
+                    let index =
+                        known.iter().position(|e| e.is_like(&landing, near)).unwrap_or_else(|| {
+                            known.push(landing.clone());
                             known.len() - 1
                         });
-                    known[index].1.cells.push(at);
                     (landing.word, index as i64 + 1, String::new())
                 }
                 (Ok(_), None) => continue,
-                (Err(error), _) => {
-                    failed.cells.push(at);
-                    ("failed".to_owned(), 0, error.to_string())
-                }
+                (Err(error), _) => ("failed".to_owned(), 0, error.to_string()),
             };
             let more = [Entry::Word(word), Entry::Integer(number), Entry::Word(reason)];
             table.push(cell.0.iter().cloned().chain(more));
         }
-        let words: Vec<String> = known.iter().map(|(landing, _)| landing.word.clone()).collect();
-        let mut basins: Vec<Basin> = known.into_iter().map(|(_, basin)| basin).collect();
-        // Two attractors may have one word; the rows tell them apart by their numbers.
-        for (i, basin) in basins.iter_mut().enumerate() {
-            if words.iter().filter(|word| **word == words[i]).count() > 1 {
-                basin.name = format!("{}, no. {}", words[i], i + 1);
-            }
-        }
-        if !failed.cells.is_empty() {
-            basins.push(failed);
-        }
-        (table, basins)
+        table
     }
 }
 
@@ -598,7 +561,7 @@ impl Question for ScanQuestion {
             let (word, _) = ways[part.way];
             cells.extend(part.cells(&answer)?.into_iter().map(|cell| (word, cell)));
         }
-        let table = if scan.is_map() { scan.endings(&cells).0 } else { scan.passages(&cells) };
+        let table = if scan.is_map() { scan.endings(&cells) } else { scan.passages(&cells) };
         Ok(Answer::of_tables(vec![table]))
     }
 }

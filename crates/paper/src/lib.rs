@@ -18,6 +18,7 @@ pub mod pipeline;
 pub mod plots;
 pub mod reuse;
 pub mod study;
+pub mod tables;
 pub mod verdict;
 pub mod wording;
 

@@ -10,7 +10,6 @@ use twofold_hybrid::motion::Record;
 use twofold_job::general::GeneralRun;
 use twofold_job::record::Hash;
 use twofold_job::spec::RunSpec;
-use twofold_job::table::Cells;
 use twofold_job::{Answer, AnyQuestion, Column, Entry, Run, Table};
 use twofold_render::markup;
 use twofold_render::sheet::{
@@ -21,6 +20,8 @@ use twofold_render::style;
 use twofold_system::System;
 
 use super::draw::plot::{self, Crossed, Frame, Look};
+use super::draw::scan::{self, Scanned};
+use super::tables::{column, table};
 use super::wording;
 
 /// The panels of a picture.
@@ -54,6 +55,8 @@ pub enum Drawing {
     Run(Box<Recorded>, Look),
     /// Columns of a table against another one.
     Columns(Columns),
+    /// Endings of a scan's or sweep's runs over two settings, as `twofold scan` draws them.
+    Map(Box<[Scanned; 2]>),
 }
 
 /// A run of a system of either kind.
@@ -140,6 +143,7 @@ impl Plots {
                 let drawing = match &p.drawing {
                     Drawing::Run(_, look) => format!("{look:?}"),
                     Drawing::Columns(columns) => format!("{columns:?}"),
+                    Drawing::Map(over) => format!("{over:?}"),
                 };
                 format!("{} {} {drawing} {:?}", p.label, p.title, p.points)
             })
@@ -197,7 +201,13 @@ impl Plots {
                 }
                 whole.panels.push(panel);
             }
-            for entry in part.legend {
+            for mut entry in part.legend {
+                // Maps have colours of their own.
+                if let Drawing::Map(_) = plot.drawing
+                    && !label.is_empty()
+                {
+                    entry.text = format!("{label} {}", entry.text);
+                }
                 if !whole.legend.contains(&entry) {
                     whole.legend.push(entry);
                 }
@@ -276,6 +286,7 @@ impl Plot {
                 plot::sheet(&frame, answer, look, Vec::new()).map_err(|e| e.to_string())?
             }
             Drawing::Columns(columns) => columns.sheet(answer, self.look_of_dots())?,
+            Drawing::Map(over) => scan::map("", over.each_ref(), table(answer, None)?)?,
         };
         Ok(self.with_points(sheet))
     }
@@ -301,6 +312,11 @@ impl Plot {
                 let names = columns.y.iter().chain([&columns.x]).map(String::as_str);
                 let table = columns.table.as_deref().unwrap_or_default();
                 columns.sheet(&two_rows(table, names.collect()), self.look_of_dots())?
+            }
+            Drawing::Map(over) => {
+                let settings = over.iter().map(|of| Column::numbers(&of.column));
+                let columns = settings.chain([Column::words("ending")]);
+                scan::map("", over.each_ref(), &Table::new("endings", columns))?
             }
         };
         Ok(self.with_points(sheet))
@@ -372,66 +388,6 @@ impl Columns {
     }
 }
 
-/// The table of this name, or the first one.
-///
-/// # Errors
-/// If the answer has none: its name, and those that there are.
-pub fn table<'a>(answer: &'a Answer, name: Option<&str>) -> Result<&'a Table, String> {
-    let Some(name) = name else {
-        return answer.tables.first().ok_or_else(|| "the answer has no table".into());
-    };
-    answer.table(name).ok_or_else(|| {
-        let known: Vec<&str> = answer.tables.iter().map(|t| t.name.as_str()).collect();
-        format!("the answer has no table \"{name}\"; it has {}", listed(&known))
-    })
-}
-
-/// A column of numbers.
-///
-/// # Errors
-/// If the table has no such column: its name, and those that there are.
-pub fn column<'a>(table: &'a Table, name: &str) -> Result<std::borrow::Cow<'a, [f64]>, String> {
-    let numbers = table.numbers(name);
-    if !numbers.is_empty() || table.is_empty() && table.columns.iter().any(|c| c.name == name) {
-        return Ok(numbers.into());
-    }
-    let integers = table.integers(name);
-    if !integers.is_empty() {
-        // Counts: far below 2^53.
-        return Ok(integers.iter().map(|i| *i as f64).collect::<Vec<_>>().into());
-    }
-    let is_number = |c: &&twofold_job::Column| !matches!(c.cells, Cells::Words(_));
-    let known: Vec<&str> =
-        table.columns.iter().filter(is_number).map(|c| c.name.as_str()).collect();
-    Err(format!(
-        "table \"{}\" has no column of numbers \"{name}\"; it has {}",
-        table.name,
-        listed(&known)
-    ))
-}
-
-/// A column of words.
-///
-/// # Errors
-/// If the table has no such column: its name, and those that there are.
-pub fn words<'a>(table: &'a Table, name: &str) -> Result<Vec<&'a str>, String> {
-    let are_words = |c: &&twofold_job::Column| matches!(c.cells, Cells::Words(_));
-    let known = table.columns.iter().filter(are_words).map(|c| c.name.as_str());
-    if known.clone().any(|column| column == name) {
-        return Ok(table.words(name).collect());
-    }
-    let known: Vec<&str> = known.collect();
-    Err(format!(
-        "table \"{}\" has no column of words \"{name}\"; it has {}",
-        table.name,
-        listed(&known)
-    ))
-}
-
-fn listed(names: &[&str]) -> String {
-    if names.is_empty() { "none".into() } else { names.join(", ") }
-}
-
 const COLOURS: [twofold_render::colour::Colour; 4] =
     [style::INK, style::BLUE, style::VERMILLION, style::GREEN];
 /// Numbers read off a paper.
@@ -494,6 +450,37 @@ mod tests {
         twofold_render::render(&sheet).unwrap();
     }
 
+    /// Colours of one map are not another's: the legend says whose they are.
+    #[test]
+    fn maps_side_by_side_have_a_legend_each() {
+        let over = ["start.x=0,1", "start.v=0,1"]
+            .map(|axis| Scanned::from(&axis.parse::<twofold_job::sweep::Axis>().unwrap()));
+        let map = Plot { drawing: Drawing::Map(over.into()), points: None, ..plane(&ball()) };
+        let answer = |words: [&str; 4]| {
+            let mut table = Table::new(
+                "sweep",
+                ["start.x", "start.v"]
+                    .map(Column::numbers)
+                    .into_iter()
+                    .chain([Column::words("outcome")]),
+            );
+            for (i, word) in words.into_iter().enumerate() {
+                let number = |k: usize| Entry::Number(k as f64);
+                table.push([number(i / 2), number(i % 2), Entry::Word(word.into())]);
+            }
+            Arc::new(Answer::of_tables(vec![table]))
+        };
+        let answers = [answer(["rest"; 4]), answer(["far", "rest", "rest", "rest"])];
+        let legend = |plots: Vec<Plot>| {
+            let sheet = Plots { columns: 2, plots }.sheet(&answers).unwrap();
+            twofold_render::render(&sheet).unwrap();
+            sheet.legend.into_iter().map(|e| e.text).collect::<Vec<_>>()
+        };
+        let b = Plot { label: "b".into(), ..map.clone() };
+        assert_eq!(legend(vec![map.clone(), b]), ["(a) rest (4)", "(b) far (1)", "(b) rest (3)"]);
+        assert_eq!(legend(vec![map]), ["rest (4)"]);
+    }
+
     #[test]
     fn each_state_of_a_series_has_the_time_below_it_when_they_stand_side_by_side() {
         let ball = ball();
@@ -553,18 +540,6 @@ mod tests {
         let many: String = (0..20).map(|i| format!("p{i} = {i}\n")).collect();
         let many = said(vec![panel("a", &many)]).unwrap();
         assert!(many.matches(" = ").count() == 12 && many.ends_with(", …"), "{many}");
-    }
-
-    #[test]
-    fn a_column_that_is_not_there_is_named_with_those_that_are() {
-        let mut table = Table::new("branch", vec![Column::numbers("period")]);
-        table.push(vec![Entry::Number(1.0)]);
-        assert_eq!(&*column(&table, "period").unwrap(), [1.0]);
-        let said = column(&table, "perod").unwrap_err();
-        assert!(
-            said.contains("branch") && said.contains("\"perod\"") && said.contains("it has period"),
-            "{said}"
-        );
     }
 
     #[test]

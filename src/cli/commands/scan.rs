@@ -9,12 +9,12 @@ use crate::cli::general;
 use crate::cli::progress::Progress;
 use crate::cli::speak::{Delivery, complain, deliver, is_standard_output, try_delivery};
 use crate::cli::{CliError, Exit, in_pool};
-use crate::draw::scan;
+use crate::draw::scan::{self, Scanned};
 use crate::hybrid::Model;
 use crate::hybrid::motion::Record;
-use crate::job::scan::{Basin, Follow, Scan};
+use crate::job::scan::{Follow, Scan};
 use crate::job::spec::Observation;
-use crate::job::sweep::{Axis, Base, Sweep, Values};
+use crate::job::sweep::{Axis, Base, Sweep};
 use crate::job::table::{Entry, Table};
 use crate::job::{self, encode};
 use crate::record::Hash;
@@ -241,7 +241,8 @@ impl Arguments {
         }
         let names: Vec<String> =
             scan.axes().iter().map(|a| markup::literal(&a.to_string())).collect();
-        let varied: Vec<String> = scan.axes().iter().map(|axis| scanned(axis).title).collect();
+        let varied: Vec<String> =
+            scan.axes().iter().map(|axis| Scanned::from(axis).title).collect();
         drawn.footer = drawn.footer.iter().filter_map(|line| without(line, &varied)).collect();
         drawn.footer.insert(0, format!("over {}", names.join(", ")));
         Ok((scan, drawn))
@@ -298,7 +299,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     }
     deliver(out, &bytes)?;
     if let (Some(file), Some(format)) = (&arguments.plot, format) {
-        write(&picture(&scan, &drawn, &found.table, &found.basins), file, format)?;
+        write(&picture(&scan, &drawn, &found.table)?, file, format)?;
     }
     match found.first_error {
         None => Ok(Exit::Fine),
@@ -331,26 +332,13 @@ fn without(line: &str, varied: &[String]) -> Option<String> {
     (!fixed.is_empty()).then(|| fixed.join(", "))
 }
 
-/// A setting as it is drawn; its name as mathematics sets it, of `params.alpha` only the
-/// parameter's.
-fn scanned(axis: &Axis) -> scan::Scanned {
-    let name = axis.coordinate.to_string();
-    let values: Vec<f64> = (0..axis.count()).map(|i| axis.value(i, 0.5).value()).collect();
-    let logarithmic = matches!(axis.values, Values::Log { .. }) && values.iter().all(|v| *v > 0.0);
-    scan::Scanned {
-        title: markup::name(name.rsplit('.').next().unwrap_or(&name)),
-        values,
-        logarithmic,
-    }
-}
-
-fn picture(scan: &Scan, drawn: &Drawn, table: &Table, basins: &[Basin]) -> crate::render::Sheet {
-    let axes = scan.axes();
+fn picture(scan: &Scan, drawn: &Drawn, table: &Table) -> Result<crate::render::Sheet, CliError> {
+    let axes: Vec<Scanned> = scan.axes().iter().map(Scanned::from).collect();
     let mut sheet = if scan.is_map() {
-        scan::map(&drawn.title, [&scanned(&axes[0]), &scanned(&axes[1])], basins)
+        scan::map(&drawn.title, [&axes[0], &axes[1]], table).map_err(CliError::Usage)?
     } else {
-        let name = axes[0].coordinate.to_string();
-        let value = |row: usize| table.column(&name).map_or(f64::NAN, |c| c.get(row).value());
+        let value =
+            |row: usize| table.column(&axes[0].column).map_or(f64::NAN, |c| c.get(row).value());
         let heights = drawn.shown.as_deref().map_or(&[][..], |s| table.numbers(s));
         let ways = table
             .column("follow")
@@ -370,19 +358,20 @@ fn picture(scan: &Scan, drawn: &Drawn, table: &Table, basins: &[Basin]) -> crate
         };
         scan::diagram(
             &drawn.title,
-            &scanned(&axes[0]),
+            &axes[0],
             &drawn.shown.as_deref().map_or(String::new(), markup::name),
             series,
         )
     };
     sheet.footer.clone_from(&drawn.footer);
-    sheet
+    let sheet = sheet
         .provenance("Software", concat!("twofold ", env!("CARGO_PKG_VERSION")))
         .provenance("Picture", if scan.is_map() { "scan-map" } else { "scan-diagram" })
         .provenance("Reading", "none")
         .provenance("Method", drawn.method)
         .provenance("Spec-SHA256", drawn.hash.as_str())
-        .provenance("Data-SHA256", Hash::of(&encode::bits(std::slice::from_ref(table))).as_str())
+        .provenance("Data-SHA256", Hash::of(&encode::bits(std::slice::from_ref(table))).as_str());
+    Ok(sheet)
 }
 
 #[cfg(test)]

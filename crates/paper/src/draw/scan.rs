@@ -1,6 +1,7 @@
 //! Pictures of scans: an orbit diagram over one parameter, a map of endings over two.
 
-use twofold_job::scan::Basin;
+use twofold_job::Table;
+use twofold_job::sweep::{Axis as Over, Values};
 use twofold_num::elementary::{pow, sqrt};
 use twofold_render::markup;
 use twofold_render::sheet::{
@@ -8,14 +9,33 @@ use twofold_render::sheet::{
 };
 use twofold_render::style;
 
+use crate::tables::{column, words};
+
 /// A setting that a scan varied.
+#[derive(Clone, Debug)]
 pub struct Scanned {
+    /// Its column in a table.
+    pub column: String,
     /// Its name in rich text.
     pub title: String,
-    /// Its values, in their order.
+    /// Its values, the least first.
     pub values: Vec<f64>,
     /// Whether they are evenly spaced in the logarithm, and so are shown so.
     pub logarithmic: bool,
+}
+
+impl From<&Over> for Scanned {
+    /// Its name as mathematics sets it, of `params.alpha` only the parameter's.
+    fn from(axis: &Over) -> Self {
+        let column = axis.coordinate.to_string();
+        let mut values: Vec<f64> = (0..axis.count()).map(|i| axis.value(i, 0.5).value()).collect();
+        values.sort_by(f64::total_cmp);
+        values.dedup();
+        let logarithmic =
+            matches!(axis.values, Values::Log { .. }) && values.iter().all(|v| *v > 0.0);
+        let title = markup::name(column.rsplit('.').next().unwrap_or(&column));
+        Self { column, title, values, logarithmic }
+    }
 }
 
 impl Scanned {
@@ -89,8 +109,42 @@ pub fn diagram(
     sheet.panel("", "", panel)
 }
 
-/// A map of endings over a grid of two settings.
-pub fn map(title: &str, over: [&Scanned; 2], basins: &[Basin]) -> Sheet {
+/// An ending and where it occurs.
+struct Basin {
+    /// Its word, and its number in a table that tells attractors of one word apart.
+    ending: (String, i64),
+    /// Its cells, as (column, row).
+    cells: Vec<(usize, usize)>,
+}
+
+/// The endings of runs over a grid of two settings, in order of their first occurrence; runs that
+/// failed come last.
+fn basins(table: &Table, over: [&Scanned; 2]) -> Result<Vec<Basin>, String> {
+    let endings = words(table, "outcome").or_else(|_| words(table, "ending"))?;
+    let [x, y] = [column(table, &over[0].column)?, column(table, &over[1].column)?];
+    let numbers = table.integers("number");
+    let place = |of: &Scanned, value: f64| {
+        let found = of.values.iter().position(|v| *v == value);
+        found.ok_or_else(|| format!("{} = {value} is no value of the grid", of.column))
+    };
+    let mut found: Vec<Basin> = Vec::new();
+    for (row, word) in endings.iter().enumerate() {
+        let at = (place(over[0], x[row])?, place(over[1], y[row])?);
+        let ending = ((*word).to_owned(), numbers.get(row).copied().unwrap_or(0));
+        match found.iter_mut().find(|b| b.ending == ending) {
+            Some(basin) => basin.cells.push(at),
+            None => found.push(Basin { ending, cells: vec![at] }),
+        }
+    }
+    found.sort_by_key(|basin| basin.ending.0 == "failed");
+    Ok(found)
+}
+
+/// A map of endings over a grid of two settings: the table of a scan or a sweep.
+///
+/// # Errors
+/// If the table has no endings, or not these settings.
+pub fn map(title: &str, over: [&Scanned; 2], table: &Table) -> Result<Sheet, String> {
     let [x_edges, y_edges] = over.map(Scanned::edges);
     let ends = |e: &[f64]| (e[0], e[e.len() - 1]);
     let mut panel = PlanePanel::new(over[0].axis(ends(&x_edges)), over[1].axis(ends(&y_edges)));
@@ -98,21 +152,28 @@ pub fn map(title: &str, over: [&Scanned; 2], basins: &[Basin]) -> Sheet {
         .title(markup::literal(title))
         .panel_aspect(0.9);
     let (mut attractors, mut others) = (0.., 0..);
-    for basin in basins {
-        let colour = if basin.attracts {
+    let basins = basins(table, over)?;
+    for Basin { ending: (word, number), cells } in &basins {
+        // Closed orbits and rests.
+        let attracts = word == "rest" || word.contains("period-");
+        let colour = if attracts {
             attractors.next().map_or(style::INK, palette)
         } else {
             others.next().map_or(style::CROSSING, grey)
         };
-        for (i, j, length) in rows_of(&basin.cells) {
+        for (i, j, length) in rows_of(cells) {
             let (a, b) = (x_edges[i], x_edges[i + length]);
             let (c, d) = (y_edges[j], y_edges[j + 1]);
             panel = panel.solid(vec![[a, c], [b, c], [b, d], [a, d]], colour);
         }
-        let text = format!("{} ({})", markup::literal(&basin.name), basin.cells.len());
+        let mut name = markup::literal(word);
+        if basins.iter().filter(|basin| basin.ending.0 == *word).count() > 1 {
+            name += &format!(", no. {number}");
+        }
+        let text = format!("{name} ({})", cells.len());
         sheet = sheet.legend(LegendEntry::new(LegendKey::Area(colour, 100), text));
     }
-    sheet.panel("", "", panel)
+    Ok(sheet.panel("", "", panel))
 }
 
 /// Neighbouring cells of one row as one rectangle: (column, row, how many).
@@ -149,23 +210,53 @@ fn grey(k: usize) -> Colour {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use twofold_job::{Column, Entry};
     use twofold_render::sheet::Content;
 
+    /// Two attractors of one word have a number each; what failed comes last.
     #[test]
     fn endings_have_a_colour_each() {
-        let basin = |attracts: bool, i: usize| Basin {
-            name: format!("ending {i}"),
-            attracts,
-            cells: vec![(i, 0)],
-        };
-        let basins: Vec<Basin> = (0..6).map(|i| basin(i % 2 == 0, i)).collect();
+        let columns = [Column::numbers("x"), Column::numbers("y"), Column::words("ending")];
+        let columns = columns.into_iter().chain([Column::integers("number")]);
+        let mut table = Table::new("endings", columns);
+        let endings = [
+            ("failed", 0),
+            ("period-1", 1),
+            ("far", 2),
+            ("period-1", 3),
+            ("rest", 4),
+            ("irregular", 5),
+        ];
+        for (i, (word, number)) in endings.into_iter().enumerate() {
+            table.push([
+                Entry::Number(i as f64),
+                Entry::Number(0.0),
+                Entry::Word(word.into()),
+                Entry::Integer(number),
+            ]);
+        }
         let values: Vec<f64> = (0..6).map(f64::from).collect();
-        let (x, y) = (scanned(&values, false), scanned(&[0.0], false));
-        let sheet = map("", [&x, &y], &basins);
+        let [x, y] = [("x", &values[..]), ("y", &[0.0])]
+            .map(|(column, values)| Scanned { column: column.into(), ..scanned(values, false) });
+        let sheet = map("", [&x, &y], &table).unwrap();
+        let texts: Vec<&str> = sheet.legend.iter().map(|e| e.text.as_str()).collect();
+        assert_eq!(
+            texts,
+            [
+                "period-1, no. 1 (1)",
+                "far (1)",
+                "period-1, no. 3 (1)",
+                "rest (1)",
+                "irregular (1)",
+                "failed (1)"
+            ]
+        );
         let mut seen: Vec<String> = sheet.legend.iter().map(|e| format!("{:?}", e.key)).collect();
         seen.sort();
         seen.dedup();
         assert_eq!(seen.len(), 6, "{seen:?}");
+        let other = Scanned { values: vec![7.0], ..y };
+        assert!(map("", [&x, &other], &table).unwrap_err().contains("no value of the grid"));
     }
 
     #[test]
@@ -177,7 +268,12 @@ mod tests {
     }
 
     fn scanned(values: &[f64], logarithmic: bool) -> Scanned {
-        Scanned { title: String::new(), values: values.to_vec(), logarithmic }
+        Scanned {
+            column: String::new(),
+            title: String::new(),
+            values: values.to_vec(),
+            logarithmic,
+        }
     }
 
     #[test]
