@@ -625,7 +625,8 @@ impl Claim {
         let own: Vec<AnyQuestion> =
             self.reads().map(|name| folder.sources[name].question.clone()).collect();
         let answers = ask(&own)?;
-        let (mut agrees, mut found) = self.check.of(&answers).map_err(JobError::Other)?;
+        let rtol = own.iter().map(|question| rtol(&question.json())).fold(0.0, f64::max);
+        let (mut agrees, mut found) = self.check.of(&answers, rtol).map_err(JobError::Other)?;
         let mut hashes: Vec<String> =
             answers.iter().map(|a| a.hash().as_str().to_owned()).collect();
         let digest = |hashes: &[String]| Hash::of(hashes.join("\n").as_bytes());
@@ -636,7 +637,7 @@ impl Claim {
             for questions in self.repeated(folder).map_err(|e| JobError::Other(e.to_string()))? {
                 let judged = ask(&questions).and_then(|answers| {
                     hashes.extend(answers.iter().map(|a| a.hash().as_str().to_owned()));
-                    self.check.of(&answers).map_err(JobError::Other)
+                    self.check.of(&answers, rtol).map_err(JobError::Other)
                 });
                 match judged {
                     Ok((holds, _)) => hits += u64::from(holds),
@@ -675,6 +676,15 @@ impl Claim {
             words_after_data: false,
         })
     }
+}
+
+/// Relative tolerance of a question's runs; 0 if it has none.
+fn rtol(question: &Value) -> f64 {
+    let own = |run: &Value| {
+        let method = &run["method"];
+        method["rtol"].as_f64().or(method["tolerance"]["rtol"].as_f64())
+    };
+    own(question).or(own(&question["sweep"]["run"])).unwrap_or(0.0)
 }
 
 /// Start of a source's run.
@@ -905,8 +915,8 @@ impl std::fmt::Display for Measured {
 }
 
 impl Read {
-    /// The number with the interval that stands beside it.
-    fn measured(&self, answer: &Answer) -> Result<Measured, String> {
+    /// The number with the interval that stands beside it, of runs at this tolerance.
+    fn measured(&self, answer: &Answer, rtol: f64) -> Result<Measured, String> {
         let beside = match self {
             Read::Column { table, column, take: Take::Share, word } => {
                 let table = tables::table(answer, table.as_deref())?;
@@ -915,7 +925,7 @@ impl Read {
             Read::Column { table, column, take: Take::Onset, word } => {
                 let table = tables::table(answer, table.as_deref())?;
                 let word = word.as_deref().unwrap_or_default();
-                let Onset::Between(a, b) = onset(table, column, word)? else {
+                let Onset::Between(a, b) = onset(table, column, word, rtol)? else {
                     return Err(format!("{word} does not begin in these rows"));
                 };
                 let how = format!("{word} begins from {} to {}: ", short(a), short(b));
@@ -934,12 +944,17 @@ impl Read {
 
     /// The finding if it does not begin within `within` of `equals`, though rows reach so far on
     /// both sides.
-    fn never(&self, answer: &Answer, equals: f64, within: f64) -> Result<Option<String>, String> {
+    fn never(
+        &self,
+        answer: &Answer,
+        rtol: f64,
+        [equals, within]: [f64; 2],
+    ) -> Result<Option<String>, String> {
         let Read::Column { table, column, take: Take::Onset, word: Some(word) } = self else {
             return Ok(None);
         };
         let table = tables::table(answer, table.as_deref())?;
-        let Onset::Never(a, b) = onset(table, column, word)? else { return Ok(None) };
+        let Onset::Never(a, b) = onset(table, column, word, rtol)? else { return Ok(None) };
         let said = format!("no {word} from {} to {} ({equals} claimed)", short(a), short(b));
         if a.min(b) <= equals - within && a.max(b) >= equals + within {
             return Ok(Some(said));
@@ -983,14 +998,14 @@ enum Onset {
 
 /// Place where the outcome becomes this word, along a column whose values go one way. Rows whose
 /// outcome is open make it wider.
-fn onset(table: &Table, column: &str, word: &str) -> Result<Onset, String> {
+fn onset(table: &Table, column: &str, word: &str, rtol: f64) -> Result<Onset, String> {
     let values = tables::column(table, column)?;
     let rows: Vec<(f64, Option<bool>)> = match outcomes(table) {
         Some(outcomes) => {
             let is = |o: &&str| if is_open(o) { None } else { Some(*o == word) };
             values.iter().copied().zip(outcomes.iter().map(is)).collect()
         }
-        None => periods(table, &values)
+        None => periods(table, &values, rtol)
             .into_iter()
             .map(|(value, found)| (value, found.map(|n| Some(n) == period_of(word))))
             .collect(),
@@ -1017,8 +1032,9 @@ fn onset(table: &Table, column: &str, word: &str) -> Result<Onset, String> {
     }
 }
 
-/// Periods of an orbit diagram's points, value by value; none if they do not come back.
-fn periods(table: &Table, values: &[f64]) -> Vec<(f64, Option<usize>)> {
+/// Periods of an orbit diagram's points, value by value; none if they do not come back, or errors
+/// of a run may be what tells them apart.
+fn periods(table: &Table, values: &[f64], rtol: f64) -> Vec<(f64, Option<usize>)> {
     let states = table.columns.iter().skip_while(|c| c.name != "t").skip(1);
     let states: Vec<&[f64]> = states.map(|c| table.numbers(&c.name)).collect();
     let mut found = Vec::new();
@@ -1028,7 +1044,8 @@ fn periods(table: &Table, values: &[f64]) -> Vec<(f64, Option<usize>)> {
         from = rows.end;
         let points: Vec<Vec<f64>> = rows.map(|i| states.iter().map(|s| s[i]).collect()).collect();
         let period = period(&points, REPEATS).or_else(|| approached(&points));
-        found.push((group[0], period));
+        let is_told = blurred(&points, REPEATS, rtol, period).is_none();
+        found.push((group[0], period.filter(|_| is_told)));
     }
     found
 }
@@ -1046,22 +1063,22 @@ fn undecided(said: &str) -> String {
 }
 
 impl Check {
-    /// Whether it holds of these answers, and what was found.
-    fn of(&self, answers: &[Arc<Answer>]) -> Result<(bool, String), String> {
+    /// Whether it holds of these answers of runs at this tolerance, and what was found.
+    fn of(&self, answers: &[Arc<Answer>], rtol: f64) -> Result<(bool, String), String> {
         let first = &answers[0];
         match self {
             Check::Value { read, equals, within } => {
-                if let Some(said) = read.never(first, *equals, *within)? {
+                if let Some(said) = read.never(first, rtol, [*equals, *within])? {
                     return Ok((false, said));
                 }
-                let found = read.measured(first)?;
+                let found = read.measured(first, rtol)?;
                 let off = (found.value - equals).abs();
                 let said = format!("{found} ({equals} claimed, {} off)", short(off));
                 Ok((is_within(off, found.half, *within, &said)?, said))
             }
             Check::Ratio { read, other, equals, within } => {
-                let over = read.measured(first)?;
-                let under = other.measured(answers.last().unwrap_or(first))?;
+                let over = read.measured(first, rtol)?;
+                let under = other.measured(answers.last().unwrap_or(first), rtol)?;
                 let ratio = over.value / under.value;
                 let off = (ratio - equals).abs();
                 let said = format!(
@@ -1076,10 +1093,10 @@ impl Check {
                 Ok((is_within(off, half, *within, &said)?, said))
             }
             Check::Order { read, less, than, other } => {
-                let value = read.measured(first)?;
+                let value = read.measured(first, rtol)?;
                 let than = match (than, other) {
                     (Some(than), _) => Measured::of(*than, 0.0),
-                    (None, Some(other)) => other.measured(answers.last().unwrap_or(first))?,
+                    (None, Some(other)) => other.measured(answers.last().unwrap_or(first), rtol)?,
                     (None, None) => return Err("nothing to compare with".into()),
                 };
                 let more = value.value - than.value;
@@ -1109,6 +1126,13 @@ impl Check {
                     ));
                 }
                 let none = || format!("no period up to {longest}");
+                if let Some(n) = blurred(&points, *within, rtol, found) {
+                    return Err(format!(
+                        "{}, and period {n} but for distances that errors of a run at rtol \
+                            {rtol:e} may have; give a smaller rtol",
+                        found.map_or_else(none, |n| format!("period {n}"))
+                    ));
+                }
                 let still = if reached.is_none() { ", still approached" } else { "" };
                 let said = found.map_or_else(none, |n| format!("period {n}{still}"));
                 Ok((found == Some(*is as usize), said))
@@ -1271,9 +1295,12 @@ impl Extents {
     /// Units of the states: 1, but of one that moves little beside the largest, and by more than
     /// errors, `small` of its extent.
     fn units(&self, small: impl Fn(f64) -> f64) -> Vec<f64> {
-        let moves_little = |span: f64| span > ONE_POINT * self.size && span < LITTLE * self.span;
-        let unit = |span: &f64| if moves_little(*span) { small(*span) } else { 1.0 };
+        let unit = |span: &f64| if self.moves_little(*span) { small(*span) } else { 1.0 };
         self.spans.iter().map(unit).collect()
+    }
+
+    fn moves_little(&self, span: f64) -> bool {
+        span > ONE_POINT * self.size && span < LITTLE * self.span
     }
 }
 
@@ -1297,6 +1324,30 @@ fn period(points: &[Vec<f64>], within: f64) -> Option<usize> {
     // A small orbit that is resolved has its period; of a run's errors alone none repeats.
     repeats(within * span).or_else(|| repeats(within * size).filter(|_| span <= ONE_POINT * size))
 }
+
+/// A shorter period than was found, or one where none was, of points that are the same but for
+/// errors that a run at this tolerance can have: its steps may settle to a cycle of their own, or
+/// to none.
+fn blurred(points: &[Vec<f64>], within: f64, rtol: f64, found: Option<usize>) -> Option<usize> {
+    let extents = Extents::of(points);
+    let near: Vec<f64> = (0..points[0].len())
+        .map(|i| {
+            let moves_little = extents.moves_little(extents.spans[i]);
+            let own = points.iter().fold(0.0, |most: f64, p| most.max(p[i].abs()));
+            let size = if moves_little { own } else { extents.size };
+            let fine = if moves_little { LITTLE_REPEATS * extents.spans[i] } else { f64::INFINITY };
+            fine.min(within * extents.span).max(BLUR * rtol * size)
+        })
+        .collect();
+    let same =
+        |a: &[f64], b: &[f64]| a.iter().zip(b).zip(&near).all(|((a, b), n)| (a - b).abs() <= *n);
+    let longest = found.map_or(LONGEST.min(points.len() / 3), |n| n - 1);
+    (1..=longest).find(|n| points.iter().zip(&points[*n..]).all(|(a, b)| same(a, b)))
+}
+
+/// Errors of a run on a closed orbit, in units of its relative tolerance: of van der Pol's, by
+/// three methods at 1e-3 to 1e-8, they are up to 11.
+const BLUR: f64 = 100.0;
 
 /// The period of an orbit that points still approach: each comes nearer to the one a period before,
 /// quarter by quarter of the section, as evenly as a geometric series (a power of the time slows
@@ -1422,7 +1473,7 @@ mod tests {
             table.push(Vec::from(cells.map(crate::job::Entry::Number)));
         }
         let answer = [Arc::new(Answer::of_tables(vec![table]))];
-        let judged = |is| Check::Period { is, within: 1e-6 }.of(&answer);
+        let judged = |is| Check::Period { is, within: 1e-6 }.of(&answer, 1e-9);
         assert_eq!(judged(1), Ok((false, "no period up to 1".into())));
         assert!(judged(2).unwrap_err().contains("4 times in the later half"));
     }
@@ -1468,7 +1519,7 @@ mod tests {
                 ]);
             }
             let answer = [Arc::new(Answer::of_tables(vec![table]))];
-            let judged = Check::Period { is: 1, within: 1e-6 }.of(&answer).unwrap();
+            let judged = Check::Period { is: 1, within: 1e-6 }.of(&answer, 0.0).unwrap();
             assert_eq!(judged, (radius > 0.0, found.into()));
         }
     }
@@ -1554,7 +1605,7 @@ mod tests {
     #[test]
     fn an_onset_lies_between_rows_that_are_decided() {
         let [one, two, open] = ["period-1", "period-2", "undecided"];
-        let of = |outcomes: &[(f64, &str)]| onset(&rows(outcomes), "p", two);
+        let of = |outcomes: &[(f64, &str)]| onset(&rows(outcomes), "p", two, 0.0);
         assert_eq!(of(&[(1.0, one), (2.0, two), (3.0, one)]), Ok(Onset::Between(1.0, 2.0)));
         let widened = of(&[(4.0, one), (3.0, open), (2.0, "failed"), (1.0, two)]);
         assert_eq!(widened, Ok(Onset::Between(4.0, 1.0)));
@@ -1573,11 +1624,12 @@ mod tests {
         let (table, word) = (None, Some(two.to_owned()));
         let read = Read::Column { table, column: "p".into(), take: Take::Onset, word };
         let answer = [Arc::new(Answer::of_tables(vec![rows(&[(1.0, one), (2.0, one)])]))];
-        let judged = |equals| Check::Value { read: read.clone(), equals, within: 0.25 }.of(&answer);
+        let judged =
+            |equals| Check::Value { read: read.clone(), equals, within: 0.25 }.of(&answer, 0.0);
         assert_eq!(judged(1.5).map(|(agrees, _)| agrees), Ok(false));
         assert!(judged(1.9).unwrap_err().contains("do not reach so far"));
         let order = Check::Order { read, less: false, than: Some(1.5), other: None };
-        assert!(order.of(&answer).unwrap_err().contains("does not begin"));
+        assert!(order.of(&answer, 0.0).unwrap_err().contains("does not begin"));
     }
 
     /// Wilson's interval of 9 of 10 is 0.596 to 0.982; rows that are open may be of either kind.
@@ -1619,8 +1671,44 @@ mod tests {
             table.push(cells.map(crate::job::Entry::Number));
         }
         let values = table.numbers("params.p").to_vec();
-        assert_eq!(periods(&table, &values), [(1.0, Some(1)), (2.0, Some(2)), (4.0, None)]);
-        assert_eq!(onset(&table, "params.p", "period-2"), Ok(Onset::Between(1.0, 2.0)));
+        assert_eq!(periods(&table, &values, 1e-9), [(1.0, Some(1)), (2.0, Some(2)), (4.0, None)]);
+        assert_eq!(onset(&table, "params.p", "period-2", 1e-9), Ok(Onset::Between(1.0, 2.0)));
+    }
+
+    /// Steps that settle to a cycle of three turns, or to none, on an orbit of one: van der Pol's
+    /// at rtol 1e-3 to 1e-8 (mu = 1, 3, 8) by dopri5, lsoda and radau5 have such errors.
+    #[test]
+    fn errors_of_a_run_have_no_period() {
+        let section = |x: &dyn Fn(i32) -> f64| {
+            let columns = ["t", "x", "v"].map(crate::job::Column::numbers);
+            let mut table = Table::new("section", columns);
+            for i in 0..60 {
+                table.push([f64::from(i), x(i), 0.0].map(crate::job::Entry::Number));
+            }
+            [Arc::new(Answer::of_tables(vec![table]))]
+        };
+        let judged = |answer: &[Arc<Answer>; 1], is, rtol| {
+            Check::Period { is, within: 1e-6 }.of(answer, rtol)
+        };
+        let locked = section(&|i| 2.0086 + 2e-5 * f64::from(i % 3));
+        let unsettled = section(&|i| 2.0086 + 1e-5 * f64::from(i * i).sin());
+        for answer in [&locked, &unsettled] {
+            for is in [1, 3] {
+                let why = judged(answer, is, 1e-4).unwrap_err();
+                assert!(why.contains("period 1 but") && why.contains("rtol 1e-4"), "{why}");
+            }
+        }
+        assert_eq!(judged(&locked, 3, 1e-9), Ok((true, "period 3".into())));
+        assert!(judged(&unsettled, 1, 1e-9).unwrap().1.starts_with("no period"));
+        // Points that are farther apart than errors are an orbit's.
+        let apart = section(&|i| 2.0 + 0.5 * f64::from(i % 3));
+        assert_eq!(judged(&apart, 3, 1e-4), Ok((true, "period 3".into())));
+        let still = section(&|i| 2.0 + 1e-15 * f64::from(i % 2));
+        assert_eq!(judged(&still, 1, 1e-3), Ok((true, "period 1".into())));
+        let mut table = locked[0].tables[0].clone();
+        table.name = "passages".into();
+        assert_eq!(periods(&table, &[0.0; 60], 1e-4), [(0.0, None)]);
+        assert_eq!(periods(&table, &[0.0; 60], 1e-9), [(0.0, Some(3))]);
     }
 
     /// Crossings that differ by the errors of a run are one point.
@@ -1654,7 +1742,7 @@ mod tests {
             Arc::new(Answer::of_tables(Vec::new()).with_fact("exponents", &rates))
         };
         let read = |i: usize| Read::Fact { path: format!("exponents/{i}/value"), modulus: false };
-        let judged = |check: Check, other: f64| check.of(&[of(0.902), of(other)]);
+        let judged = |check: Check, other: f64| check.of(&[of(0.902), of(other)], 0.0);
         let order = |i, less, than, other| Check::Order { read: read(i), less, than, other };
         for less in [true, false] {
             let found = judged(order(0, less, None, Some(read(0))), 0.909).unwrap_err();
@@ -1678,7 +1766,7 @@ mod tests {
         let judged = |value: f64, half_width| {
             let rates = [MeanRate { value: Some(value), half_width }];
             let answer = Answer::of_tables(Vec::new()).with_fact("exponents", &rates);
-            Check::Chaos.of(&[Arc::new(answer)]).map(|(agrees, _)| agrees)
+            Check::Chaos.of(&[Arc::new(answer)], 0.0).map(|(agrees, _)| agrees)
         };
         assert_eq!((judged(0.5, 0.1), judged(-0.5, 0.1)), (Ok(true), Ok(false)));
         for value in [0.0031, -0.0031, 0.0] {
@@ -1702,7 +1790,7 @@ mod tests {
         let other = read.of_the_other(Some(&path));
         let check = Check::Ratio { read: read.clone(), other, equals: 0.25, within: 1e-12 };
         let answers = [answer([3.0, 4.0]), answer([6.0, 8.0])];
-        assert_eq!(check.of(&answers).map(|(agrees, _)| agrees), Ok(true));
+        assert_eq!(check.of(&answers, 0.0).map(|(agrees, _)| agrees), Ok(true));
         assert_eq!(read.of_the_other(None), read);
     }
 
