@@ -76,7 +76,7 @@ function prepare(folder) {
   const ready = argument('--figures');
   if (ready) ['fig2', 'fig6'].forEach((id) => cpSync(join(ready, id), join(figures, id), { recursive: true }));
   else execFileSync(binary('twofold'), ['figure', 'fig2', 'fig6', '--fresh', '--out', figures, '--quiet']);
-  const { version } = JSON.parse(readFileSync(join(root, 'figures', 'fig6', 'expected.json'), 'utf8'));
+  const { version } = JSON.parse(readFileSync(join(root, 'papers', 'jeffrey-2013', 'expected', 'fig6.json'), 'utf8'));
   let forced = null;
   // Beside the figures' folders there is making.json.
   for (const id of readdirSync(figures, { withFileTypes: true }).filter((entry) => entry.isDirectory()).map((entry) => entry.name)) {

@@ -100,15 +100,21 @@ pub fn of_the_project(findings: &str) -> Vec<String> {
 /// Sections of docs/census.md and docs/parameters.md with paragraphs and tables, as HTML blocks.
 pub fn of_the_odds(page: &str) -> Vec<String> {
     let mut heading = String::new();
-    let mut tables = 0;
+    let (mut tables, mut in_section) = (0, 0);
     let mut blocks = Vec::new();
     for block in page.split("\n\n").map(str::trim) {
         if let Some(text) = block.strip_prefix("## ").or_else(|| block.strip_prefix("# ")) {
             heading = inline(text);
+            in_section = 0;
             blocks.push(format!("<h3>{heading}</h3>"));
         } else if block.starts_with("| ") {
-            tables += 1;
-            blocks.push(table(block, &heading, tables));
+            (tables, in_section) = (tables + 1, in_section + 1);
+            // Each has a name of its own for screen readers.
+            let caption = match in_section {
+                1 => heading.clone(),
+                more => format!("{heading}, table {more}"),
+            };
+            blocks.push(table(block, &caption, tables));
         } else if !heading.is_empty()
             && !block.is_empty()
             && !block.starts_with("<!--")
@@ -148,7 +154,7 @@ pub fn occurring(page: &str) -> Option<Occurring> {
     found
 }
 
-/// A table of Markdown; its caption is the section's heading.
+/// A table of Markdown.
 fn table(markdown: &str, caption: &str, number: usize) -> String {
     let row = |line: &str, [open, close]: [&str; 2]| {
         let line = line.trim();
@@ -258,6 +264,12 @@ mod tests {
         let rows = page.lines().filter(|l| l.starts_with('|') && !l.starts_with("|---")).count();
         assert_eq!(tables.iter().map(|t| t.matches("<tr>").count()).sum::<usize>(), rows);
         assert!(tables[0].contains("<td>7(ii)</td><td>period three</td>"), "{}", tables[0]);
+        let caption = |table: &&String| {
+            let (_, text) = table.split_once("<caption ").unwrap();
+            text.split_once("</caption>").unwrap().0.split_once('>').unwrap().1.to_owned()
+        };
+        let captions: std::collections::BTreeSet<String> = tables.iter().map(caption).collect();
+        assert_eq!(captions.len(), tables.len(), "{captions:?}");
         // 7(i), 8(ii) and 8(iii) as printed.
         assert_eq!(occurring(page), Some(Occurring { panels: [3, 6], of: 6, runs: 300 }));
         assert_eq!(occurring("no table"), None);
