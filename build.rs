@@ -10,6 +10,10 @@ fn main() {
     let variable = |name: &str| std::env::var(name).unwrap_or_else(|_| "unknown".into());
     let rustc =
         said(Command::new(variable("RUSTC")).arg("--version")).unwrap_or_else(|| "unknown".into());
+    // Cargo's `strip` passes over packages with an optimisation of their own, as this one.
+    if variable("PROFILE") == "release" && variable("CARGO_CFG_TARGET_OS") == "linux" {
+        println!("cargo::rustc-link-arg-bins=-Wl,--strip-all");
+    }
     // Only releases carry their commit: a debug build would be made anew after every one.
     let commit = if variable("PROFILE") == "release" {
         commit()

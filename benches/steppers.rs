@@ -7,7 +7,7 @@
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput};
-use nalgebra::{SVector, vector};
+use nalgebra::{SVector, Vector3, Vector4};
 use twofold::integrate::{
     Dopri5, DriveOptions, Failure, Flow, Lsoda, Observer, Radau5, Schedule, Statistics, Step,
     StepCap, Stepper, Summary, Tolerance, drive,
@@ -114,11 +114,12 @@ fn counts(t_end: f64) {
         };
     for (reading, alpha) in READINGS {
         for method in METHODS {
-            let result = by_name(method, &smoothed(alpha), vector![0.2, 0.0, -1.0], t_end);
+            let result = by_name(method, &smoothed(alpha), Vector3::new(0.2, 0.0, -1.0), t_end);
             print(&format!("smoothed {reading}"), method, result);
         }
         for method in METHODS {
-            let result = by_name(method, &hysteretic(alpha), vector![0.2, 0.0, -1.0, 1.0], t_end);
+            let result =
+                by_name(method, &hysteretic(alpha), Vector4::new(0.2, 0.0, -1.0, 1.0), t_end);
             print(&format!("hysteretic {reading}"), method, result);
         }
     }
@@ -132,7 +133,12 @@ fn times(criterion: &mut Criterion) {
         for method in METHODS {
             group.bench_function(BenchmarkId::from_parameter(method), |b| {
                 b.iter(|| {
-                    by_name(method, &smoothed(black_box(alpha)), vector![0.2, 0.0, -1.0], T_END)
+                    by_name(
+                        method,
+                        &smoothed(black_box(alpha)),
+                        Vector3::new(0.2, 0.0, -1.0),
+                        T_END,
+                    )
                 });
             });
         }
@@ -145,7 +151,7 @@ fn times(criterion: &mut Criterion) {
                     by_name(
                         method,
                         &hysteretic(black_box(alpha)),
-                        vector![0.2, 0.0, -1.0, 1.0],
+                        Vector4::new(0.2, 0.0, -1.0, 1.0),
                         T_END,
                     )
                 });

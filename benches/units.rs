@@ -7,7 +7,7 @@
 use std::process::exit;
 use std::time::Instant;
 
-use nalgebra::{SVector, vector};
+use nalgebra::{SVector, Vector3};
 use twofold::analyse::SectionRecorder;
 use twofold::integrate::ensemble::{EnsembleRun, InstructionSet, ensemble_with};
 use twofold::integrate::{
@@ -60,12 +60,13 @@ fn w1<F: VectorField<3>, M: Stepper<3>>(field: &F, mut stepper: M) -> Done {
         max_steps: u64::MAX,
         kicked_states: 3,
     };
-    let end = drive(field, vector![0.2, 0.0, -1.0], &options, &mut stepper, &mut section, &())?;
+    let end =
+        drive(field, Vector3::new(0.2, 0.0, -1.0), &options, &mut stepper, &mut section, &())?;
     Ok((end.statistics.steps, section.crossings().len(), end.x))
 }
 
 fn w2<F: VectorField<3>, M: Stepper<3>>(field: &F, make: impl Fn() -> M) -> Done {
-    let mut done = (0, 0, vector![0.0, 0.0, 0.0]);
+    let mut done = (0, 0, Vector3::new(0.0, 0.0, 0.0));
     let options = DriveOptions {
         t_end: 2000.0,
         schedule: Schedule::default(),
@@ -75,7 +76,8 @@ fn w2<F: VectorField<3>, M: Stepper<3>>(field: &F, make: impl Fn() -> M) -> Done
     };
     for k in 0..1000 {
         let x = 0.1 + 0.2 * (f64::from(k) + 0.5) / 1000.0;
-        let end = drive(field, vector![x, 0.0, -1.0], &options, &mut make(), &mut Ignore, &())?;
+        let end =
+            drive(field, Vector3::new(x, 0.0, -1.0), &options, &mut make(), &mut Ignore, &())?;
         done = (done.0 + end.statistics.steps, 0, end.x);
     }
     Ok(done)
@@ -85,12 +87,12 @@ fn w2<F: VectorField<3>, M: Stepper<3>>(field: &F, make: impl Fn() -> M) -> Done
 fn w2_in_lanes<E: BatchedField<3>>(equations: &E, set: InstructionSet) -> Done {
     let options = DriveOptions { step_cap: StepCap::Absolute(10.0), ..DriveOptions::to(2000.0) };
     let run = |k: u32| EnsembleRun {
-        start: vector![0.1 + 0.2 * (f64::from(k) + 0.5) / 1000.0, 0.0, -1.0],
+        start: Vector3::new(0.1 + 0.2 * (f64::from(k) + 0.5) / 1000.0, 0.0, -1.0),
         options,
     };
     let runs: Vec<_> = (0..1000).map(run).collect();
     let ends = ensemble_with(set, equations, &runs, TOLERANCE, None, |_| Ignore);
-    ends.into_iter().try_fold((0, 0, vector![0.0, 0.0, 0.0]), |done, end| {
+    ends.into_iter().try_fold((0, 0, Vector3::new(0.0, 0.0, 0.0)), |done, end| {
         let end = end.summary?;
         Ok((done.0 + end.statistics.steps, 0, end.x))
     })
@@ -99,7 +101,7 @@ fn w2_in_lanes<E: BatchedField<3>>(equations: &E, set: InstructionSet) -> Done {
 /// W0: the short stretch on which the error is known.
 fn w0<F: VectorField<3>, M: Stepper<3>>(field: &F, mut stepper: M) -> Done {
     let options = DriveOptions { step_cap: StepCap::Absolute(10.0), ..DriveOptions::to(10.0) };
-    let end = drive(field, vector![0.2, 0.0, -1.0], &options, &mut stepper, &mut Ignore, &())?;
+    let end = drive(field, Vector3::new(0.2, 0.0, -1.0), &options, &mut stepper, &mut Ignore, &())?;
     Ok((end.statistics.steps, 0, end.x))
 }
 
@@ -108,7 +110,7 @@ fn w3<F: VectorField<3>>(field: &F) -> Done {
     let options = DriveOptions { step_cap: StepCap::Absolute(10.0), ..DriveOptions::to(300.0) };
     let end = drive(
         field,
-        vector![0.2, 0.0, -1.0],
+        Vector3::new(0.2, 0.0, -1.0),
         &options,
         &mut Taylor::extended(EXACT),
         &mut Ignore,

@@ -9,7 +9,7 @@ use std::error::Error;
 use std::fs::{OpenOptions, read_to_string};
 use std::io::Write;
 
-use nalgebra::{SVector, vector};
+use nalgebra::{SVector, Vector3, Vector4};
 use serde_json::{Value, json};
 use twofold::analyse::attractor::{Question, SectionPoint, Thresholds, classify};
 use twofold::analyse::{Crossing, Direction};
@@ -228,7 +228,7 @@ fn passages(reading: Reading, rule: Rule, number: u64) -> Result<Passed, Box<dyn
         (reading.caricature(), reading.caricature().into());
     let mut passed = Passed::default();
     for _ in 0..passages {
-        let x0 = vector![0.0, random.uniform_in(low, high), random.uniform_in(low, high)];
+        let x0 = Vector3::new(0.0, random.uniform_in(low, high), random.uniform_in(low, high));
         let beyond = beyond * scale(rule);
         match (delay(rule), relaxation(rule)) {
             (Some(delay), _) => {
@@ -245,7 +245,7 @@ fn passages(reading: Reading, rule: Rule, number: u64) -> Result<Passed, Box<dyn
             (None, Some(relaxation)) => {
                 let (system, eps, eps_prime) = (caricature, EPS, RELAXATION * EPS);
                 let field = Hysteretic { system, eps, eps_prime, relaxation };
-                let start = vector![x0[0], x0[1], x0[2], 1.0];
+                let start = Vector4::new(x0[0], x0[1], x0[2], 1.0);
                 passed.follow(&field, &mut Dopri5::new(TOLERANCE), start, beyond)?;
             }
             (None, None) => {

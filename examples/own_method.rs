@@ -3,7 +3,7 @@
 //!
 //! `cargo run --example own_method`
 
-use nalgebra::{SVector, vector};
+use nalgebra::{SVector, Vector2};
 use twofold::analyse::SectionRecorder;
 use twofold::integrate::{
     Dopri5, DriveOptions, Failure, Interpolant, Statistics, Step, Stepper, Tolerance, drive,
@@ -101,7 +101,7 @@ struct Pendulum;
 
 impl VectorField<2> for Pendulum {
     fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-        vector![x[1], -x[0].sin()]
+        Vector2::new(x[1], -x[0].sin())
     }
 }
 
@@ -110,7 +110,7 @@ fn passages<M: Stepper<2>>(mut method: M) -> Result<Vec<f64>, Failure> {
     let mut section = SectionRecorder::<2>::new(0, 0.0);
     let _ = drive(
         &Pendulum,
-        vector![1.0, 0.0],
+        Vector2::new(1.0, 0.0),
         &DriveOptions::to(30.0),
         &mut method,
         &mut section,

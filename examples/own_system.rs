@@ -4,7 +4,7 @@
 //!
 //! `cargo run --example own_system`
 
-use nalgebra::{SVector, vector};
+use nalgebra::{SVector, Vector2};
 use twofold::integrate::filippov::{
     ExitRule, FilippovError, FilippovOptions, ModeEvent, Side, Trajectory, run,
 };
@@ -20,10 +20,10 @@ impl PiecewiseSmooth<2> for Refuge {
         x[0] - S::from_f64(self.prey_needed)
     }
     fn plus<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-        vector![x[0] - x[0] * x[1], x[0] * x[1] - x[1].scale(0.5)]
+        Vector2::new(x[0] - x[0] * x[1], x[0] * x[1] - x[1].scale(0.5))
     }
     fn minus<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-        vector![x[0], -x[1].scale(0.5)]
+        Vector2::new(x[0], -x[1].scale(0.5))
     }
 }
 
@@ -38,7 +38,7 @@ pub fn follow() -> Result<Vec<ModeEvent<2>>, FilippovError> {
     let mut record = Trajectory::new(4);
     let _ = run(
         &Refuge { prey_needed: 1.0 },
-        vector![2.0, 0.8],
+        Vector2::new(2.0, 0.8),
         40.0,
         &FilippovOptions::default(),
         rule,

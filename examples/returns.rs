@@ -5,7 +5,7 @@
 //!
 //! `make returns`, or `cargo run --release --example returns`
 
-use nalgebra::{SVector, vector};
+use nalgebra::{SVector, Vector3};
 use twofold::analyse::counts::wilson;
 use twofold::integrate::filippov::{
     EventKind, ExitRule, FilippovError, FilippovObserver, FilippovOptions, Mode, ModeEvent, Side,
@@ -48,7 +48,7 @@ pub fn back(system: &Caricature, box_size: f64, starts: u64) -> Result<u64, Fili
     for k in 0..starts {
         let mut random = RandomStream::new(2013, k);
         let start: SVector<f64, 3> =
-            vector![0.0, random.uniform_in(-box_size, 0.0), random.uniform_in(-box_size, 0.0)];
+            Vector3::new(0.0, random.uniform_in(-box_size, 0.0), random.uniform_in(-box_size, 0.0));
         let side = if k % 2 == 0 { Side::Plus } else { Side::Minus };
         let mut seen = Back::default();
         let _ = run(system, start, WITHIN, &settings, ExitRule::AtOnce { side }, &mut seen)?;

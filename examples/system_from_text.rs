@@ -4,7 +4,7 @@
 //!
 //! `cargo run --example system_from_text`
 
-use nalgebra::vector;
+use nalgebra::Vector2;
 use twofold::integrate::filippov::{ExitRule, FilippovOptions, Side, Trajectory, run};
 use twofold::system::{Definition, System};
 
@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut record = Trajectory::new(4);
     let end = run(
         &system.bind::<2>()?,
-        vector![2.0, 0.8],
+        Vector2::new(2.0, 0.8),
         40.0,
         &FilippovOptions::default(),
         rule,

@@ -8,7 +8,7 @@
 mod clock;
 
 use clock::measure;
-use nalgebra::{SVector, vector};
+use nalgebra::{SVector, Vector3};
 use twofold::hybrid::motion::{Method as GeneralMethod, Record};
 use twofold::hybrid::{Definition as General, Model, Options, follow};
 use twofold::integrate::delay::{Delayed, History, Inside, LateSwitch, Own, Sides};
@@ -192,7 +192,7 @@ fn reference() -> Option<()> {
         let p = problem(name)?;
         let field: BoundField<3> =
             Field::smoothed(&system(&p)?, Transition::Tanh, EPS).bind().ok()?;
-        let start = vector![p.start[0], p.start[1], p.start[2]];
+        let start = Vector3::new(p.start[0], p.start[1], p.start[2]);
         let options = DriveOptions::to(p.t_end);
         let ([x, y, z], steps) =
             method.with_stepper(tolerance, To { field: &field, start, options }).ok()?;

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 const CRATES: [(&str, &[&str], &[&str]); 14] = [
     ("digest", &[], &["proc-macro2"]),
     // The only crate that names a math library or a random generator.
-    ("num", &[], &["libm", "rand", "rand_chacha"]),
+    ("num", &[], &["libm", "rand"]),
     // Shares nothing with what it checks.
     ("verify", &[], &["num-bigint"]),
     ("system", &["num"], &[]),

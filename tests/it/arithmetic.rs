@@ -9,7 +9,7 @@
 
 use std::hint::black_box;
 
-use nalgebra::{SVector, vector};
+use nalgebra::{SVector, Vector3};
 use twofold::num::{Arithmetic, DoubleDouble};
 
 /// The next number above one.
@@ -29,7 +29,8 @@ fn products_and_sums_are_not_fused() {
     assert_eq!(separate(a, b, c), 0.0);
     // The same in the shapes in which the integrators compute: a vector plus a product, sums of
     // products.
-    let (x, k) = (black_box(vector![-1.0, -1.0, -1.0]), black_box(vector![ABOVE, ABOVE, ABOVE]));
+    let (x, k) =
+        (black_box(Vector3::new(-1.0, -1.0, -1.0)), black_box(Vector3::new(ABOVE, ABOVE, ABOVE)));
     assert_eq!(x + k * b, SVector::<f64, 3>::zeros());
     let mut sum = -1.0;
     for (a, b) in black_box([ABOVE, 0.0]).iter().zip(black_box([BELOW, 0.0])) {

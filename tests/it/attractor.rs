@@ -1,7 +1,7 @@
 //! Verdicts, exponents and multipliers on systems whose answers are known.
 #![allow(clippy::disallowed_methods)] // exact solutions are compared to tolerances, not hashed
 
-use nalgebra::{SVector, vector};
+use nalgebra::{SVector, Vector2, Vector3, Vector4};
 use twofold::analyse::attractor::{
     Evidence, Question, SectionPoint, Thresholds, Verdict, classify,
 };
@@ -20,7 +20,11 @@ struct Lorenz;
 impl VectorField<3> for Lorenz {
     fn eval<S: Elementary>(&self, s: &SVector<S, 3>) -> SVector<S, 3> {
         let [x, y, z] = [s[0], s[1], s[2]];
-        vector![(y - x).scale(10.0), x * (S::from_f64(28.0) - z) - y, x * y - z.scale(8.0 / 3.0)]
+        Vector3::new(
+            (y - x).scale(10.0),
+            x * (S::from_f64(28.0) - z) - y,
+            x * y - z.scale(8.0 / 3.0),
+        )
     }
 }
 
@@ -29,7 +33,7 @@ struct Rossler(f64);
 impl VectorField<3> for Rossler {
     fn eval<S: Elementary>(&self, s: &SVector<S, 3>) -> SVector<S, 3> {
         let [x, y, z] = [s[0], s[1], s[2]];
-        vector![-y - z, x + y.scale(0.2), S::from_f64(0.2) + z * (x - S::from_f64(self.0))]
+        Vector3::new(-y - z, x + y.scale(0.2), S::from_f64(0.2) + z * (x - S::from_f64(self.0)))
     }
 }
 
@@ -37,7 +41,7 @@ impl VectorField<3> for Rossler {
 struct VanDerPol;
 impl VectorField<2> for VanDerPol {
     fn eval<S: Elementary>(&self, s: &SVector<S, 2>) -> SVector<S, 2> {
-        vector![s[1], (S::one() - s[0] * s[0]) * s[1] - s[0]]
+        Vector2::new(s[1], (S::one() - s[0] * s[0]) * s[1] - s[0])
     }
 }
 
@@ -54,7 +58,7 @@ impl VectorField<3> for Torus {
         let r = (x * x + y * y).sqrt();
         let d = r - S::from_f64(2.0);
         let radial = (-(z.scale(self.omega)) - d.scale(self.gamma)) / r;
-        vector![x * radial - y, y * radial + x, d.scale(self.omega) - z.scale(self.gamma)]
+        Vector3::new(x * radial - y, y * radial + x, d.scale(self.omega) - z.scale(self.gamma))
     }
 }
 
@@ -156,11 +160,11 @@ fn logistic(mu: f64, n: usize) -> Vec<SectionPoint> {
 fn lorenz() {
     let settings =
         lyapunov::LyapunovOptions { transient: 20.0, duration: 2000.0, ..Default::default() };
-    let e = largest::<3, 6, _>(&Lorenz, vector![1.0, 1.0, 20.0], &settings).unwrap();
+    let e = largest::<3, 6, _>(&Lorenz, Vector3::new(1.0, 1.0, 20.0), &settings).unwrap();
     // 0.9056 (Sprott 2003, "Chaos and Time-Series Analysis", appendix A).
     assert!(e.standard_error < 0.02, "{e:?}");
     assert!((e.value - 0.9056).abs() < 3.0 * e.standard_error, "{e:?}");
-    let points = section(&Lorenz, vector![1.0, 1.0, 20.0], 1000.0, 2, 27.0, [0, 1]);
+    let points = section(&Lorenz, Vector3::new(1.0, 1.0, 20.0), 1000.0, 2, 27.0, [0, 1]);
     for lyapunov in [None, Some(e)] {
         let found = classify(
             &points,
@@ -175,16 +179,17 @@ fn lorenz() {
 fn rossler() {
     let settings =
         lyapunov::LyapunovOptions { transient: 200.0, duration: 6000.0, ..Default::default() };
-    let e = largest::<3, 6, _>(&Rossler(5.7), vector![1.0, 1.0, 1.0], &settings).unwrap();
+    let e = largest::<3, 6, _>(&Rossler(5.7), Vector3::new(1.0, 1.0, 1.0), &settings).unwrap();
     // 0.0714 (Sprott 2003).
     assert!(e.standard_error < 0.004, "{e:?}");
     assert!((e.value - 0.0714).abs() < 3.0 * e.standard_error, "{e:?}");
-    let chaotic = judge(&section(&Rossler(5.7), vector![1.0, 1.0, 1.0], 3000.0, 1, 0.0, [0, 2]));
+    let chaotic =
+        judge(&section(&Rossler(5.7), Vector3::new(1.0, 1.0, 1.0), 3000.0, 1, 0.0, [0, 2]));
     assert_eq!(chaotic.name, "chaotic", "{chaotic:?}");
     // Before its period doublings: one loop at c = 2.5, two at 3.5 (Rossler's cascade; periods 1
     // and 2).
     for (c, period) in [(2.5, 1), (3.5, 2)] {
-        let e = judge(&section(&Rossler(c), vector![1.0, 1.0, 1.0], 3000.0, 1, 0.0, [0, 2]));
+        let e = judge(&section(&Rossler(c), Vector3::new(1.0, 1.0, 1.0), 3000.0, 1, 0.0, [0, 2]));
         assert_eq!(
             (e.name.as_str(), e.verdict.cycle().unwrap().period),
             ("periodic", period),
@@ -204,7 +209,7 @@ fn henon_section_is_chaotic_with_its_exponent() {
 
 #[test]
 fn van_der_pol() {
-    let e = judge(&section(&VanDerPol, vector![0.1, 0.0], 300.0, 1, 0.0, [0, 1]));
+    let e = judge(&section(&VanDerPol, Vector2::new(0.1, 0.0), 300.0, 1, 0.0, [0, 1]));
     let Verdict::Periodic(cycle) = &e.verdict else { panic!("{e:?}") };
     // Period 6.66328686 and amplitude 2.00861986 (Andersen & Geer 1982).
     assert_eq!((cycle.period, cycle.points.len()), (1, 2));
@@ -220,7 +225,7 @@ fn van_der_pol() {
         &VanDerPol,
         plane,
         1,
-        vector![-2.2, 0.0],
+        Vector2::new(-2.2, 0.0),
         &floquet::FloquetOptions::default(),
     )
     .unwrap();
@@ -230,12 +235,12 @@ fn van_der_pol() {
     struct WithDivergence;
     impl VectorField<3> for WithDivergence {
         fn eval<S: Elementary>(&self, s: &SVector<S, 3>) -> SVector<S, 3> {
-            let f = VanDerPol.eval(&vector![s[0], s[1]]);
-            vector![f[0], f[1], S::one() - s[0] * s[0]]
+            let f = VanDerPol.eval(&Vector2::new(s[0], s[1]));
+            Vector3::new(f[0], f[1], S::one() - s[0] * s[0])
         }
     }
     let mut stepper = Dopri5::new(Tolerance { rtol: 1e-12, atol: 1e-12 });
-    let x0 = vector![o.points[0][0], o.points[0][1], 0.0];
+    let x0 = Vector3::new(o.points[0][0], o.points[0][1], 0.0);
     let turn =
         drive(&WithDivergence, x0, &DriveOptions::to(o.period), &mut stepper, &mut Ignore, &())
             .unwrap();
@@ -246,7 +251,7 @@ fn van_der_pol() {
 fn torus_is_quasi_periodic() {
     // Omega 0.6180...: as far from a closed curve as it gets.
     let torus = Torus { omega: 0.618_033_988_749_894_9, gamma: 0.0 };
-    let e = judge(&section(&torus, vector![2.7, 0.0, 0.0], 8000.0, 1, 0.0, [0, 2]));
+    let e = judge(&section(&torus, Vector3::new(2.7, 0.0, 0.0), 8000.0, 1, 0.0, [0, 2]));
     let Verdict::QuasiPeriodic(cycle) = &e.verdict else { panic!("{e:?}") };
     assert_eq!(cycle.period, 1);
     assert!((cycle.radius - 0.7).abs() < 1e-3, "{cycle:?}");
@@ -261,7 +266,7 @@ fn torus_is_quasi_periodic() {
 #[test]
 fn resonant_torus_is_periodic() {
     let torus = Torus { omega: 0.4, gamma: 0.0 };
-    let e = judge(&section(&torus, vector![2.7, 0.0, 0.0], 8000.0, 1, 0.0, [0, 2]));
+    let e = judge(&section(&torus, Vector3::new(2.7, 0.0, 0.0), 8000.0, 1, 0.0, [0, 2]));
     assert!(matches!(&e.verdict, Verdict::Periodic(c) if c.period == 5), "{e:?}");
 }
 
@@ -270,7 +275,7 @@ fn damped_spiral_has_its_rate() {
     // The reconstructed system's rates (1e-5 to 1e-4 per unit time) over a tenth of its length.
     for gamma in [3e-5, 1e-4] {
         let torus = Torus { omega: 0.3636, gamma };
-        let e = judge(&section(&torus, vector![2.3, 0.0, 0.0], 12_000.0, 1, 0.0, [0, 2]));
+        let e = judge(&section(&torus, Vector3::new(2.3, 0.0, 0.0), 12_000.0, 1, 0.0, [0, 2]));
         let Verdict::Spiralling(cycle) = &e.verdict else { panic!("{e:?}") };
         assert_eq!(cycle.period, 1);
         let rate = cycle.approach.unwrap();
@@ -284,7 +289,7 @@ fn damped_spiral_has_its_rate() {
     // Faster, the same approach ends in dots.
     let e = judge(&section(
         &Torus { omega: 0.3636, gamma: 3e-3 },
-        vector![2.3, 0.0, 0.0],
+        Vector3::new(2.3, 0.0, 0.0),
         12_000.0,
         1,
         0.0,
@@ -308,7 +313,7 @@ fn closed_orbit_of_the_torus_has_its_multipliers() {
         &torus,
         plane,
         1,
-        vector![2.1, 0.0, 0.05],
+        Vector3::new(2.1, 0.0, 0.05),
         &floquet::FloquetOptions::default(),
     )
     .unwrap();
@@ -349,7 +354,7 @@ fn short_sections() {
     // 47 points of a ring leave holes; 160 do not.
     for (t_end, expected) in [(300.0, "too-few"), (1000.0, "quasi-periodic")] {
         let torus = Torus { omega: 0.618, gamma: 0.0 };
-        let e = judge(&section(&torus, vector![2.7, 0.0, 0.0], t_end, 1, 0.0, [0, 2]));
+        let e = judge(&section(&torus, Vector3::new(2.7, 0.0, 0.0), t_end, 1, 0.0, [0, 2]));
         assert_eq!(e.name, expected, "{t_end}: {e:?}");
     }
     // A few dozen points on no curve: no verdict rather than a wrong one.
@@ -490,7 +495,7 @@ fn a_verdict_does_not_depend_on_units() {
     };
     let torus = section(
         &Torus { omega: 0.3636, gamma: 1e-4 },
-        vector![2.3, 0.0, 0.0],
+        Vector3::new(2.3, 0.0, 0.0),
         8000.0,
         1,
         0.0,
@@ -507,7 +512,14 @@ fn a_verdict_does_not_depend_on_units() {
 #[test]
 fn no_known_answer_hangs_on_the_last_digit_of_a_threshold() {
     let torus = |gamma| {
-        section(&Torus { omega: 0.618, gamma }, vector![2.3, 0.0, 0.0], 12_000.0, 1, 0.0, [0, 2])
+        section(
+            &Torus { omega: 0.618, gamma },
+            Vector3::new(2.3, 0.0, 0.0),
+            12_000.0,
+            1,
+            0.0,
+            [0, 2],
+        )
     };
     let known = [
         (logistic(3.83, 2000), "periodic"),
@@ -584,7 +596,7 @@ fn claims_are_scored_by_one_rule() {
     // A spiral counts as its period, with the reservation written down.
     let spiral = judge(&section(
         &Torus { omega: 0.3636, gamma: 1e-4 },
-        vector![2.3, 0.0, 0.0],
+        Vector3::new(2.3, 0.0, 0.0),
         12_000.0,
         1,
         0.0,
@@ -612,7 +624,7 @@ fn closed_orbits_of_the_paper() {
             &caricature(alpha, beta),
             plane,
             returns,
-            vector![x, 0.0, z],
+            Vector3::new(x, 0.0, z),
             &settings,
         )
         .unwrap()
@@ -678,14 +690,15 @@ fn hysteretic_cycle_contracts_by_its_multiplier() {
     };
     // Each turn passes the singularity, which amplifies the solver's error some 10^6 times: at 1e-9
     // the dots are off by 5e-4.
-    let points = section_to(1e-12, &field, vector![0.2, 0.0, -1.0, 1.0], 600.0, 1, 0.0, [0, 2]);
+    let points =
+        section_to(1e-12, &field, Vector4::new(0.2, 0.0, -1.0, 1.0), 600.0, 1, 0.0, [0, 2]);
     let e = judge(&points);
     assert!(matches!(&e.verdict, Verdict::Periodic(c) if c.period == 2), "{e:?}");
     let cycle = e.verdict.cycle().unwrap();
     let u = cycle.points.iter().find(|p| p.upward).unwrap().u;
     let plane = ReturnPlane { axis: 1, value: 0.0, upward: true };
     // Away from the layer phi is 1 for x > 0 up to relaxation.
-    let guess = vector![u[0], 0.0, u[1], 1.0];
+    let guess = Vector4::new(u[0], 0.0, u[1], 1.0);
     let orbit =
         closed_orbit::<4, 20, _>(&field, plane, 2, guess, &floquet::FloquetOptions::default())
             .unwrap();
@@ -709,7 +722,7 @@ fn hysteretic_cycle_contracts_by_its_multiplier() {
 #[test]
 fn spiral_of_the_reconstructed_reading_has_the_orbits_rate() {
     let field = caricature(1e-1, 1e-5);
-    let points = section(&field, vector![0.84, 0.0, 0.0], 12_000.0, 1, 0.0, [0, 2]);
+    let points = section(&field, Vector3::new(0.84, 0.0, 0.0), 12_000.0, 1, 0.0, [0, 2]);
     let e = judge(&points);
     let Verdict::Spiralling(cycle) = &e.verdict else { panic!("{e:?}") };
     assert_eq!(cycle.period, 1);
@@ -717,7 +730,8 @@ fn spiral_of_the_reconstructed_reading_has_the_orbits_rate() {
     let settings = floquet::FloquetOptions::default();
     let u = cycle.points[0].u;
     let orbit =
-        closed_orbit::<3, 12, _>(&field, plane, 1, vector![u[0], 0.0, u[1]], &settings).unwrap();
+        closed_orbit::<3, 12, _>(&field, plane, 1, Vector3::new(u[0], 0.0, u[1]), &settings)
+            .unwrap();
     assert!(
         (cycle.approach.unwrap().per_time / orbit.rate - 1.0).abs() < 0.05,
         "{cycle:?} {orbit:?}"
@@ -738,7 +752,7 @@ fn exponent_of_the_reconstructed_chaos_converges_in_tolerance() {
             duration: 3000.0,
             ..Default::default()
         };
-        largest::<3, 6, _>(&field, vector![0.2, 0.0, -1.0], &settings).unwrap()
+        largest::<3, 6, _>(&field, Vector3::new(0.2, 0.0, -1.0), &settings).unwrap()
     });
     let error = (loose.standard_error * loose.standard_error
         + tight.standard_error * tight.standard_error)
@@ -752,7 +766,7 @@ fn exponent_on_a_closed_orbit_is_zero() {
     // Along the orbit nothing grows or shrinks on average; across it everything shrinks.
     let settings =
         lyapunov::LyapunovOptions { transient: 500.0, duration: 1000.0, ..Default::default() };
-    let e = largest::<2, 4, _>(&VanDerPol, vector![2.0, 0.0], &settings).unwrap();
+    let e = largest::<2, 4, _>(&VanDerPol, Vector2::new(2.0, 0.0), &settings).unwrap();
     assert!(e.value.abs() < 2e-3, "{e:?}");
 }
 

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::wheel::Wheel;
-use nalgebra::{SVector, vector};
+use nalgebra::{SVector, Vector2, Vector3, Vector4};
 use twofold::analyse::divider::Shared;
 use twofold::analyse::{Crossing, Direction};
 use twofold::integrate::filippov::{
@@ -200,21 +200,21 @@ fn h_is_the_slip_along_the_axle() {
     let (wheel, mut random) = (Wheel::default(), RandomStream::new(2013, 0));
     let mut worst = 0.0_f64;
     for _ in 0..100 {
-        let state = vector![
+        let state = Vector3::new(
             random.uniform_in(0.1, 1.0),
             random.uniform_in(-3.0, 3.0),
-            random.uniform_in(-3.0, 3.0)
-        ];
+            random.uniform_in(-3.0, 3.0),
+        );
         // The wheel stands at (r, d) of the housing, which turns over the disc; its velocity over
         // the disc by a difference quotient.
         let place = |t: f64| {
             let (angle, along) = ((state[2] - wheel.omega0) * t, state[0] + state[1] * t);
             let (s, c) = angle.sin_cos();
-            vector![c * along - s * wheel.d, s * along + c * wheel.d]
+            Vector2::new(c * along - s * wheel.d, s * along + c * wheel.d)
         };
         let step = 1e-5;
         let velocity = (place(step) - place(-step)) / (2.0 * step);
-        let axle = vector![wheel.gamma.sin(), wheel.gamma.cos()];
+        let axle = Vector2::new(wheel.gamma.sin(), wheel.gamma.cos());
         worst = worst.max((velocity.dot(&axle) - wheel.switching(&state)).abs());
     }
     reads.read("2.2", "largest distance between h and the slip along the axle", worst);
@@ -258,12 +258,12 @@ fn a_whole_volume_reaches_the_singularity() {
     for reading in Reading::ALL {
         let (system, mut random) = (reading.caricature(), RandomStream::new(2013, 2));
         // About the paper's start, and backwards about its mirror image in x, y, z.
-        let centre = vector![0.2, 0.0, -1.0];
+        let centre = Vector3::new(0.2, 0.0, -1.0);
         let (mut forwards, mut backwards) = (0, 0);
         for _ in 0..STARTS {
             let shift = in_ball(&mut random, 0.01);
             forwards += visits(&system, centre + shift, 1);
-            backwards += visits(&Reversed(system), vector![0.0, -0.1, -0.1] + shift, 1);
+            backwards += visits(&Reversed(system), Vector3::new(0.0, -0.1, -0.1) + shift, 1);
         }
         let of = |quantity| of(reading, quantity);
         reads.read(
@@ -287,7 +287,7 @@ fn sliding_passes_from_attracting_to_repelling() {
     let normal_form = Caricature::with_reinjection(0.0, 0.0);
     let (mut random, mut passed) = (RandomStream::new(2013, 3), 0);
     for _ in 0..STARTS {
-        let start = vector![0.0, random.uniform_in(0.01, 1.0), random.uniform_in(0.01, 1.0)];
+        let start = Vector3::new(0.0, random.uniform_in(0.01, 1.0), random.uniform_in(0.01, 1.0));
         let rule = ExitRule::AfterTime { time: 1e9, side: Side::Plus };
         let mut out = Trajectory::new(1);
         let _ =
@@ -310,12 +310,12 @@ fn the_constants_satisfy_the_condition() {
     let mut reads = Reads::by("claims::the_constants_satisfy_the_condition");
     // From the equations as they are, at their two-folds, and not from the parameters.
     let caricature = Reading::Printed.caricature();
-    let fold = two_fold(&caricature, &vector![0.01, 0.01, 0.01]).unwrap();
+    let fold = two_fold(&caricature, &Vector3::new(0.01, 0.01, 0.01)).unwrap();
     let (v, w) = normal_form_constants(&caricature, &fold);
     assert!(v < 0.0 && w < 0.0);
     reads.read("3.2", "v w of the printed numbers", v * w);
     let wheel = Wheel::default();
-    let fold = two_fold(&wheel, &vector![0.69, -0.57, -0.87]).unwrap();
+    let fold = two_fold(&wheel, &Vector3::new(0.69, -0.57, -0.87)).unwrap();
     let (v, w) = normal_form_constants(&wheel, &fold);
     assert!(v < 0.0 && w < 0.0);
     reads.read("3.2", "v w of the reconstructed wheel", v * w);
@@ -327,7 +327,7 @@ fn added_terms_are_of_second_order() {
     let (whole, bare) =
         (Reading::Reconstructed.caricature(), Caricature::with_reinjection(0.0, 0.0));
     let added = |size: f64| {
-        let x = vector![0.3, -0.5, 0.8] * size;
+        let x = Vector3::new(0.3, -0.5, 0.8) * size;
         (whole.plus(&x) - bare.plus(&x)).norm() + (whole.minus(&x) - bare.minus(&x)).norm()
     };
     reads.read("4.1", "order of the added terms at the origin", (added(2e-3) / added(1e-3)).log2());
@@ -341,7 +341,7 @@ fn the_smoothed_field_has_bounded_slopes() {
         Smoothed { system: Reading::Reconstructed.caricature(), transition: Transition::Tanh, eps };
     let mut steepest = 0.0_f64;
     for k in 0..2000 {
-        let x = in_ball(&mut random, 1.0).component_mul(&vector![3.0 * eps, 1.0, 1.0]);
+        let x = in_ball(&mut random, 1.0).component_mul(&Vector3::new(3.0 * eps, 1.0, 1.0));
         // Distances from 1e-2 eps to 1e-8 eps: a jump would show as a slope that grows like their
         // inverse.
         let near = x + in_ball(&mut random, 1.0) * eps * 10_f64.powi(-2 - k % 7);
@@ -397,7 +397,7 @@ fn phi_is_drawn_to_its_ends() {
         for (beyond, end) in [(1.01 * eps_prime, 1.0), (-1.01 * eps_prime, 0.0)] {
             // x + eps (2 phi - 1) lies beyond eps prime on one side or the other.
             let x = beyond - eps * (2.0 * phi - 1.0);
-            let rate = field.eval(&vector![x, 0.1, 0.1, phi])[3];
+            let rate = field.eval(&Vector4::new(x, 0.1, 0.1, phi))[3];
             worst = worst.max((eps_prime * rate + phi - end).abs());
         }
     }

@@ -1,7 +1,7 @@
 //! Contract of a stepper, checked on every stepper.
 #![allow(clippy::disallowed_methods)] // exact solutions are compared to tolerances, not hashed
 
-use nalgebra::{SVector, vector};
+use nalgebra::{SVector, Vector1, Vector2, Vector3, Vector4};
 use proptest::prelude::*;
 use twofold::integrate::*;
 use twofold::num::Elementary;
@@ -11,7 +11,7 @@ use twofold::system::{Caricature, Hysteretic, Relaxation, Smoothed, Transition, 
 struct Oscillator;
 impl VectorField<2> for Oscillator {
     fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-        vector![x[1], -x[0]]
+        Vector2::new(x[1], -x[0])
     }
 }
 
@@ -19,7 +19,7 @@ impl VectorField<2> for Oscillator {
 struct Explosion;
 impl VectorField<1> for Explosion {
     fn eval<S: Elementary>(&self, x: &SVector<S, 1>) -> SVector<S, 1> {
-        vector![x[0] * x[0]]
+        Vector1::new(x[0] * x[0])
     }
 }
 
@@ -94,12 +94,12 @@ macro_rules! conforms {
 
             #[test]
             fn steps_keep_their_promises() {
-                walk(&mut $method::new(TOLERANCE), &Oscillator, 0.0, vector![1.0, 0.0], 25.0, 0.7);
+                walk(&mut $method::new(TOLERANCE), &Oscillator, 0.0, Vector2::new(1.0, 0.0), 25.0, 0.7);
                 walk(
                     &mut $method::new(TOLERANCE),
                     &smoothed(),
                     0.0,
-                    vector![0.2, 0.0, -1.0],
+                    Vector3::new(0.2, 0.0, -1.0),
                     20.0,
                     2.0,
                 );
@@ -107,7 +107,7 @@ macro_rules! conforms {
                     &mut $method::new(TOLERANCE),
                     &hysteretic(),
                     0.0,
-                    vector![0.2, 0.0, -1.0, 1.0],
+                    Vector4::new(0.2, 0.0, -1.0, 1.0),
                     5.0,
                     0.5,
                 );
@@ -116,7 +116,7 @@ macro_rules! conforms {
             #[test]
             fn oscillator_is_accurate() {
                 let mut m = $method::new(TOLERANCE);
-                let end = walk(&mut m, &Oscillator, 0.0, vector![1.0, 0.0], 10.0, f64::INFINITY);
+                let end = walk(&mut m, &Oscillator, 0.0, Vector2::new(1.0, 0.0), 10.0, f64::INFINITY);
                 let x = end.last().unwrap().1.map(f64::from_bits);
                 let error = (x[0] - 10.0_f64.cos()).abs().max((x[1] + 10.0_f64.sin()).abs());
                 // Global error: local tolerance times a modest number of steps.
@@ -126,13 +126,13 @@ macro_rules! conforms {
             #[test]
             fn the_interpolant_is_accurate_inside() {
                 let mut m = $method::new(TOLERANCE);
-                m.restart(&Oscillator, 0.0, vector![1.0, 0.0], 10.0, f64::INFINITY).unwrap();
+                m.restart(&Oscillator, 0.0, Vector2::new(1.0, 0.0), 10.0, f64::INFINITY).unwrap();
                 let mut t = 0.0;
                 while t < 10.0 {
                     let step = m.step(&Oscillator).unwrap();
                     for theta in [0.1, 0.5, 0.9] {
                         let s = step.time(theta);
-                        let error = (step.at(theta) - vector![s.cos(), -s.sin()]).amax();
+                        let error = (step.at(theta) - Vector2::new(s.cos(), -s.sin())).amax();
                         assert!(error < 2e-5, "{error:e} at {s}");
                     }
                     t = step.t1;
@@ -141,10 +141,10 @@ macro_rules! conforms {
 
             #[test]
             fn restart_forgets_everything() {
-                let (f, x0) = (smoothed(), vector![0.2, 0.0, -1.0]);
+                let (f, x0) = (smoothed(), Vector3::new(0.2, 0.0, -1.0));
                 let fresh = walk(&mut $method::new(TOLERANCE), &f, 0.0, x0, 12.0, 1.0);
                 let mut used = $method::new(TOLERANCE);
-                walk(&mut used, &f, 3.0, vector![-0.4, 1.1, 0.2], 9.0, 0.1);
+                walk(&mut used, &f, 3.0, Vector3::new(-0.4, 1.1, 0.2), 9.0, 0.1);
                 let before = Stepper::<3>::statistics(&used).steps;
                 let again = walk(&mut used, &f, 0.0, x0, 12.0, 1.0);
                 assert_eq!(fresh, again);
@@ -158,7 +158,7 @@ macro_rules! conforms {
             #[test]
             fn an_explosion_is_an_error_with_time_and_state() {
                 let mut m = $method::new(TOLERANCE);
-                m.restart(&Explosion, 0.0, vector![1.0], 2.0, f64::INFINITY).unwrap();
+                m.restart(&Explosion, 0.0, Vector1::new(1.0), 2.0, f64::INFINITY).unwrap();
                 let failure = loop {
                     match m.step(&Explosion) {
                         Ok(step) => assert!(step.t1 < 1.001, "walked through the pole"),
@@ -173,7 +173,7 @@ macro_rules! conforms {
             #[test]
             fn not_a_number_is_refused_at_the_start() {
                 let mut m = $method::new(TOLERANCE);
-                let result = m.restart(&Oscillator, 0.0, vector![f64::NAN, 0.0], 1.0, 1.0);
+                let result = m.restart(&Oscillator, 0.0, Vector2::new(f64::NAN, 0.0), 1.0, 1.0);
                 assert!(matches!(result, Err(Failure::NotFinite { .. })), "{result:?}");
             }
 
@@ -184,7 +184,7 @@ macro_rules! conforms {
                     a in -50.0..50.0_f64, b in -50.0..50.0_f64, t_end in 0.01..20.0_f64,
                         cap in 0.05..5.0_f64,
                 ) {
-                    let end = walk(&mut $method::new(TOLERANCE), &Oscillator, 0.0, vector![a, b],
+                    let end = walk(&mut $method::new(TOLERANCE), &Oscillator, 0.0, Vector2::new(a, b),
                         t_end, cap);
                     let x = end.last().unwrap().1.map(f64::from_bits);
                     let (r0, r) = (a.hypot(b), x[0].hypot(x[1]));

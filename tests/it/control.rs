@@ -5,7 +5,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use nalgebra::{SVector, vector};
+use nalgebra::{SVector, Vector3};
 use twofold::integrate::Schedule;
 use twofold::jeffrey_2013::Reading;
 use twofold::jeffrey_2013::study::census::{CensusRun, MotionKind, PANELS, tally};
@@ -139,8 +139,9 @@ fn the_controls_are_the_runs_of_fig_7_with_one_change() {
 #[test]
 fn no_orbit_comes_near_the_moved_two_fold() {
     let system = shifted();
-    let fold = two_fold(&system.bind::<3>().unwrap(), &vector![0.01, 0.01, -0.6]).unwrap().point;
-    assert!((fold - vector![0.0, 0.0, -0.7]).norm() < 1e-12, "{fold}");
+    let fold =
+        two_fold(&system.bind::<3>().unwrap(), &Vector3::new(0.01, 0.01, -0.6)).unwrap().point;
+    assert!((fold - Vector3::new(0.0, 0.0, -0.7)).norm() < 1e-12, "{fold}");
     let run = RunSpec {
         system,
         t_end: 500.0,

@@ -3,7 +3,7 @@
 //! Orders at held step sizes are tested beside the methods, where step and order can be held.
 #![allow(clippy::disallowed_methods)] // exact solutions are compared to tolerances, not hashed
 
-use nalgebra::{Matrix3, SVector, matrix, vector};
+use nalgebra::{Matrix3, SVector, Vector1, Vector2, Vector3, Vector4};
 use proptest::prelude::*;
 use twofold::integrate::{Dopri5, Failure, Lsoda, Radau5, Statistics, Stepper, Tolerance};
 use twofold::num::Elementary;
@@ -14,13 +14,15 @@ struct Linear {
     matrix: Matrix3<f64>,
 }
 
-const S: Matrix3<f64> = matrix![1.0, 0.4, -0.2; -0.3, 1.0, 0.5; 0.1, -0.6, 1.0];
+const S: Matrix3<f64> = Matrix3::new(1.0, 0.4, -0.2, -0.3, 1.0, 0.5, 0.1, -0.6, 1.0);
 
 impl Linear {
     fn with_rates(rates: [f64; 3]) -> Self {
         let inverse = S.try_inverse().unwrap();
         Self {
-            matrix: S * Matrix3::from_diagonal(&vector![-rates[0], -rates[1], -rates[2]]) * inverse,
+            matrix: S
+                * Matrix3::from_diagonal(&Vector3::new(-rates[0], -rates[1], -rates[2]))
+                * inverse,
         }
     }
 }
@@ -85,11 +87,11 @@ fn oscillations_stay_with_adams() {
     struct Oscillator;
     impl VectorField<2> for Oscillator {
         fn eval<T: Elementary>(&self, x: &SVector<T, 2>) -> SVector<T, 2> {
-            vector![x[1].scale(50.0), x[0].scale(-50.0)]
+            Vector2::new(x[1].scale(50.0), x[0].scale(-50.0))
         }
     }
     let mut lsoda = Lsoda::new(Tolerance { rtol: 1e-8, atol: 1e-8 });
-    lsoda.restart(&Oscillator, 0.0, vector![1.0, 0.0], 10.0, f64::INFINITY).unwrap();
+    lsoda.restart(&Oscillator, 0.0, Vector2::new(1.0, 0.0), 10.0, f64::INFINITY).unwrap();
     let x = loop {
         let step = lsoda.step(&Oscillator).unwrap();
         if step.t1 == 10.0 {
@@ -98,7 +100,7 @@ fn oscillations_stay_with_adams() {
     };
     assert_eq!(lsoda.statistics().stiff_steps, 0);
     assert!(lsoda.statistics().highest_order >= 7);
-    assert!((x - vector![500_f64.cos(), -500_f64.sin()]).amax() < 1e-5);
+    assert!((x - Vector2::new(500_f64.cos(), -500_f64.sin())).amax() < 1e-5);
 }
 
 /// x' = -sqrt(x) leaves its domain at t = 2: a trial point outside is a failed trial, and the end
@@ -108,11 +110,11 @@ fn leaving_the_domain_is_named() {
     struct Draining;
     impl VectorField<1> for Draining {
         fn eval<T: Elementary>(&self, x: &SVector<T, 1>) -> SVector<T, 1> {
-            vector![-x[0].sqrt()]
+            Vector1::new(-x[0].sqrt())
         }
     }
     fn failure<M: Stepper<1>>(mut stepper: M) -> Failure {
-        stepper.restart(&Draining, 0.0, vector![1.0], 4.0, f64::INFINITY).unwrap();
+        stepper.restart(&Draining, 0.0, Vector1::new(1.0), 4.0, f64::INFINITY).unwrap();
         (0..100_000)
             .find_map(|_| stepper.step(&Draining).err())
             .expect("there is no solution beyond t = 2")
@@ -144,7 +146,7 @@ fn hysteretic_chatter_is_the_solution() {
         };
         // Up to shortly before the first visit of the singularity, after which no two methods
         // agree.
-        stepper.restart(&field, 0.0, vector![0.2, 0.0, -1.0, 1.0], 10.0, 0.25).unwrap();
+        stepper.restart(&field, 0.0, Vector4::new(0.2, 0.0, -1.0, 1.0), 10.0, 0.25).unwrap();
         let (mut t, mut swings) = (0.0, 0);
         while t < 10.0 {
             let step = stepper.step(&field).unwrap();
@@ -173,15 +175,15 @@ fn known_bits() {
     struct Lorenz;
     impl VectorField<3> for Lorenz {
         fn eval<T: Elementary>(&self, x: &SVector<T, 3>) -> SVector<T, 3> {
-            vector![
+            Vector3::new(
                 (x[1] - x[0]).scale(10.0),
                 x[0] * (T::from_f64(28.0) - x[2]) - x[1],
-                x[0] * x[1] - x[2].scale(8.0 / 3.0)
-            ]
+                x[0] * x[1] - x[2].scale(8.0 / 3.0),
+            )
         }
     }
     fn bits<M: Stepper<3>>(mut stepper: M) -> [u64; 3] {
-        stepper.restart(&Lorenz, 0.0, vector![1.0, 1.0, 1.0], 10.0, f64::INFINITY).unwrap();
+        stepper.restart(&Lorenz, 0.0, Vector3::new(1.0, 1.0, 1.0), 10.0, f64::INFINITY).unwrap();
         loop {
             let step = stepper.step(&Lorenz).unwrap();
             if step.t1 == 10.0 {
@@ -205,7 +207,7 @@ fn known_bits() {
 fn zero_tolerance_is_a_named_failure() {
     let field = Linear::with_rates([1.0, 2.0, 3.0]);
     let zero = Tolerance { rtol: 0.0, atol: 0.0 };
-    for start in [vector![1.0, 1.0, 1.0], vector![0.0, 1.0, 0.0]] {
+    for start in [Vector3::new(1.0, 1.0, 1.0), Vector3::new(0.0, 1.0, 0.0)] {
         let lsoda = solve(Lsoda::new(zero), &field, start, 1.0);
         assert!(matches!(lsoda, Err(Failure::StepUnderflow { .. })), "{lsoda:?}");
         let radau = solve(Radau5::new(zero), &field, start, 1.0);

@@ -1,7 +1,7 @@
 //! Order of Dormand-Prince and of its dense output, by halving fixed steps.
 #![allow(clippy::disallowed_methods)] // exact solutions are compared to tolerances, not hashed
 
-use nalgebra::{SVector, vector};
+use nalgebra::{SVector, Vector2};
 use twofold::integrate::{Dopri5, Stepper, Tolerance};
 use twofold::num::Elementary;
 use twofold::system::VectorField;
@@ -10,7 +10,7 @@ use twofold::system::VectorField;
 struct Bell;
 impl VectorField<2> for Bell {
     fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-        vector![(-x[1] * x[0]).scale(2.0), S::one()]
+        Vector2::new((-x[1] * x[0]).scale(2.0), S::one())
     }
 }
 
@@ -21,7 +21,7 @@ fn errors(n: u32) -> (f64, f64) {
     let mut m = Dopri5::new(Tolerance { rtol: 1e3, atol: 1e3 });
     let mut worst = (0.0_f64, 0.0_f64);
     let mut t = 0.0;
-    m.restart(&Bell, t, vector![1.0, 0.0], 2.0, 1.0 / f64::from(n)).unwrap();
+    m.restart(&Bell, t, Vector2::new(1.0, 0.0), 2.0, 1.0 / f64::from(n)).unwrap();
     while t < 2.0 {
         let step = m.step(&Bell).unwrap();
         let error = |s: f64, x: SVector<f64, 2>| (x[0] - (-s * s).exp()).abs();

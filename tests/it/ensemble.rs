@@ -1,6 +1,6 @@
 //! A run in a lane against the same run alone.
 
-use nalgebra::{SVector, vector};
+use nalgebra::{SVector, Vector1, Vector2, Vector3};
 use twofold::analyse::SectionRecorder;
 use twofold::integrate::ensemble::{
     End, EnsembleRun, InstructionSet, SectionPlane, ensemble, ensemble_with,
@@ -51,7 +51,7 @@ fn runs() -> Vec<EnsembleRun<3>> {
                 max_steps: 50_000,
                 ..DriveOptions::to(2.0 + f64::from(k * 11 % 17))
             };
-            EnsembleRun { start: vector![0.1 + 0.01 * f64::from(k), 0.0, -1.0], options }
+            EnsembleRun { start: Vector3::new(0.1 + 0.01 * f64::from(k), 0.0, -1.0), options }
         })
         .collect();
     runs[5].start[0] = f64::NAN;
@@ -185,12 +185,12 @@ fn failures_are_those_of_a_run_alone() {
     struct Exploding;
     impl twofold::system::VectorField<1> for Exploding {
         fn eval<S: twofold::num::Elementary>(&self, x: &SVector<S, 1>) -> SVector<S, 1> {
-            vector![x[0] * x[0]]
+            Vector1::new(x[0] * x[0])
         }
     }
     let runs: Vec<EnsembleRun<1>> = (0..MANY)
         .map(|k| EnsembleRun {
-            start: vector![0.25 * f64::from(k) - 4.0],
+            start: Vector1::new(0.25 * f64::from(k) - 4.0),
             options: DriveOptions::to(1.0),
         })
         .collect();
@@ -224,13 +224,13 @@ fn a_trial_that_has_no_value_is_repeated_as_in_a_run_alone() {
     struct Edge;
     impl twofold::system::VectorField<2> for Edge {
         fn eval<S: twofold::num::Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-            vector![x[1] - x[0].sqrt(), S::zero()]
+            Vector2::new(x[1] - x[0].sqrt(), S::zero())
         }
     }
     let coarse = Tolerance { rtol: 1e-2, atol: 1e-2 };
     let runs: Vec<EnsembleRun<2>> = (0..MANY)
         .map(|k| EnsembleRun {
-            start: vector![0.3 + 0.02 * f64::from(k), 0.05 * f64::from(k % 3)],
+            start: Vector2::new(0.3 + 0.02 * f64::from(k), 0.05 * f64::from(k % 3)),
             options: DriveOptions::to(9.0),
         })
         .collect();

@@ -1,7 +1,7 @@
 //! The event-driven Filippov integrator against closed forms.
 #![allow(clippy::disallowed_methods)] // exact solutions are compared to tolerances, not hashed
 
-use nalgebra::{SVector, vector};
+use nalgebra::{SVector, Vector2, Vector3};
 use std::ops::ControlFlow;
 
 use crate::claims::Reads;
@@ -73,7 +73,7 @@ fn sliding_time_to_the_two_fold_of_the_normal_form() {
         let mut out = Trajectory::new(4);
         let end = run(
             &n,
-            vector![0.0, y, z],
+            Vector3::new(0.0, y, z),
             100.0,
             &FilippovOptions::default(),
             ExitRule::All,
@@ -101,8 +101,9 @@ fn crossing_return_map_of_the_normal_form() {
     let (v, w) = (-1.2, -1.4);
     let n = invisible(v, w);
     let mut out = Trajectory::new(1);
-    let end = run(&n, vector![0.0, -1.0, 0.4], 20.0, &FilippovOptions::default(), STAY, &mut out)
-        .unwrap();
+    let end =
+        run(&n, Vector3::new(0.0, -1.0, 0.4), 20.0, &FilippovOptions::default(), STAY, &mut out)
+            .unwrap();
     assert!(end.events > 3);
     let (mut t, mut y, mut z) = (0.0, -1.0_f64, 0.4_f64);
     for event in &out.events[1..] {
@@ -113,7 +114,7 @@ fn crossing_return_map_of_the_normal_form() {
         }
         assert!((event.t - t).abs() < 1e-10 * t, "{event:?} {t}");
         assert!(
-            (event.state - vector![0.0, y, z]).amax() < 1e-9 * (1.0 + y.abs() + z.abs()),
+            (event.state - Vector3::new(0.0, y, z)).amax() < 1e-9 * (1.0 + y.abs() + z.abs()),
             "{event:?} {y} {z}"
         );
     }
@@ -138,7 +139,7 @@ fn caricature_passes_the_two_fold_several_times() {
         let mut out = Trajectory::new(4);
         let end = run(
             &c,
-            vector![0.2, 0.0, -1.0],
+            Vector3::new(0.2, 0.0, -1.0),
             t_end,
             &FilippovOptions::default(),
             random(2013, 0.5),
@@ -176,8 +177,9 @@ fn the_misprinted_sign_never_returns() {
         ..Caricature::with_reinjection(1e-3, 1e-5)
     };
     let mut out = Trajectory::new(1);
-    let end = run(&c, vector![0.2, 0.0, -1.0], 4000.0, &FilippovOptions::default(), STAY, &mut out)
-        .unwrap();
+    let end =
+        run(&c, Vector3::new(0.2, 0.0, -1.0), 4000.0, &FilippovOptions::default(), STAY, &mut out)
+            .unwrap();
     assert_eq!(end.mode, Some(Mode::SlidingAttracting));
     // It ends on the point where f+ and f- are opposed, lambda f+ + (1 - lambda) f- = 0 with lambda
     // = z/(z - y): that is (0, 8.084, -9.014); SCIENCE.md says "near (0, 8.9, -9.4)", which does
@@ -186,7 +188,7 @@ fn the_misprinted_sign_never_returns() {
     let (lambda, r2) = (z / (z - y), y * y + z * z);
     assert!((lambda - 1.4 * (1.0 - lambda) + (1e-3 - 1e-5 * y) * r2).abs() < 1e-9);
     assert!((-1.2 * lambda + 1.0 - lambda + (1e-3 - 1e-5 * z) * r2).abs() < 1e-9);
-    assert!((end.x - vector![0.0, 8.9, -9.4]).norm() < 1.0);
+    assert!((end.x - Vector3::new(0.0, 8.9, -9.4)).norm() < 1.0);
 }
 
 #[test]
@@ -195,14 +197,14 @@ fn the_wheel_returns_to_its_singularity() {
     let mut out = Trajectory::new(4);
     let end = run(
         &w,
-        vector![0.69267, 0.0, 0.0],
+        Vector3::new(0.69267, 0.0, 0.0),
         60.0,
         &FilippovOptions::default(),
         random(1, 0.05),
         &mut out,
     )
     .unwrap();
-    let at = vector![0.6926698897, -0.5736729677, -0.8666344383];
+    let at = Vector3::new(0.6926698897, -0.5736729677, -0.8666344383);
     let visits: Vec<_> =
         out.events.iter().filter(|e| matches!(e.kind, EventKind::TwoFoldReached { .. })).collect();
     assert!(visits.len() >= 3, "{}", visits.len());
@@ -217,7 +219,8 @@ fn the_wheel_returns_to_its_singularity() {
 #[test]
 fn the_wheels_sliding_rates_are_those_of_its_normal_form() {
     // mu_strong/mu_weak depends on v and w of eq. (4) only: mu² - (v + w) mu + vw - 1 = 0.
-    let local = SlidingAtTwoFold::near(&Wheel::default(), &vector![0.69, -0.57, -0.87]).unwrap();
+    let local =
+        SlidingAtTwoFold::near(&Wheel::default(), &Vector3::new(0.69, -0.57, -0.87)).unwrap();
     let (v, w) = (-1.84902_f64, -1.98457);
     let root = (0.25 * (v + w) * (v + w) - v * w + 1.0).sqrt();
     let ratio = (0.5 * (v + w) - root) / (0.5 * (v + w) + root);
@@ -234,7 +237,7 @@ fn the_wheels_sliding_rates_are_those_of_its_normal_form() {
 fn time_along_the_invariant_curve_is_the_integrators() {
     // Sliding from a point of the curve takes the series' time, and stays on the curve.
     let c = Caricature::with_reinjection(1e-1, 1e-5);
-    let local = SlidingAtTwoFold::near(&c, &vector![0.0, 0.01, 0.01]).unwrap();
+    let local = SlidingAtTwoFold::near(&c, &Vector3::new(0.0, 0.01, 0.01)).unwrap();
     let curve = local.through.as_ref().unwrap();
     assert!(curve.radius > 0.1, "{}", curve.radius);
     for part in [0.3, 0.9] {
@@ -250,8 +253,8 @@ fn time_along_the_invariant_curve_is_the_integrators() {
     let time = 0.5 * curve.time(-curve.radius);
     let mut out = Trajectory::new(1);
     let rule = ExitRule::AfterTime { time, side: Side::Minus };
-    let _ =
-        run(&c, vector![0.0, 0.0, 0.0], 3.0, &FilippovOptions::default(), rule, &mut out).unwrap();
+    let _ = run(&c, Vector3::new(0.0, 0.0, 0.0), 3.0, &FilippovOptions::default(), rule, &mut out)
+        .unwrap();
     let exit = out.events.iter().find(|e| matches!(e.kind, EventKind::Exit { .. })).unwrap();
     assert!((exit.t - time).abs() < 1e-14);
     close(
@@ -269,7 +272,8 @@ fn last_leg_error_is_within_its_estimate() {
     let arrival = |leg: f64| {
         let settings = FilippovOptions { leg, ..FilippovOptions::default() };
         let mut out = Trajectory::new(1);
-        let _ = run(&c, vector![0.0, 1.0, 0.2], 100.0, &settings, ExitRule::All, &mut out).unwrap();
+        let _ = run(&c, Vector3::new(0.0, 1.0, 0.2), 100.0, &settings, ExitRule::All, &mut out)
+            .unwrap();
         let error = |e: &EventKind| {
             if let EventKind::TwoFoldReached { error, .. } = *e { Some(error) } else { None }
         };
@@ -292,14 +296,20 @@ fn visible_visible_sliding_leaves_along_the_fold() {
     let root3 = 3.0_f64.sqrt();
     let exact = 3.0 * (1.0 - 1.0 / root3);
     let mut out = Trajectory::new(4);
-    let end =
-        run(&n, vector![0.0, -1.0, -2.0], exact + 1.0, &FilippovOptions::default(), STAY, &mut out)
-            .unwrap();
+    let end = run(
+        &n,
+        Vector3::new(0.0, -1.0, -2.0),
+        exact + 1.0,
+        &FilippovOptions::default(),
+        STAY,
+        &mut out,
+    )
+    .unwrap();
     let left =
         out.events.iter().find(|e| e.kind == EventKind::LeftByTangency { to: Side::Plus }).unwrap();
     assert!((left.t - exact).abs() < 1e-11, "{} {exact}", left.t);
-    close(left.state, vector![0.0, 0.0, -root3], 1e-10);
-    close(end.x, vector![0.5, 1.0, -root3], 1e-10);
+    close(left.state, Vector3::new(0.0, 0.0, -root3), 1e-10);
+    close(end.x, Vector3::new(0.5, 1.0, -root3), 1e-10);
     assert!(drift(&n, &out) <= 1e-12);
 }
 
@@ -311,7 +321,7 @@ fn visible_visible_two_fold_flies_off_at_once() {
         let mut out = Trajectory::new(1);
         let end = run(
             &n,
-            vector![0.0, -1.0, -1.0],
+            Vector3::new(0.0, -1.0, -1.0),
             3.0,
             &FilippovOptions::default(),
             ExitRule::AtOnce { side },
@@ -322,8 +332,8 @@ fn visible_visible_two_fold_flies_off_at_once() {
             out.events.iter().find(|e| matches!(e.kind, EventKind::TwoFoldReached { .. })).unwrap();
         assert!((reached.t - 2.0).abs() < 1e-12, "{}", reached.t);
         let expected = match side {
-            Side::Plus => vector![0.5, 1.0, 0.0],
-            Side::Minus => vector![-0.5, 0.0, 1.0],
+            Side::Plus => Vector3::new(0.5, 1.0, 0.0),
+            Side::Minus => Vector3::new(-0.5, 0.0, 1.0),
         };
         close(end.x, expected, 1e-11);
     }
@@ -337,7 +347,7 @@ fn visible_invisible_sliding_turns_towards_the_visible_fold() {
     let mut out = Trajectory::new(1);
     let end = run(
         &visible_pair(true, false),
-        vector![0.0, -1.0, 1.0],
+        Vector3::new(0.0, -1.0, 1.0),
         root2 + 1.0,
         &FilippovOptions::default(),
         STAY,
@@ -347,13 +357,13 @@ fn visible_invisible_sliding_turns_towards_the_visible_fold() {
     let left =
         out.events.iter().find(|e| e.kind == EventKind::LeftByTangency { to: Side::Plus }).unwrap();
     assert!((left.t - root2).abs() < 1e-11);
-    close(end.x, vector![0.5, 1.0, root2], 1e-10);
+    close(end.x, Vector3::new(0.5, 1.0, root2), 1e-10);
     // Minus visible: p = -y, q = -z, p' = -q, q' = p. From (p, q) = (-1, 1) it is q that comes to
     // zero.
     let mut out = Trajectory::new(1);
     let end = run(
         &visible_pair(false, true),
-        vector![0.0, 1.0, -1.0],
+        Vector3::new(0.0, 1.0, -1.0),
         root2 + 1.0,
         &FilippovOptions::default(),
         STAY,
@@ -366,7 +376,7 @@ fn visible_invisible_sliding_turns_towards_the_visible_fold() {
         .find(|e| e.kind == EventKind::LeftByTangency { to: Side::Minus })
         .unwrap();
     assert!((left.t - root2).abs() < 1e-11);
-    close(end.x, vector![-0.5, root2, 1.0], 1e-10);
+    close(end.x, Vector3::new(-0.5, root2, 1.0), 1e-10);
 }
 
 #[test]
@@ -376,13 +386,14 @@ fn repelling_sliding_through_an_invisible_two_fold_backwards() {
     // reached at t = 2, and (1.5, 1.5) at t = 5.
     let n = visible_pair(false, false);
     let mut out = Trajectory::new(1);
-    let end = run(&n, vector![0.0, -1.0, -1.0], 5.0, &FilippovOptions::default(), STAY, &mut out)
-        .unwrap();
+    let end =
+        run(&n, Vector3::new(0.0, -1.0, -1.0), 5.0, &FilippovOptions::default(), STAY, &mut out)
+            .unwrap();
     let reached =
         out.events.iter().find(|e| matches!(e.kind, EventKind::TwoFoldReached { .. })).unwrap();
     assert!((reached.t - 2.0).abs() < 1e-12, "{}", reached.t);
     assert_eq!(end.mode, Some(Mode::SlidingAttracting));
-    close(end.x, vector![0.0, 1.5, 1.5], 1e-11);
+    close(end.x, Vector3::new(0.0, 1.5, 1.5), 1e-11);
 }
 
 #[test]
@@ -392,7 +403,7 @@ fn repelling_sliding_ends_at_an_invisible_fold() {
     let mut out = Trajectory::new(1);
     let _ = run(
         &visible_pair(false, false),
-        vector![0.0, -1.0, -0.5],
+        Vector3::new(0.0, -1.0, -0.5),
         1.0,
         &FilippovOptions::default(),
         STAY,
@@ -405,7 +416,7 @@ fn repelling_sliding_ends_at_an_invisible_fold() {
         .find(|e| matches!(e.kind, EventKind::ExitAtBoundary { to: Side::Plus, .. }))
         .expect("leaves at the fold of f-, to the other side");
     assert!((left.t - 1.5 * (1.0 - 1.0 / 3.0_f64.sqrt())).abs() < 1e-11, "{}", left.t);
-    close(left.state, vector![0.0, -(0.75_f64.sqrt()), 0.0], 1e-10);
+    close(left.state, Vector3::new(0.0, -(0.75_f64.sqrt()), 0.0), 1e-10);
 }
 
 #[test]
@@ -416,7 +427,7 @@ fn grazing_and_its_neighbours() {
     let fly = |x0: f64| {
         let mut out = Trajectory::new(1);
         let end =
-            run(&n, vector![x0, -1.0, -1.0], 3.0, &FilippovOptions::default(), STAY, &mut out)
+            run(&n, Vector3::new(x0, -1.0, -1.0), 3.0, &FilippovOptions::default(), STAY, &mut out)
                 .unwrap();
         (end, out.events)
     };
@@ -424,11 +435,11 @@ fn grazing_and_its_neighbours() {
     assert_eq!(events.len(), 1, "{events:?}");
     assert_eq!(events[0].kind, EventKind::Grazing { side: Side::Plus });
     assert!((events[0].t - 1.0).abs() < 1e-6);
-    close(end.x, vector![2.0, 2.0, -1.0], 1e-6);
+    close(end.x, Vector3::new(2.0, 2.0, -1.0), 1e-6);
 
     let (end, events) = fly(0.5 + 1e-9);
     assert!(events.is_empty(), "{events:?}");
-    close(end.x, vector![2.0 + 1e-9, 2.0, -1.0], 1e-11);
+    close(end.x, Vector3::new(2.0 + 1e-9, 2.0, -1.0), 1e-11);
 
     // The dip below the surface lasts 9e-5 and is 1e-9 deep: far inside one step. It lands, slides,
     // leaves at the fold.
@@ -439,7 +450,7 @@ fn grazing_and_its_neighbours() {
         [EventKind::Landing { from: Side::Plus }, EventKind::LeftByTangency { to: Side::Plus }]
     );
     assert!((events[0].t - (1.0 - 2e-9_f64.sqrt())).abs() < 1e-8, "{:?}", events[0].t);
-    close(end.x, vector![2.0, 2.0, -1.0], 1e-4);
+    close(end.x, Vector3::new(2.0, 2.0, -1.0), 1e-4);
 }
 
 #[test]
@@ -451,8 +462,9 @@ fn rules_do_what_they_say() {
     let speed = -mu * (y * y + z * z).sqrt() / (y + z);
     let exit = |rule: ExitRule| {
         let mut out = Trajectory::new(1);
-        let _ = run(&n, vector![0.0, 0.3, 0.5], 20.0, &FilippovOptions::default(), rule, &mut out)
-            .unwrap();
+        let _ =
+            run(&n, Vector3::new(0.0, 0.3, 0.5), 20.0, &FilippovOptions::default(), rule, &mut out)
+                .unwrap();
         let departed = out.events.iter().find(|e| e.kind == EventKind::EnteredRepelling).unwrap().t;
         let e = *out.events.iter().find(|e| matches!(e.kind, EventKind::Exit { .. })).unwrap();
         let EventKind::Exit { to, time, arc, rule: recorded } = e.kind else { unreachable!() };
@@ -494,8 +506,9 @@ fn bad_rules_are_named() {
     let n = invisible(-1.2, -1.4);
     let mut out = Trajectory::new(1);
     let rule = ExitRule::AfterTime { time: -1.0, side: Side::Plus };
-    let error = run(&n, vector![0.0, 0.3, 0.5], 1.0, &FilippovOptions::default(), rule, &mut out)
-        .unwrap_err();
+    let error =
+        run(&n, Vector3::new(0.0, 0.3, 0.5), 1.0, &FilippovOptions::default(), rule, &mut out)
+            .unwrap_err();
     assert!(matches!(error, FilippovError::Invalid(ref m) if m.contains("time")), "{error}");
     let json = r#"{"random":{"law":{"exponential":{"mean":0.5}},"plus_probability":0.5,"seed":1,"stream":0}}"#;
     assert_eq!(serde_json::from_str::<ExitRule>(json).unwrap(), random(1, 0.5));
@@ -526,7 +539,8 @@ fn stick_slip_limit_cycle() {
     let period = low + (friction - x_land) / b;
 
     let mut out = Trajectory::new(4);
-    let _ = run(&s, vector![0.0, 0.0], 60.0, &FilippovOptions::default(), STAY, &mut out).unwrap();
+    let _ =
+        run(&s, Vector2::new(0.0, 0.0), 60.0, &FilippovOptions::default(), STAY, &mut out).unwrap();
     let slips: Vec<_> = out
         .events
         .iter()
@@ -541,7 +555,7 @@ fn stick_slip_limit_cycle() {
             "{} {period}",
             pair[1].t - pair[0].t
         );
-        close(pair[1].state, vector![friction, b], 1e-11);
+        close(pair[1].state, Vector2::new(friction, b), 1e-11);
     }
     assert!((lands.last().unwrap().state[0] - x_land).abs() < 1e-10);
     assert!(drift(&s, &out) <= 1e-12 && wrong_side(&s, &out) <= 1e-12);
@@ -551,14 +565,15 @@ fn stick_slip_limit_cycle() {
 fn relay_with_linear_feedback_slides_exponentially() {
     let r = builtin::<2>("relay-linear", &[("gain", 1.0)]);
     let mut out = Trajectory::new(4);
-    let end = run(&r, vector![0.5, 0.0], 8.0, &FilippovOptions::default(), STAY, &mut out).unwrap();
+    let end =
+        run(&r, Vector2::new(0.5, 0.0), 8.0, &FilippovOptions::default(), STAY, &mut out).unwrap();
     // x = 1/2 - t²/2, v = -t: lands at t² + 2 t = 1; |v| < 1, so it slides with x' = -x.
     let t1 = 2.0_f64.sqrt() - 1.0;
     assert_eq!(out.events.len(), 1);
     assert!((out.events[0].t - t1).abs() < 1e-12);
     assert_eq!(out.events[0].kind, EventKind::Landing { from: Side::Plus });
     let x = t1 * (t1 - 8.0).exp();
-    close(end.x, vector![x, -x], 1e-12);
+    close(end.x, Vector2::new(x, -x), 1e-12);
     assert!(drift(&r, &out) <= 1e-12);
 }
 
@@ -568,15 +583,16 @@ fn relay_with_parabolic_feedback() {
     let slow = builtin::<2>("relay-parabolic", &[("gain", 2.0)]);
     let t1 = (4.0_f64 / 3.0).sqrt();
     let mut out = Trajectory::new(4);
-    let end = run(&slow, vector![2.0, 0.0], t1 + 1.5, &FilippovOptions::default(), STAY, &mut out)
-        .unwrap();
+    let end =
+        run(&slow, Vector2::new(2.0, 0.0), t1 + 1.5, &FilippovOptions::default(), STAY, &mut out)
+            .unwrap();
     let v = -t1 + 0.75;
-    close(end.x, vector![v * v, v], 1e-11);
+    close(end.x, Vector2::new(v * v, v), 1e-11);
     assert!(drift(&slow, &out) <= 1e-12);
     // The origin, at t1 + 2 t1, is a rest: zero lies between the fields (0, -1) and (0, 1).
     let end = run(
         &slow,
-        vector![2.0, 0.0],
+        Vector2::new(2.0, 0.0),
         10.0,
         &FilippovOptions::default(),
         STAY,
@@ -586,7 +602,7 @@ fn relay_with_parabolic_feedback() {
     assert!(end.x.amax() < 1e-6 && end.mode == Some(Mode::SlidingAttracting), "{end:?}");
     let end = run(
         &slow,
-        vector![2.0, 0.0],
+        Vector2::new(2.0, 0.0),
         2.9 * t1,
         &FilippovOptions::default(),
         STAY,
@@ -602,7 +618,8 @@ fn relay_with_parabolic_feedback() {
     let exact = t1 * (1.0 + (1.0 + r) / (1.0 - r));
     let mut out = Trajectory::new(1);
     let end =
-        run(&fast, vector![2.0, 0.0], 100.0, &FilippovOptions::default(), STAY, &mut out).unwrap();
+        run(&fast, Vector2::new(2.0, 0.0), 100.0, &FilippovOptions::default(), STAY, &mut out)
+            .unwrap();
     assert!(end.x.amax() < 1e-9 && end.t == 100.0, "{end:?}");
     let last = out.events.last().unwrap();
     assert!(
@@ -615,7 +632,8 @@ fn relay_with_parabolic_feedback() {
     let optimal = builtin::<2>("relay-parabolic", &[("gain", 1.0)]);
     let mut out = Trajectory::new(1);
     let end =
-        run(&optimal, vector![2.0, 0.0], 9.0, &FilippovOptions::default(), STAY, &mut out).unwrap();
+        run(&optimal, Vector2::new(2.0, 0.0), 9.0, &FilippovOptions::default(), STAY, &mut out)
+            .unwrap();
     assert!(end.x.amax() < 1e-6 && end.mode == Some(Mode::SlidingAttracting), "{end:?}");
     let landing = out.events[0];
     assert!(
@@ -624,9 +642,10 @@ fn relay_with_parabolic_feedback() {
         "{landing:?}"
     );
     let end =
-        run(&optimal, vector![2.0, 0.0], 2.5, &FilippovOptions::default(), STAY, &mut out).unwrap();
+        run(&optimal, Vector2::new(2.0, 0.0), 2.5, &FilippovOptions::default(), STAY, &mut out)
+            .unwrap();
     let v = 2.5 - 8.0_f64.sqrt();
-    close(end.x, vector![0.5 * v * v, v], 1e-9);
+    close(end.x, Vector2::new(0.5 * v * v, v), 1e-9);
 }
 
 #[test]
@@ -640,7 +659,8 @@ fn the_funnel_holds_every_exit() {
         until_two_fold: true,
         per_step: 2,
     };
-    let f = funnel(&c, vector![0.2, 0.0, -1.0], 50.0, &FilippovOptions::default(), &grid).unwrap();
+    let f =
+        funnel(&c, Vector3::new(0.2, 0.0, -1.0), 50.0, &FilippovOptions::default(), &grid).unwrap();
     assert!(f.point.amax() < 1e-14 && (f.t - 13.196).abs() < 1e-2, "{} {:?}", f.t, f.point);
     assert_eq!(f.members.len(), 10);
     for m in &f.members {
@@ -668,7 +688,7 @@ fn a_step_cap_changes_no_event() {
     fn kinds<P: PiecewiseSmooth<3>>(system: &P, max_step: f64, t_end: f64) -> Vec<(String, f64)> {
         let settings = FilippovOptions { max_step, ..FilippovOptions::default() };
         let mut out = Trajectory::new(1);
-        let start = vector![0.69267, 0.0, 0.0];
+        let start = Vector3::new(0.69267, 0.0, 0.0);
         let _ = run(system, start, t_end, &settings, ExitRule::All, &mut out).unwrap();
         out.events
             .iter()
@@ -701,7 +721,7 @@ fn a_step_that_straddles_two_crossings_misses_none() {
             x[0]
         }
         fn plus<S: twofold::num::Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-            vector![x[1].scale(2.0) - S::from_f64(self.a + self.b), S::one()]
+            Vector2::new(x[1].scale(2.0) - S::from_f64(self.a + self.b), S::one())
         }
         fn minus<S: twofold::num::Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
             self.plus(x)
@@ -712,9 +732,15 @@ fn a_step_that_straddles_two_crossings_misses_none() {
             let a = 0.05 + 0.37 * f64::from(k);
             let p = Parabola { a, b: a + gap };
             let mut out = Trajectory::new(1);
-            let _ =
-                run(&p, vector![p.a * p.b, 0.0], 20.0, &FilippovOptions::default(), STAY, &mut out)
-                    .unwrap();
+            let _ = run(
+                &p,
+                Vector2::new(p.a * p.b, 0.0),
+                20.0,
+                &FilippovOptions::default(),
+                STAY,
+                &mut out,
+            )
+            .unwrap();
             assert_eq!(out.events.len(), 2, "gap {gap:e} a {a}: {:?}", out.events);
             let error = (out.events[0].t - p.a).abs().max((out.events[1].t - p.b).abs());
             assert!(error < 1e-13 * 20.0 / gap, "gap {gap:e} a {a}: {error:e}");
@@ -730,8 +756,9 @@ fn reversed_time_leads_back() {
     let c = Caricature::with_reinjection(1e-1, 1e-5);
     let mut forward = Trajectory::new(1);
     let rule = ExitRule::AfterTime { time: 0.9, side: Side::Plus };
-    let _ = run(&c, vector![0.0, 0.0, 0.0], 2.0, &FilippovOptions::default(), rule, &mut forward)
-        .unwrap();
+    let _ =
+        run(&c, Vector3::new(0.0, 0.0, 0.0), 2.0, &FilippovOptions::default(), rule, &mut forward)
+            .unwrap();
     let exit = forward.events.iter().find(|e| matches!(e.kind, EventKind::Exit { .. })).unwrap();
     let mut back = Trajectory::new(1);
     let end =
@@ -756,7 +783,7 @@ fn observers_of_ordinary_runs_work() {
     let mut seen = Joined::default();
     let _ = run(
         &c,
-        vector![0.2, 0.0, -1.0],
+        Vector3::new(0.2, 0.0, -1.0),
         40.0,
         &FilippovOptions::default(),
         random(3, 0.5),
@@ -775,7 +802,7 @@ fn interpolants_are_in_physical_time_and_on_the_surface() {
     let mut out = Trajectory::new(16);
     let _ = run(
         &w,
-        vector![0.69267, 0.0, 0.0],
+        Vector3::new(0.69267, 0.0, 0.0),
         3.0,
         &FilippovOptions::default(),
         ExitRule::All,
@@ -793,7 +820,7 @@ fn interpolants_are_in_physical_time_and_on_the_surface() {
     for (t, x) in sliding.iter().step_by(sliding.len() / 7) {
         let end = run(
             &w,
-            vector![0.69267, 0.0, 0.0],
+            Vector3::new(0.69267, 0.0, 0.0),
             *t,
             &FilippovOptions::default(),
             ExitRule::All,
@@ -815,9 +842,16 @@ fn tolerance_buys_accuracy() {
             max_step,
             ..FilippovOptions::default()
         };
-        run(&c, vector![0.2, 0.0, -1.0], 50.0, &settings, ExitRule::All, &mut Trajectory::new(1))
-            .unwrap()
-            .t
+        run(
+            &c,
+            Vector3::new(0.2, 0.0, -1.0),
+            50.0,
+            &settings,
+            ExitRule::All,
+            &mut Trajectory::new(1),
+        )
+        .unwrap()
+        .t
     };
     let exact = arrival(1e-13, 5e-3);
     for tolerance in [1e-6, 1e-8, 1e-10, 1e-12] {
@@ -834,15 +868,18 @@ fn every_point_of_the_repelling_region_has_a_past_at_the_two_fold() {
     let n = invisible(-1.2, -1.4);
     for (y, z) in [(-0.3, -0.8), (-1.0, -0.05), (-0.4, -0.4)] {
         let exact = -((1.2 * y + z) + (y + 1.4 * z)) / (1.2 * 1.4 - 1.0);
-        let past = history(&n, vector![0.0, y, z], 100.0, &FilippovOptions::default(), 4).unwrap();
+        let past =
+            history(&n, Vector3::new(0.0, y, z), 100.0, &FilippovOptions::default(), 4).unwrap();
         let points: Vec<_> = past.points().collect();
         let (first, last) = (points[0], points[points.len() - 1]);
         assert!(first.1.amax() < 1e-12 && first.0 == 0.0);
-        close(last.1, vector![0.0, y, z], 1e-14);
+        close(last.1, Vector3::new(0.0, y, z), 1e-14);
         assert!((last.0 - exact).abs() < 1e-10 * exact, "{} {exact}", last.0);
         assert!(past.pieces.iter().all(|p| p.mode == Mode::SlidingRepelling));
     }
-    assert!(history(&n, vector![0.0, 1.0, 1.0], 100.0, &FilippovOptions::default(), 4).is_err());
+    assert!(
+        history(&n, Vector3::new(0.0, 1.0, 1.0), 100.0, &FilippovOptions::default(), 4).is_err()
+    );
 }
 
 #[test]
@@ -854,7 +891,7 @@ fn points_of_the_chaotic_set_are_connected_through_the_singularity() {
     let mut orbit = Trajectory::new(2);
     let _ = run(
         &c,
-        vector![0.2, 0.0, -1.0],
+        Vector3::new(0.2, 0.0, -1.0),
         90.0,
         &FilippovOptions::default(),
         random(3, 0.8),
@@ -871,7 +908,7 @@ fn points_of_the_chaotic_set_are_connected_through_the_singularity() {
         let b = flight.points[flight.points.len() / 2].1;
         tried += 1;
         let Ok(path) =
-            connect(&c, vector![0.2, 0.0, -1.0], b, 200.0, &FilippovOptions::default(), 2)
+            connect(&c, Vector3::new(0.2, 0.0, -1.0), b, 200.0, &FilippovOptions::default(), 2)
         else {
             continue;
         };
@@ -951,7 +988,7 @@ fn the_smoothed_reference_lies_within_eps() {
         let mut section = Section::default();
         let _ = run(
             &c,
-            vector![0.2, 0.0, -1.0],
+            Vector3::new(0.2, 0.0, -1.0),
             50.0,
             &FilippovOptions::default(),
             ExitRule::All,
@@ -975,7 +1012,7 @@ fn the_discontinuous_wheel_fills_a_box_like_the_smoothed_wheels() {
     let mut out = Trajectory::new(2);
     let _ = run(
         &w,
-        vector![0.69267, 0.0, 0.0],
+        Vector3::new(0.69267, 0.0, 0.0),
         230.0,
         &FilippovOptions::default(),
         random(5, 0.05),
@@ -1011,7 +1048,7 @@ fn a_run_that_is_cut_short_says_why() {
         }
     }
     let n = invisible(-1.2, -1.4);
-    let start = vector![0.0, 0.3, 0.8];
+    let start = Vector3::new(0.0, 0.3, 0.8);
     let mut out = Trajectory::new(1);
     let few = FilippovOptions { max_steps: 3, ..FilippovOptions::default() };
     let poor = run(&n, start, 100.0, &few, ExitRule::All, &mut out).unwrap();
@@ -1052,8 +1089,10 @@ fn a_funnel_counts_the_work_of_its_approach() {
     use twofold::job::simulate::simulate;
     use twofold::job::spec::{FunnelSpec, Method, MethodSpec, Observation, RunSpec, SwitchSpec};
     let c = Caricature::with_reinjection(1e-1, 1e-5);
-    let (start, settings) =
-        (vector![0.2, 0.0, -1.0], FilippovOptions { max_step: 5.0, ..FilippovOptions::default() });
+    let (start, settings) = (
+        Vector3::new(0.2, 0.0, -1.0),
+        FilippovOptions { max_step: 5.0, ..FilippovOptions::default() },
+    );
     let grid = FunnelGrid {
         shortest: 0.1,
         longest: 1.0,

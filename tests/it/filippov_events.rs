@@ -2,7 +2,7 @@
 //! run ends.
 #![allow(clippy::disallowed_methods)] // exact solutions are compared to tolerances, not hashed
 
-use nalgebra::{SVector, vector};
+use nalgebra::{SVector, Vector2, Vector3};
 use twofold::integrate::Tolerance;
 use twofold::integrate::filippov::{
     EventKind, ExitRule, FilippovError, FilippovOptions, FilippovSummary, Mode, Side, SlidingFlow,
@@ -50,8 +50,12 @@ fn thin_windows_are_passed_through() {
         for factor in [1.0, 3e-15, 7e9] {
             let h = format!("{factor}*((x - ({center}))^2 - {width}^2)");
             let rate = format!("{}", 1.0 / width);
-            let (end, seen) =
-                go(&planar(&h, ["1", "0"], ["1", &rate]), vector![-1.0, 0.0], 3.0, &settings(1e-9));
+            let (end, seen) = go(
+                &planar(&h, ["1", "0"], ["1", &rate]),
+                Vector2::new(-1.0, 0.0),
+                3.0,
+                &settings(1e-9),
+            );
             let y = end.unwrap().x[1];
             // The places of the two zeros are rounded to the spacing of the numbers there.
             let resolved = 1e-6 + 10.0 * f64::EPSILON / width;
@@ -71,8 +75,12 @@ fn thin_windows_of_other_functions_are_passed_through() {
         let h = format!("1 - {d} - cos(x - {center})");
         let half = (2.0 * d * (1.0 + d / 6.0)).sqrt();
         let rate = format!("{}", 1.0 / half);
-        let (end, _) =
-            go(&planar(&h, ["1", "0"], ["1", &rate]), vector![-1.0, 0.0], 3.0, &settings(1e-9));
+        let (end, _) = go(
+            &planar(&h, ["1", "0"], ["1", &rate]),
+            Vector2::new(-1.0, 0.0),
+            3.0,
+            &settings(1e-9),
+        );
         let y = end.unwrap().x[1];
         // h is rounded by an epsilon of 1: a share of d.
         assert!((y - 2.0).abs() < 1e-6 + 10.0 * f64::EPSILON / d, "{center} {d}: {y}");
@@ -86,8 +94,12 @@ fn near_grazing_pairs_do_not_accumulate() {
     for (k, d, turns) in [(1.0, 1e-3, 30), (2.5, 1e-5, 60), (1.3, 1e-9, 40)] {
         let h = format!("sin({k}*x) - (1 - {d})");
         let t_end = f64::from(turns) * std::f64::consts::TAU / k;
-        let (end, seen) =
-            go(&planar(&h, ["1", "1"], ["1", "0"]), vector![0.0, 0.0], t_end, &settings(1e-10));
+        let (end, seen) = go(
+            &planar(&h, ["1", "1"], ["1", "0"]),
+            Vector2::new(0.0, 0.0),
+            t_end,
+            &settings(1e-10),
+        );
         let one = 2.0 / k * (2.0 * d * (1.0 + d / 6.0)).sqrt();
         let y = end.unwrap_or_else(|e| panic!("{k} {d}: {e}")).x[1];
         assert_eq!(seen.events.len(), 2 * turns as usize, "{k} {d}");
@@ -104,7 +116,7 @@ fn motion_comes_to_rest_on_the_surface() {
     {
         let rate = |sign: &str| format!("{sign}{speed}*{power}");
         let system = planar("x", [&rate("-"), "0"], [&rate(""), "0"]);
-        let Ok(end) = go(&system, vector![1.0, 0.0], 8.0, &settings(1e-9)).0 else {
+        let Ok(end) = go(&system, Vector2::new(1.0, 0.0), 8.0, &settings(1e-9)).0 else {
             panic!("{speed} {power}")
         };
         assert!(end.x[0].abs() < 1e-9 && end.t == 8.0, "{speed} {power}: {end:?}");
@@ -132,7 +144,7 @@ fn crossings_accumulate_at_a_rest_and_the_motion_stays() {
         let y = second / w * (-a * s).exp() * (w * s).sin() * f64::sqrt(size);
         let exact = y / second * (1.0 + (1.0 + r) / (1.0 - r));
         let (end, seen) =
-            go(&super_twisting(first, second), vector![size, 0.0], 100.0, &settings(1e-12));
+            go(&super_twisting(first, second), Vector2::new(size, 0.0), 100.0, &settings(1e-12));
         let end = end.unwrap_or_else(|e| panic!("{first} {second} {size}: {e}"));
         assert!(
             end.x.amax() < 1e-8 && end.mode == Some(Mode::SlidingAttracting),
@@ -158,7 +170,7 @@ fn accumulation_where_the_motion_goes_on_is_no_rest() {
                 1.5*sqrt(abs(x))\", \"1.1\", \"1\"]\n";
     let system: Bound<3> =
         System::new(Definition::from_toml(text, "drift.toml").unwrap()).bind().unwrap();
-    match go(&system, vector![1.0, 0.0, 0.0], 20.0, &settings(1e-10)).0 {
+    match go(&system, Vector3::new(1.0, 0.0, 0.0), 20.0, &settings(1e-10)).0 {
         Err(FilippovError::Zeno { accumulates, .. }) => {
             assert!((accumulates - 1.7414).abs() < 1e-3, "{accumulates}")
         }
@@ -182,7 +194,7 @@ fn runs_end_at_events() {
         }
         for _ in 0..12 {
             t_end = t_end.next_up();
-            let end = go(&system, vector![0.5 * k * k, 0.0], t_end, &settings(1e-10)).0;
+            let end = go(&system, Vector2::new(0.5 * k * k, 0.0), t_end, &settings(1e-10)).0;
             let end = end.unwrap_or_else(|e| panic!("{k} {t_end}: {e}"));
             assert!(
                 end.t == t_end && end.x[0].abs() < 1e-8 * k * k && (end.x[1] + k).abs() < 1e-8 * k,
@@ -376,10 +388,14 @@ fn units_change_nothing_of_two_surfaces_and_of_a_clock() {
 fn a_flight_that_leaves_the_domain_says_which_expression_ends_where() {
     for (plus, what) in [(["1 + 0*sqrt(y)", "-1"], "sqrt(y)"), (["1", "-1 + ln(y)/1000"], "ln(y)")]
     {
-        let error =
-            go::<_, 2, 3>(&planar("x", plus, ["1", "-1"]), vector![1.0, 1.0], 3.0, &settings(1e-9))
-                .0
-                .unwrap_err();
+        let error = go::<_, 2, 3>(
+            &planar("x", plus, ["1", "-1"]),
+            Vector2::new(1.0, 1.0),
+            3.0,
+            &settings(1e-9),
+        )
+        .0
+        .unwrap_err();
         let said = error.to_string();
         assert!(said.contains(what) && said.contains("t = ") && said.contains("state ["), "{said}");
     }

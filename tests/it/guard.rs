@@ -1,7 +1,7 @@
 //! Steps that jump over what a method cannot see are taken back: pulses and layers that are far
 //! thinner than the steps around them.
 
-use nalgebra::{SVector, vector};
+use nalgebra::{SVector, Vector2};
 use twofold::integrate::{
     DriveOptions, Failure, Ignore, Method, Stepper, Tolerance, WithStepper, drive,
 };
@@ -34,7 +34,7 @@ impl VectorField<2> for Pulse {
     fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
         let u = (x[0] - S::from_f64(5.0)).scale(1.0 / self.width);
         let wave = x[0].scale(self.frequency).sin().scale(self.wave);
-        vector![S::from_f64(1.0), (-(u * u)).exp() + wave]
+        Vector2::new(S::from_f64(1.0), (-(u * u)).exp() + wave)
     }
 }
 
@@ -44,7 +44,7 @@ fn a_pulse_between_two_steps_is_found() {
         for method in METHODS {
             let field = Pulse { width, wave: 0.0, frequency: 1.0 };
             let (x, steps) =
-                method.with_stepper(TOLERANCE, To(&field, vector![0.0, 0.0], 10.0)).unwrap();
+                method.with_stepper(TOLERANCE, To(&field, Vector2::new(0.0, 0.0), 10.0)).unwrap();
             let area = std::f64::consts::PI.sqrt() * width;
             assert!((x[1] - area).abs() < 1e-6, "{method:?} {width:e}: {} for {area}", x[1]);
             assert!(steps < 3000, "{method:?} {width:e}: {steps} steps");
@@ -74,7 +74,7 @@ impl VectorField<2> for Steps {
             1 => (one + u.tanh()) * (one - u.tanh()),
             _ => one - u.erf() * u.erf(),
         };
-        vector![one, pulse.scale(1.0 / self.width)]
+        Vector2::new(one, pulse.scale(1.0 / self.width))
     }
 }
 
@@ -84,7 +84,7 @@ fn a_pulse_made_of_steps_is_found() {
         for method in METHODS {
             let field = Steps { width, of };
             let (x, _) =
-                method.with_stepper(TOLERANCE, To(&field, vector![0.0, 0.0], 10.0)).unwrap();
+                method.with_stepper(TOLERANCE, To(&field, Vector2::new(0.0, 0.0), 10.0)).unwrap();
             let area = field.area() / width;
             assert!((x[1] - area).abs() < 1e-5, "{method:?} {of} {width:e}: {} for {area}", x[1]);
         }
@@ -97,7 +97,8 @@ fn a_pulse_made_of_steps_is_found() {
 fn a_pulse_among_a_thousand_waves_is_found() {
     for method in METHODS {
         let field = Pulse { width: 1e-3, wave: 1e-12, frequency: 2e4 };
-        let (x, _) = method.with_stepper(TOLERANCE, To(&field, vector![0.0, 0.0], 10.0)).unwrap();
+        let (x, _) =
+            method.with_stepper(TOLERANCE, To(&field, Vector2::new(0.0, 0.0), 10.0)).unwrap();
         let area = std::f64::consts::PI.sqrt() * 1e-3;
         assert!((x[1] - area).abs() < 1e-6, "{method:?}: {} for {area}", x[1]);
     }
@@ -109,10 +110,10 @@ fn a_step_that_hides_nothing_stands() {
     struct Pendulum;
     impl VectorField<2> for Pendulum {
         fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-            vector![x[1], -x[0].sin()]
+            Vector2::new(x[1], -x[0].sin())
         }
     }
-    let start = vector![1.0, 0.0];
+    let start = Vector2::new(1.0, 0.0);
     let guarded = Method::Dopri5.with_stepper(TOLERANCE, To(&Pendulum, start, 20.0)).unwrap();
     let bare = To(&Pendulum, start, 20.0).with(twofold::integrate::Dopri5::new(TOLERANCE)).unwrap();
     assert_eq!((guarded.0.map(f64::to_bits), guarded.1), (bare.0.map(f64::to_bits), bare.1));

@@ -1,7 +1,7 @@
 //! The method that works in the layer's own variable, against the reference, the other methods, and
 //! its own promises.
 
-use nalgebra::{SVector, vector};
+use nalgebra::{SVector, Vector3};
 use twofold::analyse::{Crossing, SectionRecorder};
 use twofold::integrate::{
     Dopri5, DriveOptions, Failure, Flow, Ignore, Kick, KickLaw, Layered, Observer, Schedule, Step,
@@ -27,8 +27,8 @@ impl VectorField<3> for Field {
         let phi = || ((x[0].squared() + x[1].squared() - c(1.0)) / c(1e-2)).tanh();
         match self {
             Field::Smooth(field) => field.eval(x),
-            Field::Circle => vector![x[1].scale(2.0) + c(0.1), -x[0], phi() - x[2].scale(0.5)],
-            Field::Quotient => vector![x[1], -x[0], phi() / (c(2.0) + x[2])],
+            Field::Circle => Vector3::new(x[1].scale(2.0) + c(0.1), -x[0], phi() - x[2].scale(0.5)),
+            Field::Quotient => Vector3::new(x[1], -x[0], phi() / (c(2.0) + x[2])),
         }
     }
 }
@@ -353,7 +353,7 @@ fn a_layer_that_is_no_plane_is_gone_through_in_time() {
         let mut method = Layered::new(tolerance(1e-11));
         drive(
             &Field::Circle,
-            vector![0.2, 0.9, 0.3],
+            Vector3::new(0.2, 0.9, 0.3),
             &DriveOptions::to(t_end),
             &mut method,
             &mut Ignore,
@@ -365,7 +365,7 @@ fn a_layer_that_is_no_plane_is_gone_through_in_time() {
     let mut taylor = Taylor::new(tolerance(1e-15));
     let want = drive(
         &Field::Circle,
-        vector![0.2, 0.9, 0.3],
+        Vector3::new(0.2, 0.9, 0.3),
         &DriveOptions::to(20.0),
         &mut taylor,
         &mut Ignore,

@@ -2,7 +2,7 @@
 //! that the paper describes.
 
 use crate::claims::Reads;
-use nalgebra::vector;
+use nalgebra::Vector3;
 use twofold::integrate::{Schedule, StepCap, Tolerance};
 use twofold::jeffrey_2013::Reading;
 use twofold::job::recording::Data;
@@ -52,7 +52,7 @@ fn the_printed_sign_sticks_and_never_returns() {
     );
     let mut system = Reading::Printed.caricature();
     system.first_component_of_minus = MinusSign::PrintedInEquation5;
-    let drift = |y, z| sliding_field(&system, &vector![0.0, y, z]).norm();
+    let drift = |y, z| sliding_field(&system, &Vector3::new(0.0, y, z)).norm();
     assert!(drift(x[1], x[2]) < 1e-4, "{}", drift(x[1], x[2]));
     assert!(drift(8.9, -9.4) > 1e-2);
 }
@@ -71,7 +71,7 @@ fn only_the_sign_of_equation_4_gives_a_two_fold_invisible_from_both_sides() {
     let fold = |sign| {
         let mut system = Reading::Printed.caricature();
         system.first_component_of_minus = sign;
-        two_fold(&system, &vector![0.01, 0.01, 0.01]).unwrap().visibility()
+        two_fold(&system, &Vector3::new(0.01, 0.01, 0.01)).unwrap().visibility()
     };
     let (above, below) = fold(MinusSign::Equation4);
     let invisible = [above, below].iter().filter(|v| **v == Visibility::Invisible).count();

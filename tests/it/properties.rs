@@ -2,7 +2,7 @@
 //! round.
 #![allow(clippy::disallowed_methods)] // exact solutions are compared to tolerances, not hashed
 
-use nalgebra::{SVector, vector};
+use nalgebra::{SVector, Vector2, Vector3};
 use proptest::prelude::*;
 use twofold::analyse::{Crossing, Direction, SectionRecorder};
 use twofold::integrate::filippov::{self, ExitRule, FilippovObserver, Mode, ModeEvent};
@@ -22,7 +22,7 @@ struct Duffing {
 impl VectorField<2> for Duffing {
     fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
         let (friction, cubic) = (S::from_f64(self.friction), S::from_f64(self.cubic));
-        vector![x[1], -x[0] - friction * x[1] - cubic * x[0] * x[0] * x[0]]
+        Vector2::new(x[1], -x[0] - friction * x[1] - cubic * x[0] * x[0] * x[0])
     }
 }
 
@@ -125,7 +125,7 @@ proptest! {
         for method in Method::ALL {
             let mut ends = Ends::default();
             let tolerance = Tolerance { rtol: tolerance, atol: tolerance };
-            method.with_stepper(tolerance, Look(Duffing { friction, cubic }, vector![x, v],
+            method.with_stepper(tolerance, Look(Duffing { friction, cubic }, Vector2::new(x, v),
                 &mut ends));
             prop_assert!(ends.steps > 0);
             // LSODA's is a polynomial about the step's end: its value at the beginning is what the
@@ -164,7 +164,7 @@ proptest! {
         // Not where the start or the end decides.
         prop_assume!(wanted.iter().all(|(t, _)| *t > 1e-2 && *t < 20.0 - 1e-2));
         let tolerance = twofold::num::elementary::exp10(-digits);
-        let start = vector![phase.cos(), -phase.sin()];
+        let start = Vector2::new(phase.cos(), -phase.sin());
         let found = method.with_stepper(
             Tolerance { rtol: tolerance, atol: tolerance },
             Record(start, SectionRecorder::new(0, level)),
@@ -190,7 +190,7 @@ proptest! {
             ..filippov::FilippovOptions::default() };
         let mut seen = OnSurface::default();
         let rule = ExitRule::AfterTime { time, side: filippov::Side::Plus };
-        let end = filippov::run(&system, vector![x, y, z], 12.0, &settings, rule, &mut seen);
+        let end = filippov::run(&system, Vector3::new(x, y, z), 12.0, &settings, rule, &mut seen);
         prop_assume!(end.is_ok());
         prop_assert!(seen.furthest <= 1e-14, "{:e} from the surface", seen.furthest);
         prop_assert_eq!(seen.wrong, None);
@@ -205,7 +205,7 @@ proptest! {
         let field = Smoothed { system, transition: Transition::Tanh, eps: 1e-2 };
         let reversed = Smoothed { system: Reversed(system), transition: Transition::Tanh,
             eps: 1e-2 };
-        let start = vector![x, y, z];
+        let start = Vector3::new(x, y, z);
         let fine = Tolerance { rtol: 1e-11, atol: 1e-11 };
         for method in [Method::Lsoda, Method::Dopri5, Method::Radau5, Method::Taylor] {
             let there = method.with_stepper(fine, Goes(&field, start, length));

@@ -1,6 +1,6 @@
 //! Crossings of planes, found the quick way, against the whole search on every step of real runs.
 
-use nalgebra::vector;
+use nalgebra::Vector3;
 use twofold::integrate::roots::{Crossing, CrossingFinder, brent};
 use twofold::integrate::{
     Dopri5, DriveOptions, Flow, Lsoda, Observer, Radau5, Schedule, Step, StepCap, Stepper, Taylor,
@@ -156,8 +156,9 @@ fn compare<M: Stepper<3>>(name: &str, mut stepper: M, t_end: f64) {
             max_steps: u64::MAX,
             kicked_states: 3,
         };
-        let _ = drive(&field, vector![0.2, 0.0, -1.0], &options, &mut stepper, &mut compared, &())
-            .unwrap();
+        let _ =
+            drive(&field, Vector3::new(0.2, 0.0, -1.0), &options, &mut stepper, &mut compared, &())
+                .unwrap();
         let Compared { steps, passages, several, decided, .. } = compared;
         println!(
             "{name} alpha {alpha}: {steps} steps, {passages} passages, {several} steps with \

@@ -2,7 +2,7 @@
 //! computed in 113-bit arithmetic outside this project (crates/verify/data/crossings-*.csv).
 
 use crate::wheel::Wheel;
-use nalgebra::{SVector, vector};
+use nalgebra::{SVector, Vector3, Vector4};
 use twofold::analyse::Direction;
 use twofold::analyse::digits::{Agreement, agreement};
 use twofold::analyse::reference::{ExtendedCrossing, SectionPlane, reference};
@@ -202,7 +202,7 @@ fn equations_with_other_layers_need_no_telling() {
     // The wheel has a second tanh (the tyre's trail); the hysteretic system's argument contains
     // phi.
     let wheel = Smoothed { system: Wheel::default(), transition: Transition::Tanh, eps: 1e-3 };
-    methods_meet(&wheel, vector![0.69267, 0.0, 0.0], 1.0, 1e-7);
+    methods_meet(&wheel, Vector3::new(0.69267, 0.0, 0.0), 1.0, 1e-7);
     let caricature = Caricature::with_reinjection(1e-1, 1e-5);
     let hysteretic = Hysteretic {
         system: caricature,
@@ -210,13 +210,13 @@ fn equations_with_other_layers_need_no_telling() {
         eps_prime: 1e-1,
         relaxation: Relaxation::Literal,
     };
-    methods_meet(&hysteretic, vector![0.2, 0.0, -1.0, 1.0], 3.0, 1e-7);
+    methods_meet(&hysteretic, Vector4::new(0.2, 0.0, -1.0, 1.0), 3.0, 1e-7);
     let perturbed = Smoothed {
         system: caricature,
         transition: Transition::PerturbedTanh { sigma: 1.0 },
         eps: 1e-3,
     };
-    methods_meet(&perturbed, vector![0.2, 0.0, -1.0], 4.0, 1e-7);
+    methods_meet(&perturbed, Vector3::new(0.2, 0.0, -1.0), 4.0, 1e-7);
 }
 
 #[test]

@@ -16,7 +16,7 @@
 //! At full length the wheel is compared with statistics measured outside this project. It is
 //! chaotic: statistics are compared, never points.
 
-use nalgebra::{SVector, vector};
+use nalgebra::{SVector, Vector3};
 use proptest::prelude::*;
 
 use crate::claims::Reads;
@@ -172,7 +172,7 @@ impl Wheel {
 
     fn with_sign<S: Elementary>(&self, x: &SVector<S, 3>, s: f64) -> SVector<S, 3> {
         let c = self.coefficients(x);
-        vector![x[1], c.a1 - c.b1.scale(s), c.a2 - c.b2.scale(s)]
+        Vector3::new(x[1], c.a1 - c.b1.scale(s), c.a2 - c.b2.scale(s))
     }
 }
 
@@ -224,7 +224,7 @@ fn right_hand_side_facts() {
 fn sticking_speed_lies_on_the_surface() {
     let w = Wheel::default();
     for (r, omega) in [(0.3, -2.0), (0.7, 3.0)] {
-        assert!(w.switching(&vector![r, w.sticking_speed(r, omega), omega]).abs() < 1e-15);
+        assert!(w.switching(&Vector3::new(r, w.sticking_speed(r, omega), omega)).abs() < 1e-15);
     }
 }
 
@@ -235,7 +235,7 @@ proptest! {
         // dE/dt along the field with sign(h) -> s must equal the power of dampers and side
         // force.
         let w = Wheel::default();
-        let x = vector![r, v, omega];
+        let x = Vector3::new(r, v, omega);
         let f = (w.plus(&x) * (1.0 + s) + w.minus(&x) * (1.0 - s)) * 0.5;
         let h = 1e-6;
         let grad = SVector::<f64, 3>::from_fn(|i, _| {
@@ -254,7 +254,7 @@ proptest! {
 fn returns_to_the_singularity_and_stays_bounded() {
     let mut reads = Reads::by("wheel::returns_to_the_singularity_and_stays_bounded");
     let wheel = Wheel::default();
-    let fold = two_fold(&wheel, &vector![0.69, -0.57, -0.87]).unwrap().point;
+    let fold = two_fold(&wheel, &Vector3::new(0.69, -0.57, -0.87)).unwrap().point;
     let spec = RunSpec {
         system: wheel.system(),
         switch: SwitchSpec::tanh(1e-3),

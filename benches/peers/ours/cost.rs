@@ -9,7 +9,7 @@
 
 use std::time::Instant;
 
-use nalgebra::vector;
+use nalgebra::Vector3;
 use twofold::analyse::SectionRecorder;
 use twofold::integrate::ensemble::{EnsembleRun, SectionPlane, ensemble};
 use twofold::integrate::{
@@ -61,7 +61,7 @@ fn one<M: Stepper<3>>(
         let mut section = SectionRecorder::<3>::new(1, 0.0);
         let end = drive(
             &field(eps),
-            vector![0.2, 0.0, -1.0],
+            Vector3::new(0.2, 0.0, -1.0),
             &options(t_end),
             &mut stepper(),
             &mut section,
@@ -110,7 +110,7 @@ fn main() {
     // machine is needed.
     let runs: Vec<_> = (0..512)
         .map(|k| EnsembleRun {
-            start: vector![0.1 + 0.2 * f64::from(k) / 512.0, 0.0, -1.0],
+            start: Vector3::new(0.1 + 0.2 * f64::from(k) / 512.0, 0.0, -1.0),
             options: options(2e3),
         })
         .collect();

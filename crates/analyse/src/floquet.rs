@@ -185,7 +185,7 @@ impl<const N: usize> Extent<N> {
 /// `closed_orbit::<3, 12, _>(...)`.
 ///
 /// ```
-/// use nalgebra::{SVector, vector};
+/// use nalgebra::{SVector, Vector2};
 /// use twofold_analyse::floquet::{Error, FloquetOptions, ReturnPlane, closed_orbit};
 /// use twofold_num::Elementary;
 /// use twofold_system::VectorField;
@@ -195,13 +195,13 @@ impl<const N: usize> Extent<N> {
 /// impl VectorField<2> for Circle {
 ///     fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
 ///         let inward = S::one() - x[0] * x[0] - x[1] * x[1];
-///         vector![x[0] * inward - x[1], x[1] * inward + x[0]]
+///         Vector2::new(x[0] * inward - x[1], x[1] * inward + x[0])
 ///     }
 /// }
 ///
 /// let plane = ReturnPlane { axis: 1, value: 0.0, upward: true };
 /// let options = FloquetOptions::default();
-/// let orbit = closed_orbit::<2, 6, _>(&Circle, plane, 1, vector![1.2, 0.0], &options)?;
+/// let orbit = closed_orbit::<2, 6, _>(&Circle, plane, 1, Vector2::new(1.2, 0.0), &options)?;
 /// assert!((orbit.period - 2.0 * std::f64::consts::PI).abs() < 1e-8);
 /// # Ok::<(), Error>(())
 /// ```

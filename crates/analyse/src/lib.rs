@@ -5,7 +5,7 @@
 //! on it.
 //!
 //! ```
-//! use nalgebra::{SVector, vector};
+//! use nalgebra::{SVector, Vector2};
 //! use twofold_analyse::{Direction, SectionRecorder};
 //! use twofold_integrate::{DriveOptions, Dopri5, Tolerance, drive};
 //! use twofold_num::Elementary;
@@ -15,7 +15,7 @@
 //! struct Oscillator;
 //! impl VectorField<2> for Oscillator {
 //!     fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-//!         vector![x[1], -x[0]]
+//!         Vector2::new(x[1], -x[0])
 //!     }
 //! }
 //!
@@ -23,7 +23,7 @@
 //! let mut section = SectionRecorder::<2>::new(0, 0.0);
 //! let mut method = Dopri5::new(Tolerance { rtol: 1e-9, atol: 1e-9 });
 //! let to = DriveOptions::to(6.0);
-//! let _ = drive(&Oscillator, vector![1.0, 0.0], &to, &mut method, &mut section, &())?;
+//! let _ = drive(&Oscillator, Vector2::new(1.0, 0.0), &to, &mut method, &mut section, &())?;
 //! let [down, up] = section.crossings() else { panic!("two passages") };
 //! assert_eq!((down.direction, up.direction), (Direction::Down, Direction::Up));
 //! assert!((up.t - 4.712_388_98).abs() < 1e-7);

@@ -122,7 +122,7 @@ const RANGE: f64 = 100.0;
 /// 6, _>(...)`.
 ///
 /// ```
-/// use nalgebra::vector;
+/// use nalgebra::Vector3;
 /// use twofold_analyse::lyapunov::{LyapunovOptions, largest};
 /// use twofold_system::{Definition, Field, System, Transition};
 /// // The Lorenz system; its largest exponent is 0.9056. Both fields are the same: h has no effect.
@@ -131,7 +131,7 @@ const RANGE: f64 = 100.0;
 /// let lorenz = System::new(Definition::from_toml(&text, "lorenz.toml")?);
 /// let field = Field::smoothed(&lorenz, Transition::Tanh, 1.0).bind::<3>()?;
 /// let options = LyapunovOptions { transient: 10.0, duration: 100.0, ..Default::default() };
-/// let exponent = largest::<3, 6, _>(&field, vector![1.0, 1.0, 20.0], &options)?;
+/// let exponent = largest::<3, 6, _>(&field, Vector3::new(1.0, 1.0, 20.0), &options)?;
 /// assert!((exponent.value - 0.9).abs() < 5.0 * exponent.standard_error.max(0.02));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

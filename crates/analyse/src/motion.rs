@@ -42,14 +42,14 @@ impl<const D: usize> Motion<D> {
 /// Records a [`Motion`] whose pieces stay within `chord` of the dense output.
 ///
 /// ```
-/// use nalgebra::vector;
+/// use nalgebra::Vector2;
 /// use twofold_analyse::MotionRecorder;
 /// use twofold_integrate::filippov::{ExitRule, FilippovOptions, run};
 /// use twofold_system::System;
 /// let block = System::builtin("stick-slip").expect("built in").bind::<2>()?;
 /// let mut recorder = MotionRecorder::<2>::new(1e-3);
 /// let options = FilippovOptions::default();
-/// let _ = run(&block, vector![0.0, 0.0], 20.0, &options, ExitRule::Undecided, &mut recorder)?;
+/// let _ = run(&block, Vector2::new(0.0, 0.0), 20.0, &options, ExitRule::Undecided, &mut recorder)?;
 /// let motion = recorder.into_motion();
 /// assert!(motion.pieces.len() > 2 && !motion.events.is_empty());
 /// # Ok::<(), Box<dyn std::error::Error>>(())

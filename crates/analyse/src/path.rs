@@ -18,18 +18,18 @@ pub struct Sample<const D: usize = 3> {
 /// first `D` are kept and looked at.
 ///
 /// ```
-/// # use nalgebra::{SVector, vector};
+/// # use nalgebra::{SVector, Vector2};
 /// # use twofold_integrate::{DriveOptions, Dopri5, Tolerance, drive};
 /// # use twofold_num::Elementary;
 /// # use twofold_system::VectorField;
 /// # struct Oscillator;
 /// # impl VectorField<2> for Oscillator {
 /// #     fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-/// #         vector![x[1], -x[0]]
+/// #         Vector2::new(x[1], -x[0])
 /// #     }
 /// # }
 /// # let mut method = Dopri5::new(Tolerance { rtol: 1e-9, atol: 1e-9 });
-/// # let x0 = vector![1.0, 0.0];
+/// # let x0 = Vector2::new(1.0, 0.0);
 /// use twofold_analyse::PathRecorder;
 /// // x'' = -x from (1, 0); both states are kept.
 /// let mut path = PathRecorder::<2>::new(&x0, 1e-3);
@@ -173,18 +173,18 @@ impl<const N: usize, const D: usize> Observer<N> for PathRecorder<D> {
 /// running sums. After a kick at such a moment the state is the one before it.
 ///
 /// ```
-/// # use nalgebra::{SVector, vector};
+/// # use nalgebra::{SVector, Vector2};
 /// # use twofold_integrate::{DriveOptions, Dopri5, Tolerance, drive};
 /// # use twofold_num::Elementary;
 /// # use twofold_system::VectorField;
 /// # struct Oscillator;
 /// # impl VectorField<2> for Oscillator {
 /// #     fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-/// #         vector![x[1], -x[0]]
+/// #         Vector2::new(x[1], -x[0])
 /// #     }
 /// # }
 /// # let mut method = Dopri5::new(Tolerance { rtol: 1e-9, atol: 1e-9 });
-/// # let x0 = vector![1.0, 0.0];
+/// # let x0 = Vector2::new(1.0, 0.0);
 /// use twofold_analyse::TimesRecorder;
 /// // x'' = -x from (1, 0), at t = 0, 0.5, ..., 6.
 /// let mut times = TimesRecorder::<2>::new(&x0, 0.5);

@@ -50,18 +50,18 @@ pub struct Crossing<const D: usize = 3> {
 /// seen to.
 ///
 /// ```
-/// # use nalgebra::{SVector, vector};
+/// # use nalgebra::{SVector, Vector2};
 /// # use twofold_integrate::{DriveOptions, Dopri5, Tolerance, drive};
 /// # use twofold_num::Elementary;
 /// # use twofold_system::VectorField;
 /// # struct Oscillator;
 /// # impl VectorField<2> for Oscillator {
 /// #     fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-/// #         vector![x[1], -x[0]]
+/// #         Vector2::new(x[1], -x[0])
 /// #     }
 /// # }
 /// # let mut method = Dopri5::new(Tolerance { rtol: 1e-9, atol: 1e-9 });
-/// # let x0 = vector![1.0, 0.0];
+/// # let x0 = Vector2::new(1.0, 0.0);
 /// use twofold_analyse::SectionRecorder;
 /// // x'' = -x from (1, 0): crossings of x = 0 at pi/2 and 3 pi/2.
 /// let mut section = SectionRecorder::<2>::new(0, 0.0);

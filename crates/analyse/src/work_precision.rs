@@ -109,7 +109,7 @@ pub fn work_precision<const N: usize>(
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::vector;
+    use nalgebra::Vector1;
 
     use super::*;
     use twofold_integrate::{Ignore, Stepper, WithStepper, drive};
@@ -121,7 +121,7 @@ mod tests {
     struct Fast;
     impl VectorField<1> for Fast {
         fn eval<S: Elementary>(&self, x: &SVector<S, 1>) -> SVector<S, 1> {
-            vector![(S::one() - x[0]).scale(1000.0)]
+            Vector1::new((S::one() - x[0]).scale(1000.0))
         }
     }
 

@@ -237,7 +237,7 @@ fn drive_any<const N: usize>(
 mod tests {
     use std::sync::atomic::{AtomicBool, Ordering};
 
-    use nalgebra::vector;
+    use nalgebra::Vector2;
 
     use super::*;
     use crate::{Dopri5, Tolerance};
@@ -274,7 +274,7 @@ mod tests {
         monitor: &dyn Monitor,
     ) -> Summary<2> {
         let mut stepper = Dopri5::new(Tolerance { rtol: 1e-9, atol: 1e-9 });
-        drive(&Turning, vector![1.0, 0.0], &options, &mut stepper, observer, monitor).unwrap()
+        drive(&Turning, Vector2::new(1.0, 0.0), &options, &mut stepper, observer, monitor).unwrap()
     }
 
     #[test]
@@ -350,7 +350,8 @@ mod tests {
             ..DriveOptions::to(100.0)
         };
         let mut seen = Lengths::default();
-        let end = drive(&field, vector![2.0, 0.0], &options, &mut stepper, &mut seen, &()).unwrap();
+        let end =
+            drive(&field, Vector2::new(2.0, 0.0), &options, &mut stepper, &mut seen, &()).unwrap();
         let s = &end.statistics;
         assert_eq!((s.restarts, s.highest_order), (4, 5));
         assert!(s.rejected > 20, "the orbit has fast parts: {} rejected", s.rejected);

@@ -6,7 +6,7 @@
 //! each step to an [`Observer`]. What is made of the steps (a path, a section) is not decided here.
 //!
 //! ```
-//! use nalgebra::{SVector, vector};
+//! use nalgebra::{SVector, Vector2};
 //! use twofold_integrate::{DriveOptions, Dopri5, Ignore, StopReason, Tolerance, drive};
 //! use twofold_num::Elementary;
 //! use twofold_system::VectorField;
@@ -15,13 +15,13 @@
 //! struct Oscillator;
 //! impl VectorField<2> for Oscillator {
 //!     fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-//!         vector![x[1], -x[0]]
+//!         Vector2::new(x[1], -x[0])
 //!     }
 //! }
 //!
 //! let mut method = Dopri5::new(Tolerance { rtol: 1e-9, atol: 1e-9 });
 //! let to = DriveOptions::to(1.0);
-//! let end = drive(&Oscillator, vector![1.0, 0.0], &to, &mut method, &mut Ignore, &())?;
+//! let end = drive(&Oscillator, Vector2::new(1.0, 0.0), &to, &mut method, &mut Ignore, &())?;
 //! assert_eq!(end.stop, StopReason::EndTime);
 //! assert!((end.x[0] - 0.540_302_305_868).abs() < 1e-8); // cos 1
 //! # Ok::<(), twofold_integrate::Failure>(())

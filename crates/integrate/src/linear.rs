@@ -97,20 +97,20 @@ where
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{Complex, SMatrix, SVector, matrix, vector};
+    use nalgebra::{Complex, Matrix2, Matrix3, SMatrix, SVector, Vector3};
     use proptest::prelude::*;
 
     #[test]
     fn pivots() {
-        let a = matrix![0.0, 2.0, 1.0; 1.0, 0.0, 3.0; 4.0, -1.0, 0.0];
-        let x = vector![1.0, -2.0, 3.0];
+        let a = Matrix3::new(0.0, 2.0, 1.0, 1.0, 0.0, 3.0, 4.0, -1.0, 0.0);
+        let x = Vector3::new(1.0, -2.0, 3.0);
         assert!((Lu::new(a).unwrap().solve(a * x) - x).norm() < 1e-14);
     }
 
     #[test]
     fn refuses_singular_and_nan() {
-        assert!(Lu::new(matrix![1.0, 2.0; 2.0, 4.0]).is_none());
-        assert!(Lu::new(matrix![f64::NAN, 2.0; 2.0, 4.0]).is_none());
+        assert!(Lu::new(Matrix2::new(1.0, 2.0, 2.0, 4.0)).is_none());
+        assert!(Lu::new(Matrix2::new(f64::NAN, 2.0, 2.0, 4.0)).is_none());
     }
 
     proptest! {

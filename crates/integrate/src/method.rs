@@ -112,7 +112,7 @@ pub fn with_extended<U: WithStepper<N>, const N: usize>(
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::vector;
+    use nalgebra::{Vector1, Vector2};
 
     use super::*;
     use crate::{DriveOptions, Ignore, Statistics, drive};
@@ -132,7 +132,7 @@ mod tests {
     struct Growing;
     impl VectorField<1> for Growing {
         fn eval<S: Elementary>(&self, x: &SVector<S, 1>) -> SVector<S, 1> {
-            vector![x[0] * x[0]]
+            Vector1::new(x[0] * x[0])
         }
     }
 
@@ -142,7 +142,7 @@ mod tests {
         fn with<M: Stepper<1>>(self, mut stepper: M) -> Self::Answer {
             let end = drive(
                 &Growing,
-                vector![0.7],
+                Vector1::new(0.7),
                 &DriveOptions::to(0.9),
                 &mut stepper,
                 &mut Ignore,
@@ -181,7 +181,7 @@ mod tests {
                 Jumping::Held => -(x[0] - x[1].sin().scale(0.5)).sign(),
                 Jumping::Left => x[1].scale(W).sin().sign(),
             };
-            vector![slope, S::one()]
+            Vector2::new(slope, S::one())
         }
     }
 
@@ -190,7 +190,7 @@ mod tests {
         type Answer = Result<f64, crate::Failure>;
         fn with<M: Stepper<2>>(self, mut stepper: M) -> Self::Answer {
             let options = DriveOptions::to(self.1);
-            let start = vector![0.3, 0.0];
+            let start = Vector2::new(0.3, 0.0);
             drive(&self.0, start, &options, &mut stepper, &mut Ignore, &()).map(|end| end.x[0])
         }
     }

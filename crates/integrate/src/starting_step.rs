@@ -29,7 +29,7 @@ pub(super) fn starting_step<const N: usize>(
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::vector;
+    use nalgebra::Vector1;
 
     use super::*;
 
@@ -37,7 +37,9 @@ mod tests {
     /// recipe.
     fn first(x: f64, f: impl Fn(f64) -> f64, longest: f64) -> f64 {
         let norm = |v: &SVector<f64, 1>| v[0].abs() / (1e-6 + 1e-6 * x.abs());
-        starting_step(&vector![x], &vector![f(x)], &norm, 0.2, longest, &|y| vector![f(y[0])])
+        starting_step(&Vector1::new(x), &Vector1::new(f(x)), &norm, 0.2, longest, &|y| {
+            Vector1::new(f(y[0]))
+        })
     }
 
     fn near(a: f64, b: f64) {

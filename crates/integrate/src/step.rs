@@ -525,7 +525,7 @@ pub(crate) fn finite<const N: usize>(x: &SVector<f64, N>) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::vector;
+    use nalgebra::Vector2;
 
     use super::*;
 
@@ -566,7 +566,7 @@ mod tests {
     struct Wrong;
     impl Interpolant<2> for Wrong {
         fn at(&self, theta: f64) -> SVector<f64, 2> {
-            vector![theta * theta + 0.125, -theta]
+            Vector2::new(theta * theta + 0.125, -theta)
         }
         fn degree(&self) -> usize {
             2
@@ -578,8 +578,8 @@ mod tests {
         let step = Step {
             t0: 3.0,
             t1: 5.0,
-            x0: vector![0.0, 0.0],
-            x1: vector![1.0, -1.0],
+            x0: Vector2::new(0.0, 0.0),
+            x1: Vector2::new(1.0, -1.0),
             interpolant: &Wrong,
         };
         assert_eq!(
@@ -602,10 +602,10 @@ mod tests {
         // An interpolant that says nothing of itself is not thought to be near, nor to be monotone.
         assert!(Wrong.reach(0) == f64::INFINITY && !Wrong.is_monotone(0));
         assert!(
-            finite(&vector![1.0, -2.0])
-                && !finite(&vector![1.0, f64::NAN])
-                && !finite(&vector![f64::INFINITY, 0.0])
+            finite(&Vector2::new(1.0, -2.0))
+                && !finite(&Vector2::new(1.0, f64::NAN))
+                && !finite(&Vector2::new(f64::INFINITY, 0.0))
         );
-        assert_eq!(Failure::state(&vector![1.0, 2.0]), [1.0, 2.0]);
+        assert_eq!(Failure::state(&Vector2::new(1.0, 2.0)), [1.0, 2.0]);
     }
 }

@@ -115,20 +115,20 @@ impl<const L: usize> Precision for MultiFloat<L> {
 /// `S`, which [`Taylor::state`] and [`Taylor::at`] give in full.
 ///
 /// ```
-/// # use nalgebra::{SVector, vector};
+/// # use nalgebra::{SVector, Vector2};
 /// # use twofold_num::Elementary;
 /// # use twofold_system::VectorField;
 /// # struct Oscillator;
 /// # impl VectorField<2> for Oscillator {
 /// #     fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-/// #         vector![x[1], -x[0]]
+/// #         Vector2::new(x[1], -x[0])
 /// #     }
 /// # }
 /// use twofold_integrate::{DriveOptions, Ignore, Taylor, Tolerance, drive};
 /// // x'' = -x from (1, 0), in f64; `Taylor::extended` works with 32 digits.
 /// let mut taylor = Taylor::new(Tolerance { rtol: 1e-15, atol: 1e-15 });
 /// let to = DriveOptions::to(1.0);
-/// let end = drive(&Oscillator, vector![1.0, 0.0], &to, &mut taylor, &mut Ignore, &())?;
+/// let end = drive(&Oscillator, Vector2::new(1.0, 0.0), &to, &mut taylor, &mut Ignore, &())?;
 /// assert!((end.x[0] - 0.540_302_305_868_139_7).abs() < 1e-14);
 /// # Ok::<(), twofold_integrate::Failure>(())
 /// ```
@@ -969,7 +969,9 @@ mod tests {
     /// Steps from outside the layer through it, all on compiled series?
     fn is_compiled<F: VectorField<3>>(field: &F) -> bool {
         let mut taylor = Taylor::<3>::new(Tolerance { rtol: 1e-8, atol: 1e-8 });
-        taylor.restart(field, 0.0, nalgebra::vector![0.2, 0.0, -1.0], 10.0, f64::INFINITY).unwrap();
+        taylor
+            .restart(field, 0.0, nalgebra::Vector3::new(0.2, 0.0, -1.0), 10.0, f64::INFINITY)
+            .unwrap();
         while taylor.state().0 < 10.0 {
             taylor.step(field).unwrap();
         }

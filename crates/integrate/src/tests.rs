@@ -8,7 +8,7 @@
 use std::fmt::Write;
 use std::ops::ControlFlow;
 
-use nalgebra::{SVector, vector};
+use nalgebra::{SVector, Vector2, Vector3, Vector4};
 
 use super::ensemble::{
     Common, EnsembleRun, InstructionSet, SectionPlane, Tolerances, ensemble_watched,
@@ -193,13 +193,13 @@ impl VectorField<2> for Planar {
     fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
         match self {
             Planar::VanDerPol(mu) => {
-                vector![x[1], ((S::one() - x[0] * x[0]) * x[1]).scale(*mu) - x[0]]
+                Vector2::new(x[1], ((S::one() - x[0] * x[0]) * x[1]).scale(*mu) - x[0])
             }
-            Planar::Explosion => vector![x[0] * x[0], S::one()],
+            Planar::Explosion => Vector2::new(x[0] * x[0], S::one()),
             Planar::Decay(lambda) => {
-                vector![(x[1].cos() - x[0]).scale(*lambda) - x[1].sin(), S::one()]
+                Vector2::new((x[1].cos() - x[0]).scale(*lambda) - x[1].sin(), S::one())
             }
-            Planar::Root => vector![(S::one() - x[0] * x[0]).sqrt() * x[1], S::one()],
+            Planar::Root => Vector2::new((S::one() - x[0] * x[0]).sqrt() * x[1], S::one()),
         }
     }
 }
@@ -222,13 +222,15 @@ impl VectorField<3> for Spatial {
         let phi = || ((x[0].squared() + x[1].squared() - c(1.0)) / c(1e-2)).tanh();
         match self {
             Spatial::Smooth(field) => field.eval(x),
-            Spatial::Circle => vector![x[1].scale(2.0) + c(0.1), -x[0], phi() - x[2].scale(0.5)],
+            Spatial::Circle => {
+                Vector3::new(x[1].scale(2.0) + c(0.1), -x[0], phi() - x[2].scale(0.5))
+            }
             Spatial::Crossed => {
                 let (a, b) =
                     ((x[0] / c(1e-2)).tanh(), ((x[1] + x[0].scale(0.25)) / c(1e-2)).tanh());
-                vector![-b + x[2].scale(0.1), a - x[2].scale(0.2), a * b - x[2].scale(0.5)]
+                Vector3::new(-b + x[2].scale(0.1), a - x[2].scale(0.2), a * b - x[2].scale(0.5))
             }
-            Spatial::Quotient => vector![x[1], -x[0], phi() / (c(2.0) + x[2])],
+            Spatial::Quotient => Vector3::new(x[1], -x[0], phi() / (c(2.0) + x[2])),
         }
     }
 }
@@ -327,7 +329,7 @@ fn lsoda() {
     let mut found = in_space(|size| Lsoda::new(tolerance(size)), 14.0, 4.0);
     found.extend(in_the_plane(|size| Lsoda::new(tolerance(size)), 50.0));
     let relative = Tolerance { rtol: 0.0, atol: 1e-7 };
-    let start = vector![2.0, 0.0];
+    let start = Vector2::new(2.0, 0.0);
     found.push(follow(
         "absolute",
         &Planar::VanDerPol(1.0),
@@ -456,7 +458,7 @@ fn hysteretic() {
         };
         let options =
             DriveOptions { schedule: kicked(KickLaw::Sphere, 0.3), ..DriveOptions::to(3.0) };
-        let start = vector![0.2, 0.0, -1.0, 1.0];
+        let start = Vector4::new(0.2, 0.0, -1.0, 1.0);
         for (name, options) in [("plain", &DriveOptions::to(3.0)), ("kicked", &options)] {
             found.push(follow(name, &field, start, options, Lsoda::new(tolerance(1e-8))));
             found.push(follow(name, &field, start, options, Dopri5::new(tolerance(1e-6))));
@@ -621,7 +623,7 @@ fn filippov_families() {
     }
     found.push(line(
         "short history",
-        &history(&caricature, vector![0.0, -0.9, -0.9], 0.1, &settings, 3),
+        &history(&caricature, Vector3::new(0.0, -0.9, -0.9), 0.1, &settings, 3),
     ));
     for b in [[0.3, 0.4, -0.6], [-0.2, 0.5, 0.1], [0.0, 0.3, 0.3]] {
         found.push(line(
@@ -737,7 +739,7 @@ impl VectorField<3> for Clocked {
         if let Some(t) = (&x[2] as &dyn std::any::Any).downcast_ref::<f64>() {
             self.0.fetch_max(t.to_bits(), std::sync::atomic::Ordering::Relaxed);
         }
-        vector![x[1], -x[0], S::one()]
+        Vector3::new(x[1], -x[0], S::one())
     }
 }
 
@@ -746,7 +748,7 @@ impl VectorField<3> for Clocked {
 fn nothing_is_asked_beyond_the_end() {
     fn latest(mut method: impl Stepper<3>, t0: f64, t_end: f64, cap: f64) -> f64 {
         let field = Clocked(Default::default());
-        method.restart(&field, t0, vector![1.0, 0.5, t0], t_end, cap).unwrap();
+        method.restart(&field, t0, Vector3::new(1.0, 0.5, t0), t_end, cap).unwrap();
         loop {
             let step = method.step(&field).unwrap();
             assert!(step.t1 <= t_end && step.length() <= cap * (1.0 + 1e-12));
@@ -826,7 +828,7 @@ fn lanes_tell_of_the_steps_that_may_meet_the_plane() {
     };
     let runs: Vec<EnsembleRun<3>> = (0..8_u32)
         .map(|k| EnsembleRun {
-            start: vector![0.1 + 0.05 * f64::from(k), 0.02, -1.0],
+            start: Vector3::new(0.1 + 0.05 * f64::from(k), 0.02, -1.0),
             options: DriveOptions::to(12.0),
         })
         .collect();
@@ -897,7 +899,7 @@ fn lanes_are_runs_alone() {
                 step_cap,
                 ..DriveOptions::to(0.5 + f64::from(k * 7 % 11) / 5.0)
             };
-            EnsembleRun { start: vector![0.1 + 0.01 * f64::from(k), 0.0, -1.0], options }
+            EnsembleRun { start: Vector3::new(0.1 + 0.01 * f64::from(k), 0.0, -1.0), options }
         })
         .collect();
     let sizes: Vec<Tolerance> =

@@ -1,6 +1,6 @@
 //! Passage of an orbit through a two-fold, as questions.
 
-use nalgebra::{SVector, vector};
+use nalgebra::{SVector, Vector4};
 use serde::Serialize;
 use serde_json::Value;
 
@@ -196,7 +196,7 @@ impl Question for Leaving {
             }
             SwitchSpec::Hysteretic { eps_prime, relaxation, phi0, .. } => {
                 let field = instances::hysteretic(&self.system, eps, eps_prime, relaxation)?;
-                self.each(&*field, eps, |[x, y, z]| vector![x, y, z, phi0])
+                self.each(&*field, eps, |[x, y, z]| Vector4::new(x, y, z, phi0))
             }
             SwitchSpec::Delayed { .. } | SwitchSpec::Relay { .. } | SwitchSpec::Filippov { .. } => {
                 unreachable!("refused above")

@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 
-use nalgebra::{SVector, vector};
+use nalgebra::{SVector, Vector4};
 
 use super::answer::{Answer, Stop};
 use super::question::JobError;
@@ -387,7 +387,7 @@ fn three_states(
         }
         SwitchSpec::Hysteretic { eps, eps_prime, relaxation, phi0 } => {
             let field = instances::hysteretic(&spec.system, eps, eps_prime, relaxation)?;
-            observe(spec, &*field, vector![x0[0], x0[1], x0[2], phi0], aside, monitor)
+            observe(spec, &*field, Vector4::new(x0[0], x0[1], x0[2], phi0), aside, monitor)
         }
         SwitchSpec::Delayed { .. } | SwitchSpec::Relay { .. } => {
             late(spec, &*switched::late(&spec.system)?, x0, aside, monitor)

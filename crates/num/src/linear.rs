@@ -350,12 +350,12 @@ fn double_step(a: &mut [Vec<f64>], low: usize, last: usize, (x, y, w): (f64, f64
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{matrix, vector};
+    use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 
     #[test]
     fn exchanges_rows() {
-        let a = matrix![0.0, 2.0, 1.0; 1.0, 0.0, 3.0; 4.0, -1.0, 0.0];
-        let x = vector![1.0, -2.0, 3.0];
+        let a = Matrix3::new(0.0, 2.0, 1.0, 1.0, 0.0, 3.0, 4.0, -1.0, 0.0);
+        let x = Vector3::new(1.0, -2.0, 3.0);
         assert!((solve(a, a * x, 0.0).unwrap() - x).norm() < 1e-14);
     }
 
@@ -436,10 +436,12 @@ mod tests {
 
     #[test]
     fn refuses_what_has_no_solution() {
-        assert!(solve(matrix![1.0, 2.0; 2.0, 4.0], vector![1.0, 1.0], 0.0).is_none());
-        assert!(solve(matrix![1.0, 0.0; 0.0, 1e-20], vector![1.0, 1.0], 0.0).is_some());
-        assert!(solve(matrix![1.0, 0.0; 0.0, 1e-20], vector![1.0, 1.0], 1e-14).is_none());
-        assert!(solve(matrix![f64::NAN, 2.0; 2.0, 4.0], vector![1.0, 1.0], 0.0).is_none());
+        assert!(solve(Matrix2::new(1.0, 2.0, 2.0, 4.0), Vector2::new(1.0, 1.0), 0.0).is_none());
+        assert!(solve(Matrix2::new(1.0, 0.0, 0.0, 1e-20), Vector2::new(1.0, 1.0), 0.0).is_some());
+        assert!(solve(Matrix2::new(1.0, 0.0, 0.0, 1e-20), Vector2::new(1.0, 1.0), 1e-14).is_none());
+        assert!(
+            solve(Matrix2::new(f64::NAN, 2.0, 2.0, 4.0), Vector2::new(1.0, 1.0), 0.0).is_none()
+        );
     }
 
     /// Pseudo-random whole numbers from -3 to 3.

@@ -5,9 +5,8 @@
 //! are our own, because library distributions may change between releases or reach the platform's
 //! math functions.
 
-use rand::Rng;
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
+use rand::rngs::ChaCha8Rng;
+use rand::{Rng, SeedableRng};
 
 use super::elementary::{cos, ln, sin, sqrt};
 
@@ -24,9 +23,19 @@ use super::elementary::{cos, ln, sin, sqrt};
 /// assert_eq!(u, same.uniform());
 /// assert_ne!(u, other.uniform());
 /// ```
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct RandomStream {
     generator: ChaCha8Rng,
+}
+
+/// The copy gives the numbers that the stream has still to give.
+impl Clone for RandomStream {
+    fn clone(&self) -> Self {
+        let mut generator = ChaCha8Rng::from_seed(self.generator.get_seed());
+        generator.set_stream(self.generator.get_stream());
+        generator.set_word_pos(self.generator.get_word_pos());
+        Self { generator }
+    }
 }
 
 impl RandomStream {
@@ -86,6 +95,17 @@ mod tests {
             let mut r = RandomStream::new(2013, stream);
             for word in words {
                 assert_eq!(r.uniform(), (word >> 11) as f64 / 9_007_199_254_740_992.0);
+            }
+        }
+    }
+
+    #[test]
+    fn a_copy_gives_the_numbers_that_follow() {
+        let mut one = RandomStream::new(2013, 7);
+        for _ in 0..100 {
+            let mut copy = one.clone();
+            for number in [one.uniform(), one.uniform(), one.uniform()] {
+                assert_eq!(copy.uniform(), number);
             }
         }
     }

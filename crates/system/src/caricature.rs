@@ -1,6 +1,6 @@
 //! The paper's caricature: the two-fold normal form (4) with the re-injection of eq. (5).
 
-use nalgebra::{SVector, vector};
+use nalgebra::{SVector, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::PiecewiseSmooth;
@@ -19,10 +19,10 @@ use twofold_num::Elementary;
 /// be shown.
 ///
 /// ```
-/// use nalgebra::vector;
+/// use nalgebra::Vector3;
 /// use twofold_system::{Caricature, PiecewiseSmooth};
 /// let caricature = Caricature::with_reinjection(1e-3, 1e-5);
-/// assert_eq!(caricature.plus(&vector![0.0, 0.0, 0.0]), vector![0.0, 1.0, -1.2]);
+/// assert_eq!(caricature.plus(&Vector3::new(0.0, 0.0, 0.0)), Vector3::new(0.0, 1.0, -1.2));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -81,7 +81,7 @@ impl PiecewiseSmooth<3> for Caricature {
     #[inline(always)]
     fn plus<S: Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
         let (dy, dz) = self.reinjection(x);
-        vector![-x[1], S::one() + dy, S::from_f64(self.v_plus) + dz]
+        Vector3::new(-x[1], S::one() + dy, S::from_f64(self.v_plus) + dz)
     }
 
     #[inline(always)]
@@ -91,7 +91,7 @@ impl PiecewiseSmooth<3> for Caricature {
             MinusSign::Equation4 => x[2],
             MinusSign::PrintedInEquation5 => -x[2],
         };
-        vector![first, S::from_f64(self.v_minus) + dy, S::one() + dz]
+        Vector3::new(first, S::from_f64(self.v_minus) + dy, S::one() + dz)
     }
 }
 
@@ -102,16 +102,18 @@ mod tests {
     #[test]
     fn values_by_hand() {
         let c = Caricature::with_reinjection(1e-1, 1e-5);
-        let x = vector![0.2, 0.5, -1.0];
+        let x = Vector3::new(0.2, 0.5, -1.0);
         let r2 = 0.04 + 0.25 + 1.0;
         assert_eq!(c.switching(&x), 0.2);
         let p = c.plus(&x);
         assert!(
-            (p - vector![-0.5, 1.0 + (0.1 - 0.5e-5) * r2, -1.2 + (0.1 + 1e-5) * r2]).norm() < 1e-15
+            (p - Vector3::new(-0.5, 1.0 + (0.1 - 0.5e-5) * r2, -1.2 + (0.1 + 1e-5) * r2)).norm()
+                < 1e-15
         );
         let m = c.minus(&x);
         assert!(
-            (m - vector![-1.0, -1.4 + (0.1 - 0.5e-5) * r2, 1.0 + (0.1 + 1e-5) * r2]).norm() < 1e-15
+            (m - Vector3::new(-1.0, -1.4 + (0.1 - 0.5e-5) * r2, 1.0 + (0.1 + 1e-5) * r2)).norm()
+                < 1e-15
         );
     }
 }

@@ -16,12 +16,12 @@ use twofold_num::{Aligned, Arithmetic, Elementary, Simd};
 /// An autonomous ordinary differential equation x' = f(x) as data.
 ///
 /// ```
-/// use nalgebra::vector;
+/// use nalgebra::Vector3;
 /// use twofold_system::{Field, System, Transition, VectorField, jacobian};
 /// let caricature = System::builtin("caricature").expect("built in");
 /// let smoothed = Field::smoothed(&caricature, Transition::Tanh, 1e-3);
 /// let f = smoothed.bind::<3>()?;
-/// assert_eq!(f.eval(&vector![1.0, 0.5, 0.0])[0], -0.5); // far from the layer: f+
+/// assert_eq!(f.eval(&Vector3::new(1.0, 0.5, 0.0))[0], -0.5); // far from the layer: f+
 /// // Orbit and two tangent vectors together, in nine dimensions:
 /// let tangent = smoothed.variational(2);
 /// assert_eq!((tangent.dimension(), tangent.names()[3].as_str()), (9, "d1_x"));

@@ -82,11 +82,11 @@ pub fn sliding_weight<P: PiecewiseSmooth<N>, S: Elementary, const N: usize>(
 /// The sliding vector field lambda f+ + (1 - lambda) f-. Undefined (0/0) at a two-fold.
 ///
 /// ```
-/// use nalgebra::vector;
+/// use nalgebra::{Vector2, Vector3};
 /// use twofold_system::{System, filippov::sliding_field};
 /// let block = System::builtin("stick-slip").expect("built in").bind::<2>()?;
 /// // On the belt (v = 0.3) the spring stretches and the block does not accelerate.
-/// let sliding = sliding_field(&block, &vector![0.1, 0.3]);
+/// let sliding = sliding_field(&block, &Vector2::new(0.1, 0.3));
 /// assert!((sliding[0] - 0.3).abs() < 1e-12 && sliding[1].abs() < 1e-12);
 /// # Ok::<(), twofold_system::BindError>(())
 /// ```
@@ -151,10 +151,10 @@ pub enum TwoFoldError {
 /// the two-folds form a set, of which one near the guess is found.
 ///
 /// ```
-/// use nalgebra::vector;
+/// use nalgebra::{Vector2, Vector3};
 /// use twofold_system::{System, filippov::{Visibility, two_fold}};
 /// let normal_form = System::builtin("two-fold").expect("built in").bind::<3>()?;
-/// let found = two_fold(&normal_form, &vector![0.1, 0.2, -0.1])?;
+/// let found = two_fold(&normal_form, &Vector3::new(0.1, 0.2, -0.1))?;
 /// assert!(found.point.norm() < 1e-12); // the origin
 /// assert_eq!(found.visibility(), (Visibility::Invisible, Visibility::Invisible));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -252,34 +252,35 @@ fn dot<S: Elementary, const N: usize>(a: &SVector<S, N>, b: &SVector<S, N>) -> S
 mod tests {
     use super::*;
     use crate::{Caricature, System};
-    use nalgebra::vector;
+    use nalgebra::Vector3;
 
     #[test]
     fn regions_of_the_caricature() {
         let c = Caricature::with_reinjection(1e-3, 1e-5);
-        assert_eq!(region(&c, &vector![0.0, 1.0, 1.0]), Region::Attracting);
-        assert_eq!(region(&c, &vector![0.0, -1.0, -1.0]), Region::Repelling);
-        assert_eq!(region(&c, &vector![0.0, -1.0, 1.0]), Region::CrossingUp);
-        assert_eq!(region(&c, &vector![0.0, 1.0, -1.0]), Region::CrossingDown);
-        assert_eq!(region(&c, &vector![0.0, 0.0, 0.0]), Region::Boundary);
+        assert_eq!(region(&c, &Vector3::new(0.0, 1.0, 1.0)), Region::Attracting);
+        assert_eq!(region(&c, &Vector3::new(0.0, -1.0, -1.0)), Region::Repelling);
+        assert_eq!(region(&c, &Vector3::new(0.0, -1.0, 1.0)), Region::CrossingUp);
+        assert_eq!(region(&c, &Vector3::new(0.0, 1.0, -1.0)), Region::CrossingDown);
+        assert_eq!(region(&c, &Vector3::new(0.0, 0.0, 0.0)), Region::Boundary);
     }
 
     #[test]
     fn sliding_in_the_caricature() {
         // lambda = z/(y + z); near the two-fold the sliding field is (z + v- y, y + v+ z)/(y + z).
         let c = Caricature::with_reinjection(0.0, 0.0);
-        let x = vector![0.0, 0.3, 0.8];
+        let x = Vector3::new(0.0, 0.3, 0.8);
         assert!((sliding_weight(&c, &x) - 0.8 / 1.1).abs() < 1e-15);
         let f = sliding_field(&c, &x);
         assert!(
-            (f - vector![0.0, (0.8 - 1.4 * 0.3) / 1.1, (0.3 - 1.2 * 0.8) / 1.1]).norm() < 1e-15
+            (f - Vector3::new(0.0, (0.8 - 1.4 * 0.3) / 1.1, (0.3 - 1.2 * 0.8) / 1.1)).norm()
+                < 1e-15
         );
     }
 
     #[test]
     fn two_fold_of_the_caricature_and_its_constants() {
         let c = Caricature::with_reinjection(1e-1, 1e-5);
-        let t = two_fold(&c, &vector![0.01, 0.02, -0.03]).unwrap();
+        let t = two_fold(&c, &Vector3::new(0.01, 0.02, -0.03)).unwrap();
         assert!(t.point.amax() < 1e-14);
         assert_eq!(t.visibility(), (Visibility::Invisible, Visibility::Invisible));
         let (v, w) = normal_form_constants(&c, &t);
@@ -290,9 +291,9 @@ mod tests {
     fn two_fold_of_the_wheel() {
         // SCIENCE.md section 7.
         let w = System::builtin("wheel").unwrap().bind::<3>().unwrap();
-        let t = two_fold(&w, &vector![0.69, -0.57, -0.87]).unwrap();
+        let t = two_fold(&w, &Vector3::new(0.69, -0.57, -0.87)).unwrap();
         assert!(
-            (t.point - vector![0.6926698897, -0.5736729677, -0.8666344383]).amax() < 1e-10,
+            (t.point - Vector3::new(0.6926698897, -0.5736729677, -0.8666344383)).amax() < 1e-10,
             "{:?}",
             t.point
         );

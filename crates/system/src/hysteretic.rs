@@ -43,12 +43,12 @@ impl Relaxation {
 /// x' = f- + (f+ - f-) phi, eps' phi' = psi - phi. State (x, phi), dimension `N + 1`.
 ///
 /// ```
-/// use nalgebra::vector;
+/// use nalgebra::Vector4;
 /// use twofold_system::{Caricature, Hysteretic, Relaxation, VectorField};
 /// let system = Caricature::with_reinjection(1e-3, 1e-5);
 /// let relaxation = Relaxation::Literal;
 /// let hysteretic = Hysteretic { system, eps: 1e-3, eps_prime: 1e-2, relaxation };
-/// let x = vector![1.0, 0.0, 0.0, 1.0]; // the state and phi
+/// let x = Vector4::new(1.0, 0.0, 0.0, 1.0); // the state and phi
 /// assert_eq!(hysteretic.eval(&x)[3], 0.0); // phi is 1 and stays 1 where h > eps
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]

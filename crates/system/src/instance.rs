@@ -16,7 +16,7 @@ use twofold_num::{Decimal, Elementary};
 /// A piecewise-smooth system as data: a [`Definition`] and values for its parameters.
 ///
 /// ```
-/// use nalgebra::vector;
+/// use nalgebra::Vector2;
 /// use twofold_system::{Definition, PiecewiseSmooth, System};
 /// let text = r#"
 ///     states = ["x", "v"]
@@ -30,8 +30,8 @@ use twofold_num::{Decimal, Elementary};
 /// let system = System::new(Definition::from_toml(text, "block.toml")?).with("friction", 0.5)?;
 /// // Evaluated over any number type; the dimension is checked here, once.
 /// let block = system.bind::<2>()?;
-/// assert_eq!(block.switching(&vector![0.0, 1.3]), 1.0);
-/// assert_eq!(block.plus(&vector![0.25, 1.3]), vector![1.3, -0.75]);
+/// assert_eq!(block.switching(&Vector2::new(0.0, 1.3)), 1.0);
+/// assert_eq!(block.plus(&Vector2::new(0.25, 1.3)), Vector2::new(1.3, -0.75));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///

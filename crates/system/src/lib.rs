@@ -58,7 +58,7 @@ pub use transition::Transition;
 /// An autonomous ordinary differential equation x' = f(x) in `N` dimensions.
 ///
 /// ```
-/// use nalgebra::{SVector, vector};
+/// use nalgebra::{SVector, Vector2};
 /// use twofold_num::Elementary;
 /// use twofold_system::{VectorField, jacobian};
 ///
@@ -66,11 +66,11 @@ pub use transition::Transition;
 /// struct Oscillator;
 /// impl VectorField<2> for Oscillator {
 ///     fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-///         vector![x[1], -x[0] - x[1] * S::from_f64(0.5)]
+///         Vector2::new(x[1], -x[0] - x[1] * S::from_f64(0.5))
 ///     }
 /// }
-/// assert_eq!(Oscillator.eval(&vector![1.0, 2.0]), vector![2.0, -2.0]);
-/// assert_eq!(jacobian(&Oscillator, &vector![1.0, 2.0])[(1, 1)], -0.5);
+/// assert_eq!(Oscillator.eval(&Vector2::new(1.0, 2.0)), Vector2::new(2.0, -2.0));
+/// assert_eq!(jacobian(&Oscillator, &Vector2::new(1.0, 2.0))[(1, 1)], -0.5);
 /// # use twofold_num::Arithmetic;
 /// ```
 pub trait VectorField<const N: usize>: Sync {
@@ -122,7 +122,7 @@ pub trait VectorField<const N: usize>: Sync {
 /// 3).
 ///
 /// ```
-/// use nalgebra::{SVector, vector};
+/// use nalgebra::{SVector, Vector2};
 /// use twofold_num::Elementary;
 /// use twofold_system::PiecewiseSmooth;
 /// use twofold_system::filippov::{Region, region};
@@ -134,13 +134,13 @@ pub trait VectorField<const N: usize>: Sync {
 ///         x[0]
 ///     }
 ///     fn plus<S: Elementary>(&self, _: &SVector<S, 2>) -> SVector<S, 2> {
-///         vector![-S::one(), S::one()]
+///         Vector2::new(-S::one(), S::one())
 ///     }
 ///     fn minus<S: Elementary>(&self, _: &SVector<S, 2>) -> SVector<S, 2> {
-///         vector![S::one(), S::one()]
+///         Vector2::new(S::one(), S::one())
 ///     }
 /// }
-/// assert_eq!(region(&Relay, &vector![0.0, 3.0]), Region::Attracting);
+/// assert_eq!(region(&Relay, &Vector2::new(0.0, 3.0)), Region::Attracting);
 /// # use twofold_num::Arithmetic;
 /// ```
 pub trait PiecewiseSmooth<const N: usize>: Sync {

@@ -8,11 +8,11 @@ use twofold_num::Elementary;
 /// x' = f- + (f+ - f-) phi(h/eps): a smooth vector field that tends to `system` as eps -> 0.
 ///
 /// ```
-/// use nalgebra::vector;
+/// use nalgebra::Vector3;
 /// use twofold_system::{Caricature, PiecewiseSmooth, Smoothed, Transition, VectorField};
 /// let system = Caricature::with_reinjection(1e-3, 1e-5);
 /// let smoothed = Smoothed { system, transition: Transition::Tanh, eps: 1e-3 };
-/// let x = vector![1.0, 0.0, 0.0]; // far outside the layer the field is f+
+/// let x = Vector3::new(1.0, 0.0, 0.0); // far outside the layer the field is f+
 /// assert!((smoothed.eval(&x) - system.plus(&x)).norm() < 1e-15);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -295,7 +295,7 @@ pub enum LateSwitch {
 /// A system whose switch depends on the past, and where it starts.
 ///
 /// ```
-/// use nalgebra::{SVector, vector};
+/// use nalgebra::{SVector, Vector1};
 /// use twofold_integrate::delay::{Delayed, History, LateSwitch, Own, Sides};
 /// use twofold_integrate::{DriveOptions, Ignore, Method, Stepper, Tolerance, WithStepper, drive};
 /// use twofold_system::{Definition, System};
@@ -306,7 +306,7 @@ pub enum LateSwitch {
 ///     type Answer = SVector<f64, 1>;
 ///     fn with<M: Stepper<1>>(self, mut stepper: M) -> Self::Answer {
 ///         let to = DriveOptions::to(4.0);
-///         drive(&Own, vector![0.3], &to, &mut stepper, &mut Ignore, &()).expect("it runs").x
+///         drive(&Own, Vector1::new(0.3), &to, &mut stepper, &mut Ignore, &()).expect("it runs").x
 ///     }
 /// }
 ///
@@ -315,7 +315,7 @@ pub enum LateSwitch {
 /// let relay = System::new(Definition::from_toml(text, "relay.toml")?);
 /// let bound = relay.bind::<1>()?;
 /// let switch = LateSwitch::Delayed { delay: 1.0, smooth: None, history: History::Constant };
-/// let delayed = Delayed { sides: Sides::new(&bound, &relay), switch, x0: vector![0.3] };
+/// let delayed = Delayed { sides: Sides::new(&bound, &relay), switch, x0: Vector1::new(0.3) };
 /// let tolerance = Tolerance { rtol: 1e-9, atol: 1e-9 };
 /// let end = delayed.with_stepper(Method::Dopri5, None, tolerance, ToFour)?;
 /// assert!((end[0] - 0.3).abs() < 1e-9);

@@ -1,4 +1,4 @@
-use nalgebra::{SVector, vector};
+use nalgebra::{SVector, Vector1, Vector2, Vector3};
 
 use super::*;
 use crate::{
@@ -347,7 +347,7 @@ fn a_passage_at_the_time_of_a_switch_is_seen() {
 #[test]
 fn a_delay_that_times_cannot_tell_apart_is_refused() {
     let run = |delay: f64, smooth| {
-        let (data, x0) = (relay(1.0, 1.0), vector![0.5]);
+        let (data, x0) = (relay(1.0, 1.0), Vector1::new(0.5));
         let bound: Bound<1> = data.bind().unwrap();
         let switch = LateSwitch::Delayed { delay, smooth, history: History::Constant };
         let delayed = Delayed { sides: Sides::new(&bound, &data), switch, x0 };
@@ -597,11 +597,11 @@ fn the_smooth_rule_keeps_the_methods_order() {
 /// Steps are remembered for one delay and a half at most.
 #[test]
 fn the_past_is_one_delay() {
-    let mut past = past::Past::constant(vector![0.0]);
+    let mut past = past::Past::constant(Vector1::new(0.0));
     let bound: Bound<1> = linear().bind().unwrap();
     let mut dopri5 = Dopri5::new(tolerance(1e-8));
     let field = twofold_system::Blended { system: &bound, phi: 0.0 };
-    dopri5.restart(&field, 0.0, vector![0.0], 100.0, 0.1).unwrap();
+    dopri5.restart(&field, 0.0, Vector1::new(0.0), 100.0, 0.1).unwrap();
     let mut t = 0.0;
     while t < 50.0 {
         let step = dopri5.step(&field).unwrap();
@@ -718,7 +718,7 @@ fn switches() -> [LateSwitch; 4] {
 fn disturbances_are_those_of_neighbouring_orbits() {
     let system = Caricature::with_reinjection(1e-1, 1e-5);
     let data = System::from(system);
-    let (x0, size, until) = (vector![0.01, 0.4, 0.5], 1e-6, 0.5);
+    let (x0, size, until) = (Vector3::new(0.01, 0.4, 0.5), 1e-6, 0.5);
     for switch in switches() {
         let end = |x0: SVector<f64, 3>| {
             let delayed = Delayed { sides: Sides::new(&system, &data), switch, x0 };
@@ -763,14 +763,15 @@ fn disturbances_of_rapid_oscillations_grow_by_the_root_of_two() {
     let bound: Bound<1> = data.bind().unwrap();
     let varied = Varied(&bound);
     let switch = LateSwitch::Delayed { delay: 1.0, smooth: None, history: History::Constant };
-    let delayed = Delayed { sides: Sides::varied(&varied, &data), switch, x0: vector![0.0, 1.0] };
+    let delayed =
+        Delayed { sides: Sides::varied(&varied, &data), switch, x0: Vector2::new(0.0, 1.0) };
     let queue = [(0.2, true), (0.6, false), (1.0, true)];
     let mut stepper = delayed
         .sharp_dopri5(tolerance(1e-12))
         .unwrap()
         .carrying(&varied)
         .with_queue(false, true, &queue);
-    stepper.restart(&Own, 0.0, vector![0.0, 1.0], 100.0, f64::INFINITY).unwrap();
+    stepper.restart(&Own, 0.0, Vector2::new(0.0, 1.0), 100.0, f64::INFINITY).unwrap();
     let mut zeros = vec![0.0, 0.0, 0.0, 1.0];
     let mut finder = CrossingFinder::starting(true);
     while zeros.len() < 34 {
@@ -880,7 +881,7 @@ fn a_jump_that_attracts_is_refused_by_the_smooth_rule() {
     let smooth = Some((Transition::Tanh, 0.05));
     let switch = LateSwitch::Delayed { delay: 0.1, smooth, history: History::Constant };
     for method in SMOOTH_METHODS {
-        let x0 = vector![1.5, 0.0];
+        let x0 = Vector2::new(1.5, 0.0);
         let delayed = Delayed { sides: Sides::new(&bound, &data), switch, x0 };
         let failure = delayed.with_stepper(method, None, tolerance(1e-9), Failing(x0)).unwrap();
         let Failure::StaysOnJump { t, state, .. } = failure else { panic!("{failure}") };

@@ -27,13 +27,13 @@ use twofold_system::{PiecewiseSmooth, VectorField, variables};
 /// Runs the Filippov motion of `system` from (0, x0) to `t_end`. `M` is `N + 1` and is inferred.
 ///
 /// ```
-/// use nalgebra::vector;
+/// use nalgebra::Vector2;
 /// use twofold_integrate::filippov::{ExitRule, FilippovOptions, Mode, Trajectory, run};
 /// use twofold_system::System;
 /// let block = System::builtin("stick-slip").expect("built in").bind::<2>()?;
 /// let mut path = Trajectory::new(4);
 /// let options = FilippovOptions::default();
-/// let end = run(&block, vector![0.0, 0.0], 20.0, &options, ExitRule::Undecided, &mut path)?;
+/// let end = run(&block, Vector2::new(0.0, 0.0), 20.0, &options, ExitRule::Undecided, &mut path)?;
 /// assert_eq!(end.t, 20.0);
 /// assert!(path.pieces.iter().any(|piece| piece.mode == Mode::SlidingAttracting)); // it sticks
 /// # Ok::<(), Box<dyn std::error::Error>>(())

@@ -73,7 +73,7 @@ const MOST_POINTS: usize = 20_000_000;
 /// [`ExitRule::All`].
 ///
 /// ```
-/// use nalgebra::vector;
+/// use nalgebra::Vector3;
 /// use twofold_integrate::filippov::{FilippovOptions, FunnelGrid, funnel};
 /// use twofold_system::System;
 /// let normal_form = System::builtin("two-fold").expect("built in").bind::<3>()?;
@@ -85,7 +85,7 @@ const MOST_POINTS: usize = 20_000_000;
 ///     until_two_fold: true,
 ///     per_step: 1,
 /// };
-/// let start = vector![0.0, 0.5, 0.5]; // attracting sliding
+/// let start = Vector3::new(0.0, 0.5, 0.5); // attracting sliding
 /// let futures = funnel(&normal_form, start, 100.0, &FilippovOptions::default(), &grid)?;
 /// assert!(futures.at_two_fold);
 /// assert_eq!(futures.members.len(), 4); // two exit times, two sides

@@ -78,7 +78,7 @@ enum First {
 /// met last (at the start: the first one, unless the run starts on the second).
 ///
 /// ```
-/// use nalgebra::vector;
+/// use nalgebra::{Vector2, Vector4};
 /// use twofold_integrate::filippov::{ExitRule, FilippovOptions, Trajectory, run_two_surfaces};
 /// use twofold_system::System;
 /// let blocks = System::builtin("two-blocks").expect("built in");
@@ -86,7 +86,7 @@ enum First {
 /// let faces = [[a.bind::<4>()?, b.bind::<4>()?], [c.bind::<4>()?, d.bind::<4>()?]];
 /// let mut path = Trajectory::new(1);
 /// let options = FilippovOptions::default();
-/// let start = vector![0.0, 0.0, 0.0, 0.0];
+/// let start = Vector4::new(0.0, 0.0, 0.0, 0.0);
 /// let end = run_two_surfaces(&faces, start, 5.0, &options, ExitRule::Undecided, &mut path, &())?;
 /// assert_eq!(end.t, 5.0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -540,7 +540,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> FilippovObserver<N> for Guard<'_, P,
 mod tests {
     use super::super::Trajectory;
     use super::*;
-    use nalgebra::vector;
+    use nalgebra::Vector2;
 
     /// Constant fields, one for each quadrant of the plane: x' = (a, b) by the signs of x and y.
     #[derive(Clone, Copy)]
@@ -609,7 +609,7 @@ mod tests {
             let to = if k % 4 < 2 { Side::Minus } else { Side::Plus };
             assert_eq!(*kind, EventKind::Crossing { to }, "{k}");
         }
-        assert!((end.x - vector![-0.5, 0.25]).amax() < 1e-9, "{}", end.x);
+        assert!((end.x - Vector2::new(-0.5, 0.25)).amax() < 1e-9, "{}", end.x);
         assert_eq!((end.t, end.stop, end.events), (100.0, StopReason::EndTime, 133));
     }
 
@@ -628,12 +628,13 @@ mod tests {
         let (end, _) = run(DOWN, [1.0, 3.0], 2.5);
         let end = end.unwrap();
         assert!(
-            (end.x - vector![0.0, 0.5]).amax() < 1e-11 && end.mode == Some(Mode::SlidingAttracting)
+            (end.x - Vector2::new(0.0, 0.5)).amax() < 1e-11
+                && end.mode == Some(Mode::SlidingAttracting)
         );
         // Crossing y = 0 first, then landing on x = 0 below it, where the two fields are opposite:
         // there it rests.
         let (end, seen) = run(DOWN, [3.0, 1.0], 10.0);
-        assert!((end.unwrap().x - vector![0.0, -2.0]).amax() < 1e-10);
+        assert!((end.unwrap().x - Vector2::new(0.0, -2.0)).amax() < 1e-10);
         let kinds: Vec<_> = seen.events.iter().map(|e| e.kind).collect();
         assert_eq!(
             kinds,
@@ -647,7 +648,7 @@ mod tests {
         // downwards.
         let (end, seen) =
             run([[-1.0, -1.0], [1.0, -1.0], [-1.0, -2.0], [1.0, -2.0]], [1.0, 3.0], 10.0);
-        assert!((end.unwrap().x - vector![0.0, -14.0]).amax() < 1e-10);
+        assert!((end.unwrap().x - Vector2::new(0.0, -14.0)).amax() < 1e-10);
         let events: Vec<_> = seen.events.iter().map(|e| (e.kind, e.to)).collect();
         let sliding = Some(Mode::SlidingAttracting);
         let crossed = EventKind::Crossing { to: Side::Minus };
@@ -659,7 +660,7 @@ mod tests {
         // Below, x = 0 is crossed and not slid on: it leaves there, to x > 0.
         let (end, seen) =
             run([[-1.0, -1.0], [1.0, -1.0], [0.5, -2.0], [1.0, -2.0]], [1.0, 3.0], 4.0);
-        assert!((end.unwrap().x - vector![0.5, -2.0]).amax() < 1e-10);
+        assert!((end.unwrap().x - Vector2::new(0.5, -2.0)).amax() < 1e-10);
         assert_eq!(seen.events[1].to, Some(Mode::Plus));
         // Below, x = 0 repels: a set of futures.
         let (end, _) =
@@ -674,7 +675,7 @@ mod tests {
     #[test]
     fn flying_into_the_intersection_goes_on_where_all_fields_cross() {
         let (end, _) = run(SQUARE.map(|_| [-1.0, -1.0]), [2.0, 2.0], 5.0);
-        assert!((end.unwrap().x - vector![-3.0, -3.0]).amax() < 1e-10);
+        assert!((end.unwrap().x - Vector2::new(-3.0, -3.0)).amax() < 1e-10);
     }
 
     #[test]

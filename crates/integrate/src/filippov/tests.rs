@@ -1,7 +1,7 @@
 //! Properties of any piecewise-smooth system: two sides that mirror each other, the local analysis
 //! against differences of the field itself, and a two-fold that is not at the origin.
 
-use nalgebra::{SVector, vector};
+use nalgebra::{SVector, Vector2, Vector3};
 use std::ops::ControlFlow;
 
 use super::flow::desingularised;
@@ -186,7 +186,11 @@ impl Curved {
     fn field<S: Elementary>(&self, x: &SVector<S, 3>, which: usize) -> SVector<S, 3> {
         let [_, y, z] = [0, 1, 2].map(|i| x[i] - S::from_f64(self.centre[i]));
         let c = self.fields[which].map(S::from_f64);
-        vector![c[0] * y + c[1] * z + c[2] * y * y + c[3] * z * z, c[4] + c[6] * z, c[5] + c[7] * y]
+        Vector3::new(
+            c[0] * y + c[1] * z + c[2] * y * y + c[3] * z * z,
+            c[4] + c[6] * z,
+            c[5] + c[7] * y,
+        )
     }
 }
 
@@ -214,7 +218,7 @@ fn the_local_analysis_is_that_of_the_field_itself() {
     for _ in 0..60 {
         let s = Curved::by_chance(&mut stream);
         let centre = SVector::from(s.centre);
-        let Some(local) = SlidingAtTwoFold::near(&s, &(centre + vector![0.01, -0.02, 0.015]))
+        let Some(local) = SlidingAtTwoFold::near(&s, &(centre + Vector3::new(0.01, -0.02, 0.015)))
         else {
             continue;
         };
@@ -364,16 +368,16 @@ impl PiecewiseSmooth<3> for Straight {
         // + 2 y) and q = y.
         let rest = S::one() + x[1].scale(2.0);
         let along = S::from_f64(-1.0);
-        vector![-(x[1] * rest), along - rest.scale(0.5), along - rest.scale(-0.25)]
+        Vector3::new(-(x[1] * rest), along - rest.scale(0.5), along - rest.scale(-0.25))
     }
     fn minus<S: Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
-        vector![x[2], S::from_f64(0.5), S::from_f64(-0.25)]
+        Vector3::new(x[2], S::from_f64(0.5), S::from_f64(-0.25))
     }
 }
 
 #[test]
 fn a_curve_is_used_only_where_it_slides() {
-    let local = SlidingAtTwoFold::near(&Straight, &vector![0.0, 0.01, 0.02]).unwrap();
+    let local = SlidingAtTwoFold::near(&Straight, &Vector3::new(0.0, 0.01, 0.02)).unwrap();
     let curve = local.through.as_ref().unwrap();
     let zero = std::f64::consts::FRAC_1_SQRT_2;
     assert!(curve.radius > zero, "the series itself knows of no fold: {}", curve.radius);
@@ -394,7 +398,7 @@ fn a_resonance_ends_the_series() {
         bend: 0.0,
         fields: [field([1.0, 0.0], [-0.15, -0.45]), field([0.0, 1.0], [0.45, 0.15])],
     };
-    let local = SlidingAtTwoFold::near(&system, &vector![0.0, 0.01, 0.02]).unwrap();
+    let local = SlidingAtTwoFold::near(&system, &Vector3::new(0.0, 0.01, 0.02)).unwrap();
     let [weak, strong] = local.directions.unwrap();
     near(weak.rate, -0.3, 1e-14, "weak");
     near(strong.rate, -0.6, 1e-14, "strong");
@@ -436,7 +440,7 @@ fn futures_and_pasts_meet_at_a_two_fold_anywhere() {
     let (v, w) = (-1.2, -1.4);
     let time = |y: f64, z: f64| ((v * y - z) + (w * z - y)) / (1.0 - v * w);
     let system = Moved { fold: fold(1.0, 1.0, v, w), centre: [2.0, -3.0, 5.0] };
-    let place = |y: f64, z: f64| SVector::from(system.centre) + vector![0.0, y, z];
+    let place = |y: f64, z: f64| SVector::from(system.centre) + Vector3::new(0.0, y, z);
     let settings = FilippovOptions::default();
     let path = connect(&system, place(0.3, 0.8), place(-0.4, -0.5), 100.0, &settings, 2).unwrap();
     let points: Vec<_> = path.points().collect();
@@ -504,7 +508,7 @@ fn a_start_on_a_visible_fold_flies_off_along_it() {
 fn a_budget_is_an_error_where_it_is_asked_to_be() {
     let summary = |stop| FilippovSummary {
         t: 1.5,
-        x: vector![1.0, 2.0],
+        x: Vector2::new(1.0, 2.0),
         mode: None,
         stop,
         events: 0,
@@ -539,7 +543,7 @@ fn a_watch_ends_a_run() {
         let mut seen = Trajectory::new(1);
         let end = run_watched(
             &system,
-            vector![0.0, 0.3, 0.8],
+            Vector3::new(0.0, 0.3, 0.8),
             3.0,
             &settings,
             rule,

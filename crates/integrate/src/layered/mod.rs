@@ -63,14 +63,14 @@ pub fn applicable(tape: &Tape) -> Result<(), NotPolynomial> {
 /// The stepper. See the [module](self).
 ///
 /// ```
-/// use nalgebra::vector;
+/// use nalgebra::Vector2;
 /// use twofold_integrate::{DriveOptions, Ignore, Layered, Tolerance, drive};
 /// use twofold_system::{Field, System, Transition};
 /// let block = System::builtin("stick-slip").expect("built in");
 /// let smoothed = Field::smoothed(&block, Transition::Tanh, 1e-3).bind::<2>()?;
 /// let mut layered = Layered::new(Tolerance { rtol: 1e-10, atol: 1e-10 });
 /// let to = DriveOptions::to(5.0);
-/// let end = drive(&smoothed, vector![0.0, 0.0], &to, &mut layered, &mut Ignore, &())?;
+/// let end = drive(&smoothed, Vector2::new(0.0, 0.0), &to, &mut layered, &mut Ignore, &())?;
 /// assert_eq!(end.t, 5.0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

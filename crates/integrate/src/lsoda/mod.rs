@@ -128,20 +128,20 @@ pub type Lsoda<const N: usize> = LsodaOf<Const<N>>;
 /// at run time ([`nalgebra::Dyn`]; [`LsodaOf::start`], [`LsodaOf::advance`]).
 ///
 /// ```
-/// # use nalgebra::{SVector, vector};
+/// # use nalgebra::{SVector, Vector2};
 /// # use twofold_num::Elementary;
 /// # use twofold_system::VectorField;
 /// # struct Oscillator;
 /// # impl VectorField<2> for Oscillator {
 /// #     fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-/// #         vector![x[1], -x[0]]
+/// #         Vector2::new(x[1], -x[0])
 /// #     }
 /// # }
 /// use twofold_integrate::{DriveOptions, Ignore, Lsoda, Tolerance, drive};
 /// // x'' = -x from (1, 0).
 /// let mut lsoda = Lsoda::new(Tolerance { rtol: 1e-10, atol: 1e-10 });
 /// let to = DriveOptions::to(1.0);
-/// let end = drive(&Oscillator, vector![1.0, 0.0], &to, &mut lsoda, &mut Ignore, &())?;
+/// let end = drive(&Oscillator, Vector2::new(1.0, 0.0), &to, &mut lsoda, &mut Ignore, &())?;
 /// assert!((end.x[0] - 0.540_302_305_868).abs() < 1e-8);
 /// # Ok::<(), twofold_integrate::Failure>(())
 /// ```

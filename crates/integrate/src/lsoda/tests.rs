@@ -2,7 +2,7 @@
 //! and forgets.
 
 use super::*;
-use nalgebra::vector;
+use nalgebra::{Vector1, Vector2, Vector3, Vector4};
 use twofold_num::Elementary;
 use twofold_system::{Caricature, Hysteretic, Relaxation};
 
@@ -11,7 +11,7 @@ struct Circle;
 
 impl VectorField<2> for Circle {
     fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-        vector![-x[1], x[0]]
+        Vector2::new(-x[1], x[0])
     }
 }
 
@@ -20,17 +20,17 @@ struct Hyperbola;
 
 impl VectorField<1> for Hyperbola {
     fn eval<S: Elementary>(&self, x: &SVector<S, 1>) -> SVector<S, 1> {
-        vector![-x[0].squared()]
+        Vector1::new(-x[0].squared())
     }
 }
 
 /// A stepper held to one formula and one step, with the exact history of the hyperbola at t = 0.
 fn held(family: Family, order: usize, h: f64) -> Lsoda<1> {
     let mut lsoda = Lsoda::new(Tolerance { rtol: 1e-14, atol: 1e-14 });
-    lsoda.restart(&Hyperbola, 0.0, vector![1.0], 1e9, f64::INFINITY).unwrap();
+    lsoda.restart(&Hyperbola, 0.0, Vector1::new(1.0), 1e9, f64::INFINITY).unwrap();
     let mut power = 1.0;
     for j in 0..=order {
-        lsoda.history.set_column(j, vector![power]);
+        lsoda.history.set_column(j, Vector1::new(power));
         power *= -h;
     }
     (lsoda.family, lsoda.order, lsoda.h, lsoda.held) = (family, order, h, true);
@@ -119,8 +119,8 @@ fn error_follows_tolerance() {
     for k in 4..=11 {
         let tolerance = 10_f64.powi(-k);
         let mut lsoda = Lsoda::new(Tolerance { rtol: tolerance, atol: tolerance });
-        let x = run(&mut lsoda, &Circle, vector![1.0, 0.0], 0.0, 20.0);
-        let error = (x - vector![20_f64.cos(), 20_f64.sin()]).amax();
+        let x = run(&mut lsoda, &Circle, Vector2::new(1.0, 0.0), 0.0, 20.0);
+        let error = (x - Vector2::new(20_f64.cos(), 20_f64.sin())).amax();
         assert!(error < 200.0 * tolerance && error > 0.05 * tolerance, "{tolerance}: {error}");
         assert_eq!(lsoda.statistics().method_switches, 0);
     }
@@ -135,11 +135,11 @@ fn conserves_linear_invariants() {
         fn eval<S: Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
             let (slow, back, fast) =
                 (x[0].scale(0.04), x[1].scale(1e4) * x[2], x[1].squared().scale(3e7));
-            vector![back - slow, slow - back - fast, fast]
+            Vector3::new(back - slow, slow - back - fast, fast)
         }
     }
     let mut lsoda = Lsoda::new(Tolerance { rtol: 1e-6, atol: 1e-10 });
-    let x = run(&mut lsoda, &Reactions, vector![1.0, 0.0, 0.0], 0.0, 1e5);
+    let x = run(&mut lsoda, &Reactions, Vector3::new(1.0, 0.0, 0.0), 0.0, 1e5);
     assert!((x.sum() - 1.0).abs() < 1e-12, "{}", x.sum());
     assert!(x.iter().all(|x| *x > 0.0));
     assert!(lsoda.statistics().stiff_steps > 0);
@@ -154,11 +154,11 @@ fn stiff_decay_is_left_to_bdf() {
     struct ProtheroRobinson;
     impl VectorField<2> for ProtheroRobinson {
         fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-            vector![(x[1].cos() - x[0]).scale(1e6) - x[1].sin(), S::one()]
+            Vector2::new((x[1].cos() - x[0]).scale(1e6) - x[1].sin(), S::one())
         }
     }
     let mut lsoda = Lsoda::new(Tolerance { rtol: 1e-6, atol: 1e-6 });
-    let x = run(&mut lsoda, &ProtheroRobinson, vector![2.0, 0.0], 0.0, 10.0);
+    let x = run(&mut lsoda, &ProtheroRobinson, Vector2::new(2.0, 0.0), 0.0, 10.0);
     assert!((x[0] - 10_f64.cos()).abs() < 1e-5);
     let [first, ..] = lsoda.switches() else { panic!("no switch") };
     assert_eq!(first.to, Family::Bdf);
@@ -176,11 +176,11 @@ fn adams_returns_when_stiffness_ends() {
     impl VectorField<2> for Fading {
         fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
             let s = (S::one() - (x[1] - S::from_f64(5.0)).scale(4.0).tanh()).scale(0.5);
-            vector![(x[1].cos() - x[0]).scale(1e4) * s - x[1].sin(), S::one()]
+            Vector2::new((x[1].cos() - x[0]).scale(1e4) * s - x[1].sin(), S::one())
         }
     }
     let mut lsoda = Lsoda::new(Tolerance { rtol: 1e-7, atol: 1e-7 });
-    let x = run(&mut lsoda, &Fading, vector![1.5, 0.0], 0.0, 30.0);
+    let x = run(&mut lsoda, &Fading, Vector2::new(1.5, 0.0), 0.0, 30.0);
     assert!((x[0] - 30_f64.cos()).abs() < 1e-5, "{x}");
     let to: Vec<_> = lsoda.switches().iter().map(|s| s.to).collect();
     assert_eq!(to, [Family::Bdf, Family::Adams], "{:?}", lsoda.switches());
@@ -198,7 +198,7 @@ fn restart_forgets() {
         relaxation: Relaxation::Literal,
     };
     let tolerance = Tolerance { rtol: 1e-8, atol: 1e-8 };
-    let start = vector![0.2, 0.0, -1.0, 1.0];
+    let start = Vector4::new(0.2, 0.0, -1.0, 1.0);
     let mut used = Lsoda::new(tolerance);
     let middle = run(&mut used, &field, start, 0.0, 7.3);
     let before = used.statistics().clone();
@@ -215,8 +215,8 @@ fn restart_forgets() {
 #[test]
 fn starts_late() {
     let mut lsoda = Lsoda::new(Tolerance { rtol: 1e-8, atol: 1e-8 });
-    let x = run(&mut lsoda, &Circle, vector![1.0, 0.0], 199_980.0, 200_000.0);
-    assert!((x - vector![20_f64.cos(), 20_f64.sin()]).amax() < 1e-6);
+    let x = run(&mut lsoda, &Circle, Vector2::new(1.0, 0.0), 199_980.0, 200_000.0);
+    assert!((x - Vector2::new(20_f64.cos(), 20_f64.sin())).amax() < 1e-6);
 }
 
 /// Both families' formulas vanish at the step's start, so that the dense output goes through it.
@@ -224,7 +224,7 @@ fn starts_late() {
 fn the_dense_output_begins_at_the_step() {
     for tolerance in [1e-4, 1e-8, 1e-11] {
         let mut lsoda = Lsoda::new(Tolerance { rtol: tolerance, atol: tolerance });
-        lsoda.restart(&Circle, 0.0, vector![1.0, 0.0], 20.0, f64::INFINITY).unwrap();
+        lsoda.restart(&Circle, 0.0, Vector2::new(1.0, 0.0), 20.0, f64::INFINITY).unwrap();
         loop {
             let step = lsoda.step(&Circle).unwrap();
             assert!((step.at(0.0) - step.x0).amax() < 1e-14 && step.at(1.0) == step.x1);
@@ -238,7 +238,7 @@ fn the_dense_output_begins_at_the_step() {
 #[test]
 fn keeps_the_cap() {
     let mut lsoda = Lsoda::new(Tolerance { rtol: 1e-4, atol: 1e-4 });
-    lsoda.restart(&Circle, 0.0, vector![1.0, 0.0], 10.0, 0.01).unwrap();
+    lsoda.restart(&Circle, 0.0, Vector2::new(1.0, 0.0), 10.0, 0.01).unwrap();
     loop {
         let step = lsoda.step(&Circle).unwrap();
         assert!(step.length() <= 0.01 * (1.0 + 1e-12));
@@ -252,12 +252,12 @@ fn keeps_the_cap() {
 #[test]
 fn dense_output_is_accurate() {
     let mut lsoda = Lsoda::new(Tolerance { rtol: 1e-9, atol: 1e-9 });
-    lsoda.restart(&Circle, 0.0, vector![1.0, 0.0], 20.0, f64::INFINITY).unwrap();
+    lsoda.restart(&Circle, 0.0, Vector2::new(1.0, 0.0), 20.0, f64::INFINITY).unwrap();
     loop {
         let step = lsoda.step(&Circle).unwrap();
         for theta in [0.01, 0.25, 0.5, 0.75, 0.99] {
             let t = step.time(theta);
-            assert!((step.at(theta) - vector![t.cos(), t.sin()]).amax() < 1e-7, "t = {t}");
+            assert!((step.at(theta) - Vector2::new(t.cos(), t.sin())).amax() < 1e-7, "t = {t}");
         }
         assert!(step.interpolant.degree() <= 12);
         if step.t1 == 20.0 {
@@ -271,12 +271,12 @@ fn failures_are_named() {
     struct Explosion;
     impl VectorField<1> for Explosion {
         fn eval<S: Elementary>(&self, x: &SVector<S, 1>) -> SVector<S, 1> {
-            vector![x[0].squared()]
+            Vector1::new(x[0].squared())
         }
     }
     // x = 1/(1 - t) has no value at t = 1.
     let mut lsoda = Lsoda::new(Tolerance { rtol: 1e-8, atol: 1e-8 });
-    lsoda.restart(&Explosion, 0.0, vector![1.0], 2.0, f64::INFINITY).unwrap();
+    lsoda.restart(&Explosion, 0.0, Vector1::new(1.0), 2.0, f64::INFINITY).unwrap();
     let failure = (0..100_000)
         .find_map(|_| lsoda.step(&Explosion).err())
         .expect("the solution ends at t = 1");
@@ -287,7 +287,7 @@ fn failures_are_named() {
         panic!("{failure}")
     };
     assert!((t - 1.0).abs() < 1e-6, "{failure}");
-    let nan = lsoda.restart(&Explosion, 0.0, vector![f64::NAN], 2.0, f64::INFINITY);
+    let nan = lsoda.restart(&Explosion, 0.0, Vector1::new(f64::NAN), 2.0, f64::INFINITY);
     assert!(matches!(nan, Err(Failure::NotFinite { .. })));
 }
 

@@ -1,7 +1,7 @@
 //! Fig. 3: what happens about a two-fold of the normal form (4): regions of the surface, orbits
 //! that cross it, orbits that slide on it.
 
-use nalgebra::vector;
+use nalgebra::Vector3;
 
 use super::{lines_of, lines_table};
 use twofold_integrate::filippov::{ExitRule, FilippovOptions, Mode, Side, Trajectory, run};
@@ -135,7 +135,7 @@ pub fn draw(tables: &[Table], v: f64, w: f64) -> Sheet {
 /// Number of points that make up the first `share` of the polyline's length.
 fn along(points: &[[f64; 3]], share: f64) -> usize {
     let length = |a: &[f64; 3], b: &[f64; 3]| {
-        let d = vector![b[0] - a[0], b[1] - a[1], b[2] - a[2]];
+        let d = Vector3::new(b[0] - a[0], b[1] - a[1], b[2] - a[2]);
         d.norm()
     };
     let total: f64 = points.windows(2).map(|p| length(&p[0], &p[1])).sum();

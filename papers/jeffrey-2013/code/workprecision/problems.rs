@@ -1,7 +1,7 @@
 //! The test problems of the work-precision picture and of tests/it/odepack.rs: the same equations,
 //! starts and ends as in scripts/odepack_reference.py.
 
-use nalgebra::{SVector, vector};
+use nalgebra::{SVector, Vector2, Vector3};
 use twofold::num::Elementary;
 use twofold::system::{
     BoundField, Caricature, Field, Hysteretic, Relaxation, Smoothed, Transition, VectorField,
@@ -32,7 +32,7 @@ impl VectorField<3> for Robertson {
         let slow = a.scale(0.04);
         let back = b.scale(1e4) * c;
         let fast = b.scale(3e7) * b;
-        vector![back - slow, slow - back - fast, fast]
+        Vector3::new(back - slow, slow - back - fast, fast)
     }
 }
 
@@ -44,7 +44,7 @@ pub struct VanDerPol {
 
 impl VectorField<2> for VanDerPol {
     fn eval<S: Elementary>(&self, x: &SVector<S, 2>) -> SVector<S, 2> {
-        vector![x[1], (S::one() - x[0] * x[0]).scale(self.mu) * x[1] - x[0]]
+        Vector2::new(x[1], (S::one() - x[0] * x[0]).scale(self.mu) * x[1] - x[0])
     }
 }
 
@@ -54,11 +54,11 @@ pub struct Oregonator;
 impl VectorField<3> for Oregonator {
     fn eval<S: Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
         let [a, b, c] = [x[0], x[1], x[2]];
-        vector![
+        Vector3::new(
             (b + a * (S::one() - a.scale(8.375e-6) - b)).scale(77.27),
             (c - (S::one() + a) * b) / S::from_f64(77.27),
-            (a - c).scale(0.161)
-        ]
+            (a - c).scale(0.161),
+        )
     }
 }
 
@@ -86,11 +86,11 @@ pub struct Lorenz;
 
 impl VectorField<3> for Lorenz {
     fn eval<S: Elementary>(&self, x: &SVector<S, 3>) -> SVector<S, 3> {
-        vector![
+        Vector3::new(
             (x[1] - x[0]).scale(10.0),
             x[0] * (S::from_f64(28.0) - x[2]) - x[1],
-            x[0] * x[1] - x[2].scale(8.0 / 3.0)
-        ]
+            x[0] * x[1] - x[2].scale(8.0 / 3.0),
+        )
     }
 }
 
