@@ -5,6 +5,8 @@ use std::path::Path;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::{Map, Value, json};
+use twofold::cli::CliError;
+use twofold::folder::make::Scored;
 use twofold::folder::{Folder, FolderError};
 use twofold::job::{Executor, JobError, Store};
 use twofold::paper::View;
@@ -42,7 +44,7 @@ pub fn paper(folder: &str) -> PyResult<String> {
         .iter()
         .map(|c| {
             json!({ "id": c.id, "place": c.place, "says": c.says, "decided": c.decided,
-            "check": c.kind(), "note": c.note })
+            "check": c.kind(), "quote": c.quote, "note": c.note })
         })
         .collect();
     Ok(json!({
@@ -76,11 +78,12 @@ fn points(folder: &Folder) -> Map<String, Value> {
 
 /// The answer to a panel or measure: tables as arrays, facts as JSON.
 #[pyfunction]
-#[pyo3(signature = (folder, name, keep, show=None))]
+#[pyo3(signature = (folder, name, threads, keep, show=None))]
 pub fn paper_answer<'py>(
     py: Python<'py>,
     folder: &str,
     name: &str,
+    threads: usize,
     keep: bool,
     show: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
@@ -92,9 +95,14 @@ pub fn paper_answer<'py>(
     };
     let question = source.question.clone();
     let (answer, hash) = supervise(py, show, move |work| {
-        let answer = executor(&folder, keep, work).ask(&*question)?;
-        let hash = answer.hash();
-        Ok((answer, hash))
+        let executor = executor(&folder, keep, work);
+        pool(threads)?.install(|| {
+            // Its parts are computed side by side.
+            executor.gather(std::slice::from_ref(&question));
+            let answer = executor.ask(&*question)?;
+            let hash = answer.hash();
+            Ok((answer, hash))
+        })
     })?;
     handed(py, hash.as_str(), &json!(answer.facts), answer.tables.clone())
 }
@@ -110,22 +118,20 @@ pub fn paper_claims(
     show: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<String> {
     let folder = read(folder)?;
+    let refused = |e: CliError| errors::definition(e.to_string());
+    let known = folder.known().map_err(refused)?;
     supervise(py, show, move |work| {
         let executor = executor(&folder, keep, work);
+        let failed = |e: CliError| JobError::Other(e.to_string());
         pool(threads)?.install(|| {
-            let mut asked = Vec::new();
-            for claim in &folder.claims {
-                let questions = claim.questions(&folder);
-                let questions = questions.map_err(|e| JobError::Other(e.to_string()))?;
-                asked.extend(questions.into_iter().map(|(_, question)| question));
-            }
-            executor.gather(&asked);
-            let scored = folder.claims.iter().map(|claim| match claim.judge(&folder, &executor) {
-                Ok(verdict) => Ok(json!(verdict)),
+            executor.gather(&folder.claims_ask(&executor).map_err(failed)?);
+            let scored = folder.score(&known, &executor);
+            let scored = scored.into_iter().map(|Scored { claim, verdict }| match verdict {
+                Ok(v) => Ok(json!({ "id": claim.id, "agrees": v.agrees, "found": v.found,
+                    "odds": v.odds, "rule_after_data": v.rule_after_data,
+                    "words_after_data": v.words_after_data })),
                 Err(JobError::Interrupted) => Err(JobError::Interrupted),
-                Err(why) => {
-                    Ok(json!({ "claim": claim.id, "agrees": null, "found": why.to_string() }))
-                }
+                Err(why) => Ok(json!({ "id": claim.id, "agrees": null, "found": why.to_string() })),
             });
             Ok(json!(scored.collect::<Result<Vec<_>, _>>()?).to_string())
         })
@@ -153,7 +159,8 @@ pub fn paper_verdicts(
                     let verdicts = judge(picture, &executor)?;
                     found.extend(verdicts.into_iter().map(|v| {
                         json!({ "figure": figure.id, "panel": v.panel, "reading": v.reading,
-                            "claim": v.claim_text, "found": v.found, "agrees": v.agrees })
+                            "claim": v.claim_text, "found": v.found, "agrees": v.agrees,
+                            "because": v.because })
                     }));
                 }
             }

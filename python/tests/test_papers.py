@@ -28,10 +28,42 @@ def test_claims_are_the_commands(program, folder):
     assert {claim.id for claim in claims} == set(commands)
     for claim in claims:
         assert claim.agrees == (commands[claim.id]["outcome"] == "agrees")
-        assert claim.found == commands[claim.id]["found"]
+        for key in ["found", "decided", "rule_after_data", "words_after_data"]:
+            assert getattr(claim, key) == commands[claim.id][key], (claim.id, key)
     assert [claim.agrees for claim in twofold.Paper(folder, keep=False).claims(threads=2)] == [
         c.agrees for c in claims
     ]
+
+
+def test_a_rule_after_its_data_is_said(program, folder):
+    make = [program, "paper", "make", str(folder), "--quiet"]
+    subprocess.run(make, check=True, capture_output=True)
+    file = folder / "claims.toml"
+    rule, words = "within = 1e-6", "A narrower loop"
+    file.write_text(file.read_text().replace(rule, "within = 1e-3").replace(words, "A tight loop"))
+    claims = twofold.Paper(folder).claims()
+    assert [(c.rule_after_data, c.words_after_data) for c in claims] == [
+        (True, False),
+        (False, True),
+    ]
+    assert claims[0].note == "" and claims[0].quote == ""
+
+
+SCAN = """
+[diagram]
+scan = { system = "caricature", over = "start.x=0.1..0.3:4", t-end = 60 }
+
+[endings]
+sweep = { system = "systems/relay.toml", over = "params.w=0.2..0.6:4", t-end = 20 }
+"""
+
+
+def test_a_scan_has_the_same_bytes_on_any_number_of_threads(folder):
+    with open(folder / "measures.toml", "a") as file:
+        file.write(SCAN)
+    paper = twofold.Paper(folder, keep=False)
+    for name in ["diagram", "endings"]:
+        assert paper.answer(name, threads=1).hash == paper.answer(name).hash
 
 
 def test_what_cannot_be_scored_is_said(folder):

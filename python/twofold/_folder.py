@@ -50,6 +50,14 @@ class Claim:
     """What was found, or why it cannot be scored."""
     odds: Optional[Tuple[int, int]]
     """Repeated runs in which it holds, and all of them; None if nothing is repeated."""
+    quote: str
+    """The paper's own words, a few of them."""
+    note: str
+    """Remarks beside the outcome."""
+    rule_after_data: bool
+    """Whether the rule was written or changed when its data were already known."""
+    words_after_data: bool
+    """The same of what it says."""
 
 
 class Answer:
@@ -93,7 +101,7 @@ class Paper:
         """What the paper leaves open."""
         self.figures: List[Figure] = [Figure(**figure) for figure in said["figures"]]
         self.names: List[str] = said["sources"]
-        """Panels ("fig3/a", in a reading "fig3/a@printed") and measures, for :meth:`answer`."""
+        """Panels ("fig3/a", in a reading "fig3/a@NAME") and measures, for :meth:`answer`."""
         self.points: Dict[str, Table] = {
             panel: Table({axis: np.array(values) for axis, values in columns.items()})
             for panel, columns in said["points"].items()
@@ -101,13 +109,14 @@ class Paper:
         """Numbers of the paper (``data/*.csv``) that panels are drawn with, by panel: x and y."""
         self._claims: Dict[str, Dict[str, Any]] = {claim["id"]: claim for claim in said["claims"]}
 
-    def answer(self, name: str, progress: Progress = False) -> Answer:
-        """What a panel or measure asks, computed or taken from the folder's store.
+    def answer(self, name: str, threads: int = 0, progress: Progress = False) -> Answer:
+        """What a panel or measure asks, computed or taken from the folder's store; ``threads`` = 0
+        is one per core and changes no byte.
 
         :raises SpecError: if there is none of this name.
         """
         with Shown(progress) as show:
-            return Answer(_native.paper_answer(self._folder, name, self._keep, show))
+            return Answer(_native.paper_answer(self._folder, name, threads, self._keep, show))
 
     def claims(self, threads: int = 0, progress: Progress = False) -> List[Claim]:
         """Every claim of claims.toml with its outcome, in the file's order; ``threads`` = 0 is one
@@ -117,16 +126,12 @@ class Paper:
         """
         with Shown(progress) as show:
             verdicts = json.loads(_native.paper_claims(self._folder, threads, self._keep, show))
+        unscored = {"odds": None, "rule_after_data": False, "words_after_data": False}
         found = []
         for verdict in verdicts:
-            claim = self._claims[verdict["claim"]]
-            odds = verdict.get("odds")
-            found.append(
-                Claim(
-                    claim["id"], claim["place"], claim["says"], claim["check"], claim["decided"],
-                    verdict["agrees"], verdict["found"], tuple(odds) if odds else None,
-                )  # fmt: skip
-            )
+            claim = {**self._claims[verdict["id"]], **unscored, **verdict}
+            claim["odds"] = claim["odds"] and tuple(claim["odds"])
+            found.append(Claim(**claim))
         return found
 
     def verdicts(self, threads: int = 0, progress: Progress = False) -> List[Verdict]:

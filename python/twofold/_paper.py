@@ -1,4 +1,5 @@
-"""The paper's figures: what their panels ask, and what was published with this version."""
+"""The figures of Jeffrey (2013): what their panels ask, and what was published with this version.
+Any other paper is a :class:`twofold.Paper`."""
 
 from __future__ import annotations
 
@@ -21,13 +22,15 @@ class Verdict:
     panel: str
     """"iii"."""
     reading: Optional[str]
-    """"printed" or "reconstructed": how the paper's parameters are read; None without readings."""
+    """How the paper's parameters are read, by a name of its folder; None without readings."""
     claim: str
     """What the paper says."""
     found: str
     """What our run shows."""
     agrees: bool
     """Whether the two agree, by the rules of the library."""
+    because: str = ""
+    """Why, or with what reservation; verdicts that were published have none."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +42,7 @@ class Panel:
     panel: str
     """"iii"."""
     reading: Optional[str]
-    """"printed" or "reconstructed"; None where a figure has no readings."""
+    """How the paper's parameters are read; None where a figure has no readings."""
     title: str
     """A few words."""
     spec: Dict[str, Any] = field(repr=False)

@@ -115,12 +115,7 @@ impl Folder {
             }
         }
         let mut asked: Vec<AnyQuestion> = questions(self.figures.iter().flat_map(|f| &f.pictures));
-        for claim in &self.claims {
-            for (purpose, question) in claim.questions(self)? {
-                executor.asked_for(&*question, purpose);
-                asked.push(question);
-            }
-        }
+        asked.extend(self.claims_ask(executor)?);
         for picture in self.figures.iter().flat_map(|f| &f.pictures) {
             for (i, panel) in picture.panels.iter().enumerate() {
                 for question in verdict::questions(picture, i) {
@@ -139,40 +134,57 @@ impl Folder {
         let before = self.written()?;
         let pictures = make(&self.figures, &self.out(), executor)?;
         self.tidy(&before, &pictures, executor)?;
-        let claims = self
-            .claims
-            .iter()
-            .map(|claim| {
-                let verdict = claim.judge(self, executor).map(|mut found| {
-                    // Was it by this rule that the claim was first judged? A claim that is new is
-                    // judged by what was known of its data under other names.
-                    let of_claim = |v: &&Verdict| v.claim == claim.id;
-                    let mut judged: Vec<&Verdict> =
-                        known.verdicts.iter().filter(of_claim).collect();
-                    if judged.is_empty() {
-                        let of_data = |v: &&Verdict| v.has_data_of(&found);
-                        judged = known.verdicts.iter().filter(of_data).collect();
-                    }
-                    let same = judged.iter().find(|v| v.rule == found.rule);
-                    found.rule_after_data = same.map_or(!judged.is_empty(), |v| v.rule_after_data);
-                    found.words_after_data = same.or(judged.first()).is_some_and(|v| {
-                        v.words_after_data || v.words.is_some() && v.words != found.words
-                    });
-                    executor.progress().line(&format!("scored {}", claim.id));
-                    found
-                });
-                if let Err(why) = &verdict {
-                    executor.progress().line(&format!("{}: cannot be scored: {why}", claim.id));
-                }
-                Scored { claim, verdict }
-            })
-            .collect();
+        let claims = self.score(&known, executor);
         let made = Made { pictures, claims };
         let mut json =
             serde_json::to_vec_pretty(&made.outcomes()).expect("verdicts are plain data");
         json.push(b'\n');
         record::write(&self.out().join("claims.json"), &json)?;
         Ok(made)
+    }
+
+    /// The questions of the claims; progress shows which claim asks one.
+    ///
+    /// # Errors
+    /// If a repeated run cannot be asked for.
+    pub fn claims_ask(&self, executor: &Executor<'_>) -> Result<Vec<AnyQuestion>, CliError> {
+        let mut asked = Vec::new();
+        for claim in &self.claims {
+            for (purpose, question) in claim.questions(self)? {
+                executor.asked_for(&*question, purpose);
+                asked.push(question);
+            }
+        }
+        Ok(asked)
+    }
+
+    /// The claims with their verdicts, compared with the outcomes that were known before. A claim
+    /// that cannot be scored says so in the result.
+    pub fn score(&self, known: &Outcomes, executor: &Executor<'_>) -> Vec<Scored<'_>> {
+        let scored = self.claims.iter().map(|claim| {
+            let verdict = claim.judge(self, executor).map(|mut found| {
+                // Was it by this rule that the claim was first judged? A claim that is new is
+                // judged by what was known of its data under other names.
+                let of_claim = |v: &&Verdict| v.claim == claim.id;
+                let mut judged: Vec<&Verdict> = known.verdicts.iter().filter(of_claim).collect();
+                if judged.is_empty() {
+                    let of_data = |v: &&Verdict| v.has_data_of(&found);
+                    judged = known.verdicts.iter().filter(of_data).collect();
+                }
+                let same = judged.iter().find(|v| v.rule == found.rule);
+                found.rule_after_data = same.map_or(!judged.is_empty(), |v| v.rule_after_data);
+                found.words_after_data = same.or(judged.first()).is_some_and(|v| {
+                    v.words_after_data || v.words.is_some() && v.words != found.words
+                });
+                executor.progress().line(&format!("scored {}", claim.id));
+                found
+            });
+            if let Err(why) = &verdict {
+                executor.progress().line(&format!("{}: cannot be scored: {why}", claim.id));
+            }
+            Scored { claim, verdict }
+        });
+        scored.collect()
     }
 
     /// The records of pictures in `out`, with the folders in which they stand.
@@ -442,7 +454,10 @@ impl Folder {
     }
 
     /// The outcomes that are expected, and those that were made last.
-    fn known(&self) -> Result<Outcomes, CliError> {
+    ///
+    /// # Errors
+    /// If a file of them cannot be read.
+    pub fn known(&self) -> Result<Outcomes, CliError> {
         let mut known = self.outcomes()?;
         let path = self.out().join("claims.json");
         // Another version's cannot be read.
