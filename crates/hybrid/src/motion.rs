@@ -1082,6 +1082,8 @@ impl<'a> Follower<'a> {
         // The next implicit step where there is no series, and how many there were.
         let (mut implicit, mut leaving) = (0.0, 0);
         let mut quiet = 0;
+        // Whether the last step was made shorter than its tolerance asked for.
+        let mut shortened = false;
         let mut last_met = f64::NEG_INFINITY;
         let mut looked_at = (self.outcome.steps, self.t);
         let mut pace = Pace { since: (0, self.t), ..Pace::default() };
@@ -1159,6 +1161,10 @@ impl<'a> Follower<'a> {
                     return Ok(ending);
                 }
                 self.after(before)?;
+                continue;
+            }
+            if short && shortened && self.is_just_before_an_edge() && self.land_at_an_edge()? {
+                h = 0.0;
                 continue;
             }
             self.open_pulled()?;
@@ -1257,6 +1263,7 @@ impl<'a> Follower<'a> {
             if self.leaves_rest(&step) {
                 continue;
             }
+            shortened = rejected;
             let stopped = to_stop && !rejected;
             let most = if rejected { 1.2 } else { 5.0 };
             let factor = match error {

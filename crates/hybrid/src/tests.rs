@@ -2883,6 +2883,33 @@ fn a_rest_has_no_units() {
     }
 }
 
+/// A field that jumps where a root's domain ends turns tangent vectors there, too: x' = 1 + (1 -
+/// x)^p below 1 and 3 above, from 0, has dx/dx(0) = 3/2.
+#[test]
+fn tangents_turn_where_a_root_ends() {
+    for power in ["0.5", "1.5"] {
+        let text = format!("states = ['x']\nf = ['if(x < 1, 1 + (1 - x)^{power}, 3)']");
+        let options = Options { t_end: 2.0, start: Some(vec![0.0]), ..Options::default() };
+        let found = sensitivity::sensitivities(&model(&text), &options, &[]).unwrap();
+        near(found.by_start[0][0], 1.5, 1e-8);
+    }
+}
+
+/// A contact after Hertz (tapping-mode microscopy) is left in a few steps: areas shrink by
+/// exp(-0.02 t) whatever the phase.
+#[test]
+fn steps_do_not_creep_to_the_end_of_a_root() {
+    let start = Some(vec![-0.5690061911627036, 0.01816849959625292]);
+    let options = Options { t_end: std::f64::consts::TAU, start, ..Options::default() };
+    let text = "states = ['z', 'v']\nf = ['v', '-z - 0.02*v + 0.02*cos(t - 0.5) + F']\n[let]\nd = \
+        '0.6 + z'\nF = 'if(d > 0.05, -0.0002/d^2, -0.08 + 0.6*(0.05 - d)^1.5)'";
+    let found = sensitivity::sensitivities(&model(text), &options, &[]).unwrap();
+    let [a, b] = [&found.by_start[0], &found.by_start[1]];
+    near(a[0] * b[1] - a[1] * b[0], (-0.02 * std::f64::consts::TAU).exp(), 1e-7);
+    let end = follow(&model(text), &options, &mut |_| true).unwrap();
+    assert!(end.steps < 300, "{}", end.steps);
+}
+
 /// Populations rest where one of them is zero, on the face of the box: an equilibrium of two that
 /// compete, x' = x (r - x - a y), has the eigenvalues -r and s - b r at y = 0.
 #[test]

@@ -18,6 +18,17 @@ const DEEPEST: usize = 16;
 /// of lower order than the step, may miss the field.
 const LARGEST_DEFECT: f64 = 1e3;
 
+/// A switch that the motion is about to come to.
+struct Edge {
+    /// The time until then.
+    left: f64,
+    /// The place of its function among the active ones.
+    place: usize,
+    guard: usize,
+    /// The function's value.
+    value: f64,
+}
+
 impl Follower<'_> {
     /// Collects the conditions that may be met in a step, each with the side that it is on.
     pub(super) fn sought(&mut self, step: &Step, list: &mut Vec<(Sought, f64)>) {
@@ -842,23 +853,10 @@ impl Follower<'_> {
         let (t, x) = (self.t, self.x.clone());
         let mut field = vec![0.0; n];
         self.rhs(t, &x, &mut field);
-        let values = self.watched_values();
-        let rates = Self::along(&self.compiled, &self.variables, &field);
-        let mut nearest: Option<(f64, usize, usize)> = None;
-        for (place, guard) in self.compiled.active.iter().enumerate() {
-            let left = -values[place] / rates[place];
-            let closer = nearest.is_none_or(|(best, ..)| left < best);
-            let open = !self.sliding.contains(guard) && !self.equation.guards[*guard].whole;
-            if open
-                && left >= 0.0
-                && rates[place] * self.config.sides[*guard] < 0.0
-                && left <= 1e-9 * (self.options.t_end - self.options.t_start)
-                && closer
-            {
-                nearest = Some((left, place, *guard));
-            }
-        }
-        let Some((left, place, guard)) = nearest else { return Ok(false) };
+        let Some(Edge { left, place, guard, value }) = self.edge_ahead(&field) else {
+            return Ok(false);
+        };
+        let tangents = self.before(&[Sought::Guard { guard, upper: false }])?;
         let gradient = self.gradient(t, place);
         for i in 0..n {
             self.x[i] += left * field[i];
@@ -875,13 +873,13 @@ impl Follower<'_> {
             // two numbers, of which the later one counts.
             let mut off = off;
             for _ in 0..MOST_NUDGES {
-                if off * values[place] < 0.0 {
+                if off * value < 0.0 {
                     break;
                 }
                 self.t = self.t.next_up();
                 off = self.watched_values()[place];
             }
-            if off * values[place] < 0.0 {
+            if off * value < 0.0 {
                 let mut config = self.config.clone();
                 config.sides[guard] = off.signum();
                 self.ask_new(&mut config);
@@ -899,7 +897,50 @@ impl Follower<'_> {
             // The speeds on both sides of what was slid upon vanish there, too.
             self.decide(&zero, &vec![false; self.slides.len()])?;
         }
+        self.after(tangents)?;
         Ok(self.t > t || self.config != before || self.sliding != slid)
+    }
+
+    /// The switch that a straight motion comes to next, if that is very soon; `field` is that of
+    /// the state.
+    fn edge_ahead(&mut self, field: &[f64]) -> Option<Edge> {
+        let values = self.watched_values();
+        let rates = Self::along(&self.compiled, &self.variables, field);
+        let soon = 1e-9 * (self.options.t_end - self.options.t_start);
+        let mut nearest: Option<Edge> = None;
+        for (place, guard) in self.compiled.active.iter().enumerate() {
+            let left = -values[place] / rates[place];
+            let open = !self.sliding.contains(guard) && !self.equation.guards[*guard].whole;
+            if open
+                && (0.0..=soon).contains(&left)
+                && rates[place] * self.config.sides[*guard] < 0.0
+                && nearest.as_ref().is_none_or(|best| left < best.left)
+            {
+                nearest = Some(Edge { left, place, guard: *guard, value: values[place] });
+            }
+        }
+        nearest
+    }
+
+    /// Whether steps end before a switch, at which an expression's domain ends, so near that a
+    /// straight motion comes to it with a small part of a step's error.
+    pub(super) fn is_just_before_an_edge(&mut self) -> bool {
+        /// Part of a step's least error.
+        const OF_AN_ERROR: f64 = 0.01;
+        let (t, x) = (self.t, self.x.clone());
+        let mut field = vec![0.0; self.n];
+        self.rhs(t, &x, &mut field);
+        let Some(Edge { left, .. }) = self.edge_ahead(&field) else { return false };
+        if !self.breaks_ahead(2.0 * left) {
+            return false;
+        }
+        let half: Vec<f64> = x.iter().zip(&field).map(|(x, f)| x + 0.5 * left * f).collect();
+        let mut there = vec![0.0; self.n];
+        self.rhs(t + 0.5 * left, &half, &mut there);
+        (0..self.n).all(|i| {
+            let allowed = self.options.atol.unwrap_or(0.01 * self.options.rtol * self.size[i]);
+            left * (there[i] - field[i]).abs() <= OF_AN_ERROR * allowed
+        })
     }
 
     /// Mirrors the state at surfaces that it lies before by rounding, although motion goes on
