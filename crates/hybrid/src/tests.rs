@@ -5507,6 +5507,11 @@ fn a_tank_runs_empty_beside_what_slides() {
         let x = end(&text("1*if(t > 5, 1, 0) - sqrt(h)", "0"));
         let s = x[0].sqrt();
         near(2.0 * (-s - (1.0 - s).ln()), 3.0, 1e-7);
+        // Two diodes that a voltage opens, which is zero with their currents.
+        let diodes = "states = ['i', 'j']\nstart = [0, 0]\nf = ['if(i > 0, u - i, max(u, 0))', \
+            'if(j > 0, -u - j, max(-u, 0))']\n[let]\nu = 'sin(t)'";
+        let x = end_of(diodes, 3.0, method).unwrap();
+        near(x[0], 0.5 * (3.0_f64.sin() - 3.0_f64.cos() + (-3.0_f64).exp()), 1e-8);
         let ball = "states = ['h', 'x', 'v']\nstart = [1, 0.1, 0]\nf = ['-sqrt(h)', 'v', \
             '-9.81 + h']\n[[event]]\nwhen = 'x'\ndirection = 'down'\nafter_zeno = 'stick'\n\
             set = { v = '-0.4*v' }";

@@ -1436,16 +1436,40 @@ impl Follower<'_> {
         }
         parts.len() > 1
             && parts.iter().any(|part| self.rest_where_zero(t, no_way, &part.near, &values))
-            || no_way && near.iter().any(|one| self.stops_alone(t, *one, &values))
+            || no_way && near.iter().any(|one| self.stops_alone(t, *one, &near, &values))
     }
 
     /// Whether one function, by place and guard, stops at its zero whatever others do, on all sides
     /// of those that are slid upon, and the motion goes on so.
-    fn stops_alone(&mut self, t: f64, one: (usize, usize), values: &[f64]) -> bool {
+    fn stops_alone(
+        &mut self,
+        t: f64,
+        one: (usize, usize),
+        near: &[(usize, usize)],
+        values: &[f64],
+    ) -> bool {
         if self.slides[one.1] {
             return false;
         }
         let x = self.nearest_meeting(&[one], values);
+        // On both sides of others that are zero, too, and may be on their way.
+        let before = (std::mem::replace(&mut self.x, x.clone()), std::mem::replace(&mut self.t, t));
+        let others = near.iter().filter(|(_, other)| *other != one.1 && !self.slides[*other]);
+        let others: Vec<usize> = others.map(|(_, other)| *other).collect();
+        let few = others.len() < MOST_TOGETHER;
+        let stays = few
+            && (0..1_usize << others.len()).all(|sides| {
+                let mut config = self.config.clone();
+                for (i, other) in others.iter().enumerate() {
+                    config.sides[*other] = if sides >> i & 1 == 1 { 1.0 } else { -1.0 };
+                }
+                config.sides[one.1] = 0.0;
+                self.stays_a_little(&config, one.1)
+            });
+        (self.x, self.t) = before;
+        if !stays {
+            return false;
+        }
         let mut fields = Vec::new();
         for high in self.sliding.iter().copied().map(Some).chain([None]) {
             for side in [-1.0, 1.0] {
