@@ -33,9 +33,16 @@ pub struct Guard {
     /// Whether the equations are continuous where it is zero: it is asked by `abs`, `min`, `max`
     /// and `clip` alone, in sums, products and smooth functions.
     pub kink: bool,
-    /// Whether it is such a kink, and nothing moves its argument but the sides of others: that of
-    /// clip(sign(x), 0, 1) is no surface.
-    pub(crate) of_sides: bool,
+    /// Whether nothing moves it but the sides of others.
+    pub(crate) fixed: bool,
+}
+
+impl Guard {
+    /// Whether it is a kink that only the sides of others move: that of clip(sign(x), 0, 1) is no
+    /// surface.
+    pub(crate) fn of_sides(&self) -> bool {
+        self.kink && self.fixed
+    }
 }
 
 /// The answers to all switching functions, the mode, and the pieces of tables that hold.
@@ -260,9 +267,9 @@ impl Equation {
         for (e, rough) in terms.iter().zip(named.collect::<Vec<_>>()) {
             equation.find(e, false, !rough)?;
         }
-        let of_sides = |g: &Guard| g.kink && !g.whole && equation.is_of_sides(&g.expression);
-        let of_sides: Vec<bool> = equation.guards.iter().map(of_sides).collect();
-        equation.guards.iter_mut().zip(of_sides).for_each(|(guard, of)| guard.of_sides = of);
+        let fixed = |g: &Guard| !g.whole && equation.is_of_sides(&g.expression);
+        let fixed: Vec<bool> = equation.guards.iter().map(fixed).collect();
+        equation.guards.iter_mut().zip(fixed).for_each(|(guard, fixed)| guard.fixed = fixed);
         equation.of_fields = equation.guards.len();
         equation.has_domain_ends = fields.iter().chain(&terms).any(has_domain_ends);
         for e in &conditions {
@@ -739,7 +746,7 @@ impl Equation {
             }
         }
         self.by_text.insert(key(&expression), (i, false));
-        self.guards.push(Guard { expression, whole, chooses, kink, of_sides: false });
+        self.guards.push(Guard { expression, whole, chooses, kink, fixed: false });
     }
 
     /// The guard of an expression, and whether it is the expression's negative.
@@ -1008,7 +1015,11 @@ impl Equation {
         if let Some(found) = self.known.borrow().get(&key) {
             return found.clone();
         }
-        let made = Rc::new(self.compile(at, also));
+        // What the equations ask by themselves is compiled once.
+        let plain = (!also.is_empty()).then(|| self.compiled(at));
+        let made = plain
+            .filter(|plain| also.iter().all(|guard| plain.place(*guard).is_some()))
+            .unwrap_or_else(|| Rc::new(self.compile(at, also)));
         let mut known = self.known.borrow_mut();
         // A long run among very many structures keeps memory flat.
         if known.len() >= 4096 {

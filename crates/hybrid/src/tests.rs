@@ -2910,6 +2910,41 @@ fn steps_do_not_creep_to_the_end_of_a_root() {
     assert!(end.steps < 300, "{}", end.steps);
 }
 
+/// Logic by the greatest of products is that by `or` and by comparisons, and a network written so
+/// is followed without a structure for each gene at each gene's switch.
+#[test]
+fn logic_may_be_written_by_greatest_values() {
+    let n = 16;
+    let states: Vec<String> = (0..n).map(|i| format!("'g{i}'")).collect();
+    let start: Vec<String> =
+        (0..n).map(|i| format!("{}", 0.05 + 0.9 * (i * 7 % n) as f64 / 16.0)).collect();
+    let network = |of: &dyn Fn(String, String) -> String| {
+        let step = |i: usize| format!("heaviside(g{} - 0.5)", i % n);
+        let f: Vec<String> = (0..n)
+            .map(|i| {
+                let both = format!("(1 - {})*{}", step(i + 3), step(i + 7));
+                format!("'-g{i} + 1.1*{}'", of(both, step(i + 5)))
+            })
+            .collect();
+        let text = format!(
+            "states = [{}]\nstart = [{}]\nf = [{}]",
+            states.join(", "),
+            start.join(", "),
+            f.join(", ")
+        );
+        let options = Options { t_end: 3.0, ..Options::default() };
+        follow(&model(&text), &options, &mut |_| true).unwrap().x
+    };
+    let right = network(&|a, b| format!("if({a} > 0.5 or {b} > 0.5, 1, 0)"));
+    for found in [
+        network(&|a, b| format!("max({a}, {b})")),
+        network(&|a, b| format!("if({a} > {b}, {a}, {b})")),
+        network(&|a, b| format!("(1 - (1 - {a})*(1 - {b}))")),
+    ] {
+        found.iter().zip(&right).for_each(|(found, right)| near(*found, *right, 1e-8));
+    }
+}
+
 /// Populations rest where one of them is zero, on the face of the box: an equilibrium of two that
 /// compete, x' = x (r - x - a y), has the eigenvalues -r and s - b r at y = 0.
 #[test]

@@ -434,6 +434,19 @@ impl Follower<'_> {
                 follower.keeps_still(guard, &rates, p) && follower.stays_a_little(config, guard)
             })
         };
+        // What only sides move is pressed by nothing: all of them at once.
+        let mut fixed: Vec<usize> = zero.to_vec();
+        fixed.retain(|guard| self.equation.guards[*guard].fixed && !sliding.contains(guard));
+        fixed.retain(|guard| config.sides[*guard] == self.low(*guard));
+        if fixed.len() > 1 {
+            let mut at_zero = config.clone();
+            fixed.iter().for_each(|guard| at_zero.sides[*guard] = 0.0);
+            self.ask_new(&mut at_zero);
+            some = [&*config, &at_zero].iter().all(|c| fixed.iter().all(|g| stays(self, c, *g)));
+            if some {
+                *config = at_zero;
+            }
+        }
         for _ in 0..zero.len() {
             let mut changed = false;
             for guard in zero.iter().copied().filter(|g| !sliding.contains(g)) {
@@ -666,8 +679,8 @@ impl Follower<'_> {
             return Ok(());
         }
         // Functions that only others' sides move follow those.
-        if !zero.iter().all(|guard| self.equation.guards[*guard].of_sides) {
-            zero.retain(|guard| !self.equation.guards[*guard].of_sides);
+        if !zero.iter().all(|guard| self.equation.guards[*guard].of_sides()) {
+            zero.retain(|guard| !self.equation.guards[*guard].of_sides());
         }
         if self.equation.has_domain_ends {
             self.put_into_domain(&zero);
