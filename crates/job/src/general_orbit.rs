@@ -80,7 +80,7 @@ impl Question for GeneralOrbit {
     /// Facts where the motion comes to a rest: that of [`ClosedOrbit`](super::ClosedOrbit). Else
     /// `states` (their names), `point`, `period`, `multipliers` (real and imaginary parts,
     /// the largest first), `gap` (how far the orbit is from closed, relative to its largest
-    /// state) and, from 5 % on, `moved` (how far it lies from where the motion had settled,
+    /// state), of a system with modes `mode` (in which its point lies) and, from 5 % on, `moved` (how far it lies from where the motion had settled,
     /// relative to the size of a state). Of a branch also the tables `branch` and `bifurcations`
     /// and the fact `end`, as of [`ClosedOrbit`](super::ClosedOrbit).
     fn compute(&self, _: &dyn Ask, monitor: &dyn Monitor) -> Result<Answer, JobError> {
@@ -153,8 +153,11 @@ impl Question for GeneralOrbit {
                 HybridError::NoOrbit(why.into()).into()
             });
         }
+        let mut mode = found.mode;
         if let Some(strobe) = &strobe {
-            found.x = strobe.reached(&model, &options, found.x)?;
+            let from = Options { start: Some(found.x), mode, ..options.clone() };
+            let reached = part(&model, &from, strobe.left)?;
+            (found.x, mode) = (reached.x, reached.mode);
         }
         let mut answer = Answer::of_tables(Vec::new())
             .with_fact("states", &model.coordinates())
@@ -162,6 +165,10 @@ impl Question for GeneralOrbit {
             .with_fact("period", &found.period)
             .with_fact("multipliers", &found.multipliers)
             .with_fact("gap", &found.gap);
+        let modes = model.definition().modes();
+        if modes.len() > 1 {
+            answer = answer.with_fact("mode", &modes[mode].name);
+        }
         if found.moved > ANOTHER {
             answer = answer.with_fact("moved", &found.moved);
         }
@@ -208,7 +215,8 @@ impl Question for GeneralOrbit {
             orbit.point = map.state(&orbit.point);
             if let Some(strobe) = &strobe {
                 let model = at(&model, along, orbit.parameter)?;
-                orbit.point = strobe.reached(&model, &map.options, orbit.point.clone())?;
+                let from = Options { start: Some(orbit.point.clone()), ..map.options.clone() };
+                orbit.point = part(&model, &from, strobe.left)?.x;
             }
             if let Return::Crossings(_) = self.after {
                 // The one along the field is none of the orbit's.
@@ -376,17 +384,6 @@ impl Strobe {
             return Ok((times > 0).then_some(Self { left: period - later }));
         }
         Ok(None)
-    }
-
-    /// The state at the moment, of an orbit with this state at the later start.
-    fn reached(
-        &self,
-        model: &Model,
-        options: &Options,
-        x: Vec<f64>,
-    ) -> Result<Vec<f64>, HybridError> {
-        let from = Options { start: Some(x), ..options.clone() };
-        Ok(part(model, &from, self.left)?.x)
     }
 }
 
@@ -989,6 +986,13 @@ mod tests {
         let multipliers: Vec<[f64; 2]> =
             branch(diode, 1.0, 20.0, None).fact("multipliers").unwrap();
         assert_eq!(multipliers, [[0.0, 0.0]]);
+        // The mode of the moment is said, not that of the run's beginning.
+        let relay = "states = ['x']\nstart = [0]\n[modes.off]\nf = ['-x']\n[modes.on]\n\
+            f = ['1 - x']\n[[event]]\nwhen = 'cos(2*pi*t)'\ndirection = 'up'\nmode = 'on'\n\
+            [[event]]\nwhen = 'cos(2*pi*t)'\ndirection = 'down'\nmode = 'off'";
+        let found = branch(relay, 1.0, 20.0, None);
+        assert_eq!(found.fact::<String>("mode").unwrap(), "on");
+        assert!(branch(strobe, 1.0, 20.0, None).fact::<String>("mode").is_err());
     }
 
     /// x = sqrt(p - 1) of p x - x^3 turns at p = 1, where x = 0 crosses it.

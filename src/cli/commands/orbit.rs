@@ -349,6 +349,9 @@ fn of_general(arguments: &Arguments, question: &GeneralOrbit) -> Result<Exit, Cl
             };
             line("period", format!("{period}"));
             line("point", state_in_words(&names, &point));
+            if let Ok(mode) = answer.fact::<String>("mode") {
+                line("mode", mode);
+            }
             line("multipliers", complex(&multipliers, f64::NAN));
             let stability = match () {
                 () if (largest - 1.0).abs() < error.max(1e-6) => {
