@@ -94,7 +94,8 @@ macro_rules! conforms {
 
             #[test]
             fn steps_keep_their_promises() {
-                walk(&mut $method::new(TOLERANCE), &Oscillator, 0.0, Vector2::new(1.0, 0.0), 25.0, 0.7);
+                let start = Vector2::new(1.0, 0.0);
+                walk(&mut $method::new(TOLERANCE), &Oscillator, 0.0, start, 25.0, 0.7);
                 walk(
                     &mut $method::new(TOLERANCE),
                     &smoothed(),
@@ -116,7 +117,8 @@ macro_rules! conforms {
             #[test]
             fn oscillator_is_accurate() {
                 let mut m = $method::new(TOLERANCE);
-                let end = walk(&mut m, &Oscillator, 0.0, Vector2::new(1.0, 0.0), 10.0, f64::INFINITY);
+                let start = Vector2::new(1.0, 0.0);
+                let end = walk(&mut m, &Oscillator, 0.0, start, 10.0, f64::INFINITY);
                 let x = end.last().unwrap().1.map(f64::from_bits);
                 let error = (x[0] - 10.0_f64.cos()).abs().max((x[1] + 10.0_f64.sin()).abs());
                 // Global error: local tolerance times a modest number of steps.
@@ -184,8 +186,8 @@ macro_rules! conforms {
                     a in -50.0..50.0_f64, b in -50.0..50.0_f64, t_end in 0.01..20.0_f64,
                         cap in 0.05..5.0_f64,
                 ) {
-                    let end = walk(&mut $method::new(TOLERANCE), &Oscillator, 0.0, Vector2::new(a, b),
-                        t_end, cap);
+                    let start = Vector2::new(a, b);
+                    let end = walk(&mut $method::new(TOLERANCE), &Oscillator, 0.0, start, t_end, cap);
                     let x = end.last().unwrap().1.map(f64::from_bits);
                     let (r0, r) = (a.hypot(b), x[0].hypot(x[1]));
                     prop_assert!((r - r0).abs() <= 1e-5 * (1.0 + r0), "{r0} {r}");

@@ -49,7 +49,8 @@ impl<const D: usize> Motion<D> {
 /// let block = System::builtin("stick-slip").expect("built in").bind::<2>()?;
 /// let mut recorder = MotionRecorder::<2>::new(1e-3);
 /// let options = FilippovOptions::default();
-/// let _ = run(&block, Vector2::new(0.0, 0.0), 20.0, &options, ExitRule::Undecided, &mut recorder)?;
+/// let start = Vector2::new(0.0, 0.0);
+/// let _ = run(&block, start, 20.0, &options, ExitRule::Undecided, &mut recorder)?;
 /// let motion = recorder.into_motion();
 /// assert!(motion.pieces.len() > 2 && !motion.events.is_empty());
 /// # Ok::<(), Box<dyn std::error::Error>>(())

@@ -1015,7 +1015,7 @@ impl Equation {
         if let Some(found) = self.known.borrow().get(&key) {
             return found.clone();
         }
-        // What the equations ask by themselves is compiled once.
+        // Guards that the equations ask by themselves are compiled once.
         let plain = (!also.is_empty()).then(|| self.compiled(at));
         let made = plain
             .filter(|plain| also.iter().all(|guard| plain.place(*guard).is_some()))

@@ -1439,7 +1439,7 @@ impl<'a> Follower<'a> {
         let mut values = vec![0.0; self.compiled.outputs];
         self.compiled.watched.evaluate(&self.variables, &mut values);
         let mut config = self.config.clone();
-        // What follows from a surface that has just been left leaves zero as it does.
+        // Functions that follow from a surface that has just been left leave zero as it does.
         let left = self.left.iter().fold(0.0_f64, |most, left| most.max(*left));
         for (place, guard) in resting {
             let small = 1e-13 * self.magnitude(&self.equation.guards[guard].expression);

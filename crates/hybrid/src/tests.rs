@@ -5436,7 +5436,7 @@ fn two_bodies_stick_to_each_other() {
         }
         // They lie together from the start.
         near(end_of(&text(0.5, "", "1, 0.2, 1, 0.2"), 2.0, method).unwrap()[0], 1.4, 1e-12);
-        // Nobody knows what infinitely many impacts count to.
+        // Infinitely many impacts count to no number.
         let counts = end_of(&text(0.5, "n = 'n + 1', ", "1, 0, 0, 0.3"), 4.0, method);
         assert!(counts.as_ref().is_err_and(|e| e.contains("changes n")), "{method:?} {counts:?}");
     }
@@ -5561,8 +5561,8 @@ fn a_tank_runs_empty_beside_what_slides() {
 fn kinks_that_follow_from_what_is_slid_upon_rest() {
     let text = |gain: f64, push: &str, cost: &str| {
         format!(
-            "states = ['x', 'y', 'J']\nstart = [1, -0.8, 0]\nf = ['-{gain}*sign(x) + {push}*sin(t)', \
-             '-1.5*sign(y) + 0.5*cos(t)', '{cost}']"
+            "states = ['x', 'y', 'J']\nstart = [1, -0.8, 0]\n\
+             f = ['-{gain}*sign(x) + {push}*sin(t)', '-1.5*sign(y) + 0.5*cos(t)', '{cost}']"
         )
     };
     let x = |t: f64| 2.0 - 2.0 * t - t.cos();

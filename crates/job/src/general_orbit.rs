@@ -80,8 +80,9 @@ impl Question for GeneralOrbit {
     /// Facts where the motion comes to a rest: that of [`ClosedOrbit`](super::ClosedOrbit). Else
     /// `states` (their names), `point`, `period`, `multipliers` (real and imaginary parts,
     /// the largest first), `gap` (how far the orbit is from closed, relative to its largest
-    /// state), of a system with modes `mode` (in which its point lies) and, from 5 % on, `moved` (how far it lies from where the motion had settled,
-    /// relative to the size of a state). Of a branch also the tables `branch` and `bifurcations`
+    /// state), of a system with modes `mode` (in which its point lies) and, from 5 % on, `moved`
+    /// (how far it lies from where the motion had settled, relative to the size of a state). Of a
+    /// branch also the tables `branch` and `bifurcations`
     /// and the fact `end`, as of [`ClosedOrbit`](super::ClosedOrbit).
     fn compute(&self, _: &dyn Ask, monitor: &dyn Monitor) -> Result<Answer, JobError> {
         let model = match &self.along {
@@ -587,7 +588,7 @@ mod tests {
         }
     }
 
-    /// The slowest neighbours say how fast a rest attracts; of a set of rests each comes to its own.
+    /// The slowest neighbours say how fast a rest attracts; of a set of rests each has its own.
     #[test]
     fn the_rate_of_a_rest_is_that_of_the_slowest() {
         let text = "states = ['x', 'y']\nstart = [1, 1]\nf = ['-3*x', '-0.5*y']";

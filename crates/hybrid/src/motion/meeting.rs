@@ -834,7 +834,7 @@ impl Follower<'_> {
         let places: Vec<(usize, usize)> = places.into_iter().map(at).collect();
         let bend = places.iter().fold(0.0_f64, |most, (_, p)| most.max(rates.second[*p].abs()));
         let fastest = places.iter().fold(0.0_f64, |most, (_, p)| most.max(rates.first[*p].abs()));
-        // What rounding hides of one flight it hides of the order of all.
+        // Rounding that hides one flight hides the order of all.
         let grain = |(i, place): &(usize, usize)| self.grain_of(*i, rates.terms[*place]);
         let grain = places.iter().map(grain).fold(0.0, f64::max);
         let hidden = 0.5 * fastest * fastest / bend <= ROUNDINGS * grain;
@@ -1120,7 +1120,7 @@ impl Follower<'_> {
     }
 
     /// The event of a contact changes a state even where the motion rests, or by something else
-    /// than the speed of approach: nobody knows what infinitely many such changes make of it.
+    /// than the speed of approach: infinitely many such changes have no sum that is known.
     fn changes_at_rest(&self, event: usize, state: usize) -> HybridError {
         let definition = self.model.definition();
         let (name, state) = (&definition.events()[event].name, &definition.states()[state].name);

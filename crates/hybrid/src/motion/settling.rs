@@ -434,7 +434,7 @@ impl Follower<'_> {
                 follower.keeps_still(guard, &rates, p) && follower.stays_a_little(config, guard)
             })
         };
-        // What only sides move is pressed by nothing: all of them at once.
+        // Nothing presses functions that only sides move: all of them at once.
         let mut fixed: Vec<usize> = zero.to_vec();
         fixed.retain(|guard| self.equation.guards[*guard].fixed && !sliding.contains(guard));
         fixed.retain(|guard| config.sides[*guard] == self.low(*guard));

@@ -835,7 +835,7 @@ impl Follower<'_> {
             .collect()
     }
 
-    /// What is added to `field` in each contact's direction so that its expression stays at zero;
+    /// The part that is added to `field` in each contact's direction so that its expression stays at zero;
     /// not-a-number if there is nothing.
     pub(super) fn contact_forces(&self, field: &[f64]) -> Vec<f64> {
         self.contact_forces_in(&self.contacts, &self.compiled, &self.variables, field)
@@ -903,8 +903,8 @@ impl Follower<'_> {
     }
 
     /// The configuration in which these functions have the sides that they get as soon as the
-    /// motion, moved in a direction, leaves the zero of a watched expression to a side: first by its
-    /// speed, then by its place. The others keep theirs.
+    /// motion, moved in a direction, leaves the zero of a watched expression to a side: first by
+    /// its speed, then by its place. The others keep theirs.
     pub(super) fn sides_off(
         &self,
         watched: usize,

@@ -66,7 +66,8 @@ impl<const N: usize> Eigendirection<N> {
 /// use twofold_integrate::filippov::two_fold::SlidingAtTwoFold;
 /// use twofold_system::System;
 /// let normal_form = System::builtin("two-fold").expect("built in").bind::<3>()?;
-/// let there = SlidingAtTwoFold::near(&normal_form, &Vector3::new(0.0, 0.1, 0.1)).expect("a two-fold");
+/// let place = Vector3::new(0.0, 0.1, 0.1);
+/// let there = SlidingAtTwoFold::near(&normal_form, &place).expect("a two-fold");
 /// let [weak, strong] = there.directions.expect("a node of the sliding flow");
 /// assert!(weak.rate.abs() < strong.rate.abs());
 /// # Ok::<(), twofold_system::BindError>(())
