@@ -982,7 +982,8 @@ fn tangent_vectors_pass_switches_by_saltation_matrices() {
         t_end: 50.0,
         ..Options::default()
     };
-    let orbit = closed_orbit(&shipped("rimless-wheel"), &options, &Return::Crossings(1)).unwrap();
+    let orbit =
+        closed_orbit(&shipped("rimless-wheel"), &options, &Return::Crossings(1), 0.0).unwrap();
     assert_eq!(orbit.multipliers.len(), 1);
     near(orbit.multipliers[0][0], 0.5, 1e-8);
     // A linear oscillator that loses half of its speed at a wall, driven so that a ball comes back:
@@ -1001,6 +1002,7 @@ fn tangent_vectors_pass_switches_by_saltation_matrices() {
         &juggler,
         &Options { record: section("0 - v"), ..options },
         &Return::Crossings(1),
+        0.0,
     )
     .unwrap();
     near(orbit.period, 4.0, 1e-9);
@@ -1022,14 +1024,14 @@ fn tangent_vectors_pass_switches_by_saltation_matrices() {
     assert_eq!(found.values[1], f64::NEG_INFINITY);
     // Giaouris, Maity, Banerjee, Pickert & Zahawi (2008), sec. V: -0.8211 +- 0.0708i at 24 V.
     let options = Options { start: Some(vec![12.0222, 0.6065]), ..Options::default() };
-    let orbit = closed_orbit(&shipped("buck"), &options, &Return::Period(400e-6)).unwrap();
+    let orbit = closed_orbit(&shipped("buck"), &options, &Return::Period(400e-6), 0.0).unwrap();
     near(orbit.multipliers[0][0], -0.8211, 5e-5);
     near(orbit.multipliers[0][1].abs(), 0.0708, 5e-5);
     // A forced oscillator's multipliers over one period are exp of its eigenvalues times the
     // period.
     let period = 2.0 * std::f64::consts::PI;
     let options = Options { start: Some(vec![0.3, 0.2]), ..Options::default() };
-    let orbit = closed_orbit(&relay, &options, &Return::Period(period)).unwrap();
+    let orbit = closed_orbit(&relay, &options, &Return::Period(period), 0.0).unwrap();
     let size = (orbit.multipliers[0][0].powi(2) + orbit.multipliers[0][1].powi(2)).sqrt();
     near(size, (-0.1 * period).exp(), 1e-8);
     // Stick-slip: a piece of sliding forgets everything, and the multiplier is 0.
@@ -1043,7 +1045,7 @@ fn tangent_vectors_pass_switches_by_saltation_matrices() {
         t_end: 60.0,
         ..Options::default()
     };
-    if let Ok(orbit) = closed_orbit(&block, &options, &Return::Crossings(1)) {
+    if let Ok(orbit) = closed_orbit(&block, &options, &Return::Crossings(1), 0.0) {
         near(orbit.multipliers[0][0], 0.0, 1e-9);
     }
 }
@@ -1208,7 +1210,7 @@ fn a_cuk_converter_has_its_closed_orbits() {
         // From a start beside it.
         let start = orbit.iter().map(|x| x * 1.001).collect();
         let options = Options { start: Some(start), ..Options::default() };
-        let found = closed_orbit(&model, &options, &Return::Period(20e-6)).unwrap();
+        let found = closed_orbit(&model, &options, &Return::Period(20e-6), 0.0).unwrap();
         found.x.iter().zip(orbit).for_each(|(x, want)| near(*x, want, 1e-8));
         let mut of: Vec<f64> =
             found.multipliers.iter().map(|m| (m[0] * m[0] + m[1] * m[1]).sqrt()).collect();
@@ -1248,6 +1250,7 @@ fn tangent_vectors_agree_with_finite_differences() {
         &model,
         &Options { start: Some(start), ..Options::default() },
         &Return::Period(period),
+        0.0,
     ) else {
         panic!("no orbit")
     };
@@ -1938,6 +1941,7 @@ fn an_orbit_closes_on_a_section_through_the_origin() {
             &relay,
             &options,
             &crate::motion::tangent::Return::Crossings(1),
+            0.0,
         );
         let period = 2.0 * (1.1_f64 / 0.9).ln();
         assert!((found.unwrap().period - period).abs() < 1e-9);
@@ -2708,7 +2712,7 @@ fn nested_terms_take_no_exponential_time() {
         "f = ['0']\n[[event]]\nevery = 1\nset = { x = 'x - a40/8 + 5.1375' }",
     );
     let options = Options { record: Record::Times { every: 1.0 }, ..Options::default() };
-    let orbit = tangent::closed_orbit(&model(&reset), &options, &tangent::Return::Period(1.0));
+    let orbit = tangent::closed_orbit(&model(&reset), &options, &tangent::Return::Period(1.0), 0.0);
     near(orbit.unwrap().multipliers[0][0], 0.875, 1e-12);
     let events = "f = ['if(a40, 1, 2)']\n[[event]]\nwhen = 'a40 and x > 2'\nset = { x = 0.5 }";
     near(last(&nested("x > 0", &|i| format!("a{i} and a{i}"), events), 1.0), 0.6, 1e-12);
@@ -2816,7 +2820,7 @@ fn a_linear_oscillator_closes_on_any_section() {
         let section = twofold_system::Expression::parse_general(section, &["x", "v"]).unwrap();
         let options =
             Options { record: Record::Section(section), t_end: 100.0, ..Options::default() };
-        let found = closed_orbit(&circle, &options, &Return::Crossings(1)).unwrap();
+        let found = closed_orbit(&circle, &options, &Return::Crossings(1), 0.0).unwrap();
         near(found.period, 2.0 * std::f64::consts::PI, 1e-8);
         near(found.multipliers[0][0], 1.0, 1e-6);
         assert!(found.gap < 1e-8);
@@ -2942,6 +2946,24 @@ fn logic_may_be_written_by_greatest_values() {
         network(&|a, b| format!("(1 - (1 - {a})*(1 - {b}))")),
     ] {
         found.iter().zip(&right).for_each(|(found, right)| near(*found, *right, 1e-8));
+    }
+}
+
+/// States that begin at zero, as powers of the time, have their exponents, too: those of a cascade
+/// are on its diagonal.
+#[test]
+fn exponents_of_a_cascade_from_zero() {
+    for (f, right) in [
+        ("'-x + 2*sin(t)', '-0.5*y + x^3', '-0.2*w + y^2'", [-0.2, -0.5, -1.0]),
+        ("'-0.1*x + 0.2*sin(t)', '-0.5*y + x^3', '-w + y^4'", [-0.1, -0.5, -1.0]),
+    ] {
+        let text = format!("states = ['x', 'y', 'w']\nstart = [0, 0, 0]\nf = [{f}]");
+        let options = Options { t_end: 300.0, ..Options::default() };
+        let found = tangent::exponents(&model(&text), &options, 30.0, 3).unwrap();
+        assert_eq!(found.values.len(), 3, "{f}: {found:?}");
+        for (value, (error, right)) in found.values.iter().zip(found.errors.iter().zip(right)) {
+            assert!((value - right).abs() <= error.max(1e-3), "{f}: {found:?}");
+        }
     }
 }
 
@@ -4795,7 +4817,8 @@ fn roots_that_begin_at_a_surface_are_crossed_with_their_tangents() {
         f = ['0.3*(1 + cos(2*pi*t/10)) - 0.2*sqrt(max(h - 0.6, 0)) - 0.3*h']";
     near(end_of(tank, 1000.0, Method::Dopri5).unwrap()[0], 0.9946294707, 2e-9);
     use crate::motion::tangent::{Return, closed_orbit};
-    let orbit = closed_orbit(&model(tank), &Options::default(), &Return::Period(10.0)).unwrap();
+    let orbit =
+        closed_orbit(&model(tank), &Options::default(), &Return::Period(10.0), 0.0).unwrap();
     let after = |by: f64| {
         let start = Some(vec![orbit.x[0] + by]);
         let options = Options { t_end: 10.0, start, rtol: 1e-12, ..Options::default() };
@@ -4879,7 +4902,7 @@ fn a_size_by_a_maximum_is_no_new_surface() {
         );
         let section = Record::Section(twofold_system::Expression::Name("v".into()));
         let options = Options { record: section, t_end: 100.0, ..Options::default() };
-        closed_orbit(&model(&text), &options, &Return::Crossings(1)).unwrap().period
+        closed_orbit(&model(&text), &options, &Return::Crossings(1), 0.0).unwrap().period
     };
     let want = period("r", "abs(r)");
     near(want, 6.601640314931418, 1e-8);

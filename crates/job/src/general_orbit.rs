@@ -133,7 +133,9 @@ impl Question for GeneralOrbit {
             Return::Period(period) => Strobe::new(&model, &mut options, period)?,
             Return::Crossings(_) => None,
         };
-        let mut found = match closed_orbit(&model, &options, &self.after) {
+        let began = start_of(&model, &self.run.options)?;
+        let former = began.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+        let mut found = match closed_orbit(&model, &options, &self.after, former) {
             Err(HybridError::NoOrbit(why)) => {
                 // The motion may rest after a longer time.
                 let longest = options.t_end - options.t_start;
@@ -233,8 +235,7 @@ impl GeneralOrbit {
     /// Refuses a period after which the equations are not the same.
     fn has_period(&self, model: &Model, period: f64) -> Result<(), JobError> {
         let equation = Equation::new(model, None).map_err(HybridError::from)?;
-        let start = model.start().map_err(EquationError::from).map_err(HybridError::from)?;
-        let start = self.run.options.start.clone().or(start).unwrap_or_default();
+        let start = start_of(model, &self.run.options)?;
         let largest = start.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
         let size = |x: &f64| if largest == 0.0 { 1.0 } else { x.abs().max(0.1 * largest) };
         let sizes: Vec<f64> = start.iter().map(size).collect();
@@ -311,6 +312,12 @@ impl GeneralOrbit {
         };
         sizes.iter().map(unit).collect()
     }
+}
+
+/// The state at which a run begins.
+fn start_of(model: &Model, options: &Options) -> Result<Vec<f64>, HybridError> {
+    let own = model.start().map_err(EquationError::from)?;
+    Ok(options.start.clone().or(own).unwrap_or_default())
 }
 
 /// A motion rests that moves no more than this part of its states' size for this part of its run
@@ -597,6 +604,24 @@ mod tests {
         let text = "states = ['x', 'y']\nstart = [1, 1]\nf = ['-3*x + 0.1*y', '0*x']";
         let rest: Rest = orbit(text, 100.0, Return::Crossings(1)).unwrap().fact("rest").unwrap();
         assert_eq!(rest.stability, Stability::ToASet, "{rest:?}");
+    }
+
+    /// What a sliding control holds at zero under a periodic disturbance has a closed orbit, the
+    /// rest, to which x' = -2 x leads: states known to rounding alone are beside it.
+    #[test]
+    fn a_control_at_rest_has_a_period() {
+        use std::f64::consts::TAU;
+        let text = "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '0.3*sin(t) - 2*sign(v + 2*x)']";
+        for settle in [10.0, 200.0] {
+            let answer = orbit(text, settle, Return::Period(TAU)).unwrap();
+            let multipliers: Vec<[f64; 2]> = answer.fact("multipliers").unwrap();
+            let right = twofold_num::elementary::exp(-2.0 * TAU);
+            assert!((multipliers[0][0] - right).abs() < 1e-3 * right, "{multipliers:?}");
+            assert!(multipliers[1][0].abs() < 1e-9, "{multipliers:?}");
+            let point: Vec<f64> = answer.fact("point").unwrap();
+            assert!(point.iter().all(|x| x.abs() < 1e-11), "{point:?}");
+            assert!(answer.fact::<f64>("moved").is_err(), "{answer:?}");
+        }
     }
 
     /// Motion that drifts for ever is on no orbit, however far away what it drifts by is rounding.

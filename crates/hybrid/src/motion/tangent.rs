@@ -1011,10 +1011,16 @@ impl Follower<'_> {
         let (Some(growth), Some(tangents)) = (&mut self.growth, &mut self.tangents) else { return };
         let part = ((t - growth.begin) / (growth.end - growth.begin) * PARTS as f64)
             .clamp(0.0, PARTS as f64 - 1.0) as usize;
-        if growth.units.is_empty() {
+        // A motion that begins at zero has its sizes later: units follow it up to the mean.
+        let settles = growth.from.is_none();
+        let begins = growth.units.is_empty();
+        if begins || settles {
             growth.units = units(&tangents.bounds);
+        }
+        if begins {
             tangents.vectors = mixed(&tangents.vectors, &growth.units, growth.sums.len());
         }
+        let is_free = self.sliding.is_empty() && self.contacts.is_empty();
         let flattened = std::mem::take(&mut tangents.flattened);
         let left = orthonormal(&mut tangents.vectors, &growth.units);
         for (i, Left { before, after }) in left.iter().enumerate() {
@@ -1023,7 +1029,7 @@ impl Follower<'_> {
                 growth.sums[i][part] += if gone { f64::NEG_INFINITY } else { ln(*after) };
             }
             // Sliding has taken this direction away, or has done so before.
-            if gone && !flattened && *before != 0.0 {
+            if gone && !flattened && *before != 0.0 && !(settles && is_free) {
                 growth.told = growth.told.min(i);
             }
         }
@@ -1033,16 +1039,8 @@ impl Follower<'_> {
         // The mean begins with the first step that ends after the transient.
         if t >= growth.begin && growth.from.is_none() {
             growth.from = Some(t);
-            let units = units(&tangents.bounds);
-            let left = match units == growth.units {
-                true => Vec::new(),
-                false => orthonormal(&mut tangents.vectors, &units),
-            };
-            growth.units = units;
-            let lost = left.iter().position(|l| l.before > 0.0 && !(l.after > 1e-13 * l.before));
-            growth.told = growth.told.min(lost.unwrap_or(usize::MAX));
-            // A direction that sliding took away in the transient may be there again.
-            if self.sliding.is_empty() && self.contacts.is_empty() {
+            // A direction that sliding or rounding took away in the transient may be there again.
+            if is_free {
                 fill_up(&mut tangents.vectors, &growth.units);
             }
         }
@@ -1118,6 +1116,8 @@ const WELL_CLOSED: f64 = 1e-11;
 const OF_WAY: f64 = 1e-6;
 const OF_SIZE: f64 = 1e-12;
 const OFF: f64 = 100.0;
+/// States smaller than this part of what they were before are not told from rounding.
+const OF_FORMER: f64 = 1e-3;
 /// A search that comes to states so many times as large is given up.
 const FAR_OFF: f64 = 1e8;
 /// A multiplier's distance from 1 that may be.
@@ -1133,11 +1133,12 @@ fn apart(a: &[f64; 2], b: &[f64; 2]) -> f64 {
 
 /// The largest difference of two states, in units of the sizes within these bounds. What is zero to
 /// rounding beside the others has no size.
-fn moved(from: &[f64], to: &[f64], bounds: &[[f64; 2]]) -> f64 {
+fn moved(from: &[f64], to: &[f64], bounds: &[[f64; 2]], least: f64) -> f64 {
     const ROUNDED: f64 = 1e-6;
     let sizes: Vec<f64> = bounds.iter().map(|[low, high]| low.abs().max(high.abs())).collect();
     let largest = sizes.iter().copied().fold(0.0, f64::max);
-    let far = (0..to.len()).map(|i| (from[i] - to[i]).abs() / sizes[i].max(ROUNDED * largest));
+    let far =
+        (0..to.len()).map(|i| (from[i] - to[i]).abs() / sizes[i].max(ROUNDED * largest).max(least));
     far.filter(|share| share.is_finite()).fold(0.0, f64::max)
 }
 
@@ -1154,7 +1155,8 @@ fn multipliers_of(matrix: &[f64], n: usize, after: &Return) -> Vec<[f64; 2]> {
 }
 
 /// Finds a closed orbit near the start of `options` by Newton's method on the return map, whose
-/// derivative is carried along with saltation matrices.
+/// derivative is carried along with saltation matrices. `former` is the largest size of a state
+/// before the motion settled, or zero: what is small beside it is known to the error of its run.
 ///
 /// # Errors
 /// As [`follow`](super::follow); also if there is no return, or the iteration does not settle.
@@ -1162,6 +1164,7 @@ pub fn closed_orbit(
     model: &Model,
     options: &Options,
     after: &Return,
+    former: f64,
 ) -> Result<ClosedOrbit, HybridError> {
     explicit(options)?;
     let mut options = options.clone();
@@ -1202,13 +1205,13 @@ pub fn closed_orbit(
         }
         let gap: Vec<f64> = end.iter().zip(&x).map(|(e, x)| e - x).collect();
         let largest = gap.iter().fold(0.0_f64, |most, gap| most.max(gap.abs()));
-        let of_size = largest / size.max(f64::MIN_POSITIVE);
+        let of_size = largest / size.max(OF_FORMER * former).max(f64::MIN_POSITIVE);
         // Motion that drifts is not closed because it has come far: each state comes back to a
         // share of its way, or to rounding of what states were at first.
         if usual.is_nan() {
             usual = size;
         }
-        let rounding = OF_SIZE * size.min(OFF * usual);
+        let rounding = OF_SIZE * size.min(OFF * usual).max(former);
         let misses = gap.iter().zip(&bounds).map(|(gap, [low, high])| {
             gap.abs() / (OF_WAY * (high - low)).max(rounding).max(f64::MIN_POSITIVE)
         });
@@ -1233,7 +1236,7 @@ pub fn closed_orbit(
                 multipliers,
                 multiplier_error: 0.0,
                 gap: of_size,
-                moved: moved(&began, &x, &bounds),
+                moved: moved(&began, &x, &bounds, OF_FORMER * former),
             };
             // Where a multiplier is 1 within its error, orbits beside are closed, too: a step of
             // Newton's method would be one error over another one.

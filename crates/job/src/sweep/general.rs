@@ -31,6 +31,9 @@ const LONGEST_PERIOD: usize = 64;
 /// within so many times the tolerance of the size of their states.
 const SAME_OF_SWING: f64 = 1e-5;
 const SAME_OF_TOLERANCE: f64 = 100.0;
+/// What a run's error hides of states that have become small, as a part of the least distance for
+/// states as large as they were.
+const OF_FORMER: f64 = 1e-2;
 /// Share below which a width shrinks from the third quarter of a run to the last, if it does.
 const LESS: f64 = 0.7;
 /// A motion without a clock falls to a rest if neighbours have come closer by this power of e in
@@ -369,7 +372,8 @@ fn judged(
         let extent = seen.iter().flat_map(|p| p.u).fold(0.0_f64, |most, u| most.max(u.abs()));
         (seen, extent)
     };
-    let same = (SAME_OF_SWING * swing).max(least * size);
+    let former = section.iter().flat_map(|p| p.u).fold(0.0_f64, |most, u| most.max(u.abs()));
+    let same = (SAME_OF_SWING * swing).max(least * size).max(OF_FORMER * least * former);
     let (mut seen, mut extent) = from(middle);
     if extent <= same {
         // One point from the first on: it has the size of its states for an extent.
@@ -662,6 +666,14 @@ mod tests {
             f = ['x*g - 2*y', 'y*g + 2*x', 'u*k - v/2', 'v*k + u/2']\n[let]\n\
             g = '1 - x^2 - y^2'\nk = '1 - u^2 - v^2'";
         assert_eq!(word(text, Some("y"), 1000.0), "period-4");
+    }
+
+    /// What a control holds at zero is one point every period, however rounding moves it.
+    #[test]
+    fn a_control_at_rest_is_of_one_period() {
+        let text = "states = ['x', 'v']\nstart = [1, 0]\n\
+            f = ['v', '0.3*sin(2*pi*t) - 2*sign(v + 2*x)']";
+        assert_eq!(word(text, None, 400.0), "period-1");
     }
 
     /// A focus is approached, and is no closed orbit on the way.
