@@ -835,8 +835,8 @@ impl Follower<'_> {
             .collect()
     }
 
-    /// The part that is added to `field` in each contact's direction so that its expression stays at zero;
-    /// not-a-number if there is nothing.
+    /// The part that is added to `field` in each contact's direction so that its expression stays
+    /// at zero; not-a-number if there is nothing.
     pub(super) fn contact_forces(&self, field: &[f64]) -> Vec<f64> {
         self.contact_forces_in(&self.contacts, &self.compiled, &self.variables, field)
     }

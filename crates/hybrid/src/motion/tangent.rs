@@ -1205,13 +1205,14 @@ pub fn closed_orbit(
         }
         let gap: Vec<f64> = end.iter().zip(&x).map(|(e, x)| e - x).collect();
         let largest = gap.iter().fold(0.0_f64, |most, gap| most.max(gap.abs()));
-        let of_size = largest / size.max(OF_FORMER * former).max(f64::MIN_POSITIVE);
+        let size = size.max(OF_FORMER * former);
+        let of_size = largest / size.max(f64::MIN_POSITIVE);
         // Motion that drifts is not closed because it has come far: each state comes back to a
         // share of its way, or to rounding of what states were at first.
         if usual.is_nan() {
             usual = size;
         }
-        let rounding = OF_SIZE * size.min(OFF * usual).max(former);
+        let rounding = OF_SIZE * size.min(OFF * usual);
         let misses = gap.iter().zip(&bounds).map(|(gap, [low, high])| {
             gap.abs() / (OF_WAY * (high - low)).max(rounding).max(f64::MIN_POSITIVE)
         });
