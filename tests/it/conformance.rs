@@ -187,7 +187,8 @@ macro_rules! conforms {
                         cap in 0.05..5.0_f64,
                 ) {
                     let start = Vector2::new(a, b);
-                    let end = walk(&mut $method::new(TOLERANCE), &Oscillator, 0.0, start, t_end, cap);
+                    let mut method = $method::new(TOLERANCE);
+                    let end = walk(&mut method, &Oscillator, 0.0, start, t_end, cap);
                     let x = end.last().unwrap().1.map(f64::from_bits);
                     let (r0, r) = (a.hypot(b), x[0].hypot(x[1]));
                     prop_assert!((r - r0).abs() <= 1e-5 * (1.0 + r0), "{r0} {r}");

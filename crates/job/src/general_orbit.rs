@@ -606,8 +606,8 @@ mod tests {
         assert_eq!(rest.stability, Stability::ToASet, "{rest:?}");
     }
 
-    /// What a sliding control holds at zero under a periodic disturbance has a closed orbit, the
-    /// rest, to which x' = -2 x leads: states known to rounding alone are beside it.
+    /// A sliding control at zero under a periodic force has a closed orbit: the rest, to which
+    /// x' = -2 x leads. States known to rounding alone are beside it.
     #[test]
     fn a_control_at_rest_has_a_period() {
         use std::f64::consts::TAU;

@@ -31,8 +31,8 @@ const LONGEST_PERIOD: usize = 64;
 /// within so many times the tolerance of the size of their states.
 const SAME_OF_SWING: f64 = 1e-5;
 const SAME_OF_TOLERANCE: f64 = 100.0;
-/// What a run's error hides of states that have become small, as a part of the least distance for
-/// states as large as they were.
+/// States that have become small are known to this part of the least distance for states as large
+/// as they were: to the error of their run.
 const OF_FORMER: f64 = 1e-2;
 /// Share below which a width shrinks from the third quarter of a run to the last, if it does.
 const LESS: f64 = 0.7;
@@ -668,7 +668,7 @@ mod tests {
         assert_eq!(word(text, Some("y"), 1000.0), "period-4");
     }
 
-    /// What a control holds at zero is one point every period, however rounding moves it.
+    /// A control at zero is at one point every period, however rounding moves it.
     #[test]
     fn a_control_at_rest_is_of_one_period() {
         let text = "states = ['x', 'v']\nstart = [1, 0]\n\
