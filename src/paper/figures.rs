@@ -140,7 +140,7 @@ mod tests {
         let files = read_tree(&root, &|path| !path.starts_with("out/")).unwrap().files;
         let known = |path: &str| FILES.iter().find(|f| f.0 == path).map(|f| f.1.as_bytes());
         let ours = |path: &str| {
-            ["paper.toml", "sentences.toml"].contains(&path)
+            ["paper.toml", "sentences.toml", "theorems.toml"].contains(&path)
                 || path.starts_with("figures/")
                 || path.strip_prefix("expected/").is_some_and(is_manifest)
         };
