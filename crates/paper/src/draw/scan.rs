@@ -115,7 +115,13 @@ struct Basin {
     ending: (String, i64),
     /// Its cells, as (column, row).
     cells: Vec<(usize, usize)>,
+    /// Attractors of its word that it stands for.
+    attractors: usize,
 }
+
+/// More endings than this are told by their words only: where a parameter moves an attractor it
+/// has another number in each column, and colours are not told apart.
+const MOST_COLOURS: usize = 16;
 
 /// The endings of runs over a grid of two settings, in order of their first occurrence; runs that
 /// failed come last.
@@ -133,8 +139,21 @@ fn basins(table: &Table, over: [&Scanned; 2]) -> Result<Vec<Basin>, String> {
         let ending = ((*word).to_owned(), numbers.get(row).copied().unwrap_or(0));
         match found.iter_mut().find(|b| b.ending == ending) {
             Some(basin) => basin.cells.push(at),
-            None => found.push(Basin { ending, cells: vec![at] }),
+            None => found.push(Basin { ending, cells: vec![at], attractors: 1 }),
         }
+    }
+    if found.len() > MOST_COLOURS {
+        let mut by_word: Vec<Basin> = Vec::new();
+        for basin in found {
+            match by_word.iter_mut().find(|b| b.ending.0 == basin.ending.0) {
+                Some(all) => {
+                    all.cells.extend(basin.cells);
+                    all.attractors += 1;
+                }
+                None => by_word.push(basin),
+            }
+        }
+        found = by_word;
     }
     found.sort_by_key(|basin| basin.ending.0 == "failed");
     Ok(found)
@@ -153,7 +172,7 @@ pub fn map(title: &str, over: [&Scanned; 2], table: &Table) -> Result<Sheet, Str
         .panel_aspect(0.9);
     let (mut attractors, mut others) = (0.., 0..);
     let basins = basins(table, over)?;
-    for Basin { ending: (word, number), cells } in &basins {
+    for Basin { ending: (word, number), cells, attractors: several } in &basins {
         // Closed orbits and rests.
         let attracts = word == "rest" || word.contains("period-");
         let colour = if attracts {
@@ -169,6 +188,9 @@ pub fn map(title: &str, over: [&Scanned; 2], table: &Table) -> Result<Sheet, Str
         let mut name = markup::literal(word);
         if basins.iter().filter(|basin| basin.ending.0 == *word).count() > 1 {
             name += &format!(", no. {number}");
+        }
+        if *several > 1 {
+            name += &format!(", {several} numbers");
         }
         let text = format!("{name} ({})", cells.len());
         sheet = sheet.legend(LegendEntry::new(LegendKey::Area(colour, 100), text));
@@ -257,6 +279,29 @@ mod tests {
         assert_eq!(seen.len(), 6, "{seen:?}");
         let other = Scanned { values: vec![7.0], ..y };
         assert!(map("", [&x, &other], &table).unwrap_err().contains("no value of the grid"));
+    }
+
+    /// Colours of more endings than are told apart are those of their words.
+    #[test]
+    fn many_attractors_have_the_colour_of_their_word() {
+        let columns = [Column::numbers("x"), Column::numbers("y"), Column::words("ending")];
+        let columns = columns.into_iter().chain([Column::integers("number")]);
+        let mut table = Table::new("endings", columns);
+        for i in 0..21 {
+            let word = if i == 20 { "rest" } else { "period-1" };
+            table.push([
+                Entry::Number(i.into()),
+                Entry::Number(0.0),
+                Entry::Word(word.into()),
+                Entry::Integer(i64::from(i) + 1),
+            ]);
+        }
+        let values: Vec<f64> = (0..21).map(f64::from).collect();
+        let [x, y] = [("x", &values[..]), ("y", &[0.0])]
+            .map(|(column, values)| Scanned { column: column.into(), ..scanned(values, false) });
+        let sheet = map("", [&x, &y], &table).unwrap();
+        let texts: Vec<&str> = sheet.legend.iter().map(|e| e.text.as_str()).collect();
+        assert_eq!(texts, ["period-1, 20 numbers (20)", "rest (1)"]);
     }
 
     #[test]
