@@ -1163,7 +1163,14 @@ impl<'a> Follower<'a> {
                 self.after(before)?;
                 continue;
             }
-            if short && shortened && self.is_just_before_an_edge() && self.land_at_an_edge()? {
+            // (The multistep method would lose its history at each.)
+            let halves = matches!(self.options.method, Method::Dopri5 | Method::Radau5);
+            if halves
+                && short
+                && shortened
+                && self.is_just_before_an_edge()
+                && self.land_at_an_edge()?
+            {
                 h = 0.0;
                 continue;
             }

@@ -2914,6 +2914,18 @@ fn steps_do_not_creep_to_the_end_of_a_root() {
     assert!(end.steps < 300, "{}", end.steps);
 }
 
+/// Super-twisting crosses the end of its root again and again, and comes to rest in finite time.
+#[test]
+fn super_twisting_comes_to_rest_by_every_method() {
+    let text = "states = ['x', 'w']\nstart = [1, 0]\nf = ['-1.5*sqrt(abs(x))*sign(x) + w', \
+        '-1.1*sign(x)']";
+    for method in [Method::Dopri5, Method::Radau5, Method::Lsoda, Method::Taylor] {
+        let options = Options { t_end: 3.0, method, ..Options::default() };
+        let end = follow(&model(text), &options, &mut |_| true).unwrap();
+        assert!(end.x.iter().all(|x| x.abs() < 1e-7) && end.steps < 20_000, "{method:?}: {end:?}");
+    }
+}
+
 /// Logic by the greatest of products is that by `or` and by comparisons, and a network written so
 /// is followed without a structure for each gene at each gene's switch.
 #[test]
