@@ -17,6 +17,7 @@ use crate::definition::{Direction, Event, When};
 use crate::equation::{Configuration, Equation, EquationError};
 use crate::model::Model;
 use crate::motion::determinant_of_negative;
+use crate::motion::tangent::apart;
 
 /// A switching surface on which a rest lies.
 #[derive(Clone, Debug, PartialEq)]
@@ -897,10 +898,6 @@ impl Search<'_> {
     /// By how much the eigenvalues of a field's rest change within what the state is known to. (How
     /// much entries of its Jacobian change says less: states have units.)
     fn blur(&self, config: &Configuration, x: &[f64], own: &[[f64; 2]]) -> f64 {
-        let apart = |a: &[f64; 2], b: &[f64; 2]| {
-            let [re, im] = [a[0] - b[0], a[1] - b[1]];
-            sqrt(re * re + im * im)
-        };
         // Together, and every second one the other way: what two states change may cancel.
         let shifted = [1.0, -1.0].map(|second| {
             let shift =

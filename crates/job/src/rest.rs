@@ -34,9 +34,9 @@ pub enum RestKind {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Stability {
-    /// They do.
+    /// Its neighbours come to it.
     Attracts,
-    /// Some leave.
+    /// Some of them leave.
     Repels,
     /// The largest real part of an eigenvalue is zero within its rounding: linear terms do not
     /// decide.

@@ -204,14 +204,7 @@ const UNBALANCED: f64 = 1_048_576.0;
 /// motion whose states have very different units. In them the entry of row i and column j is
 /// `units[j] / units[i]` times what it was. All 1 where no row is a million times as large or as
 /// small as its column.
-///
-/// ```
-/// use twofold_num::linear::balance;
-/// let units = balance(&[0.2, -1e18, 1e-18, 0.2], 2);
-/// assert!((0.5..=2.0).contains(&(1e-18 * units[0] / units[1])));
-/// assert_eq!(balance(&[0.2, -1e3, 1e-2, 0.2], 2), [1.0, 1.0]);
-/// ```
-pub fn balance(matrix: &[f64], n: usize) -> Vec<f64> {
+fn balance(matrix: &[f64], n: usize) -> Vec<f64> {
     let mut units = vec![1.0; n];
     let mut most = UNBALANCED;
     for _ in 0..MOST_ITERATIONS {
@@ -351,6 +344,13 @@ fn double_step(a: &mut [Vec<f64>], low: usize, last: usize, (x, y, w): (f64, f64
 mod tests {
     use super::*;
     use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+
+    #[test]
+    fn units_are_balanced_where_they_lie_far_apart() {
+        let units = balance(&[0.2, -1e18, 1e-18, 0.2], 2);
+        assert!((0.5..=2.0).contains(&(1e-18 * units[0] / units[1])));
+        assert_eq!(balance(&[0.2, -1e3, 1e-2, 0.2], 2), [1.0, 1.0]);
+    }
 
     #[test]
     fn exchanges_rows() {

@@ -1126,7 +1126,7 @@ const NOT_ISOLATED: f64 = 1e-6;
 const NEAR_ONE: f64 = 1e-2;
 
 /// The distance of two complex numbers.
-fn apart(a: &[f64; 2], b: &[f64; 2]) -> f64 {
+pub(crate) fn apart(a: &[f64; 2], b: &[f64; 2]) -> f64 {
     let [re, im] = [a[0] - b[0], a[1] - b[1]];
     sqrt(re * re + im * im)
 }

@@ -115,8 +115,6 @@ struct Basin {
     ending: (String, i64),
     /// Its cells, as (column, row).
     cells: Vec<(usize, usize)>,
-    /// Attractors of its word that it stands for.
-    attractors: usize,
 }
 
 /// More endings than this are told by their words only: where a parameter moves an attractor it
@@ -139,17 +137,14 @@ fn basins(table: &Table, over: [&Scanned; 2]) -> Result<Vec<Basin>, String> {
         let ending = ((*word).to_owned(), numbers.get(row).copied().unwrap_or(0));
         match found.iter_mut().find(|b| b.ending == ending) {
             Some(basin) => basin.cells.push(at),
-            None => found.push(Basin { ending, cells: vec![at], attractors: 1 }),
+            None => found.push(Basin { ending, cells: vec![at] }),
         }
     }
     if found.len() > MOST_COLOURS {
         let mut by_word: Vec<Basin> = Vec::new();
         for basin in found {
             match by_word.iter_mut().find(|b| b.ending.0 == basin.ending.0) {
-                Some(all) => {
-                    all.cells.extend(basin.cells);
-                    all.attractors += 1;
-                }
+                Some(all) => all.cells.extend(basin.cells),
                 None => by_word.push(basin),
             }
         }
@@ -172,7 +167,7 @@ pub fn map(title: &str, over: [&Scanned; 2], table: &Table) -> Result<Sheet, Str
         .panel_aspect(0.9);
     let (mut attractors, mut others) = (0.., 0..);
     let basins = basins(table, over)?;
-    for Basin { ending: (word, number), cells, attractors: several } in &basins {
+    for Basin { ending: (word, number), cells } in &basins {
         // Closed orbits and rests.
         let attracts = word == "rest" || word.contains("period-");
         let colour = if attracts {
@@ -188,9 +183,6 @@ pub fn map(title: &str, over: [&Scanned; 2], table: &Table) -> Result<Sheet, Str
         let mut name = markup::literal(word);
         if basins.iter().filter(|basin| basin.ending.0 == *word).count() > 1 {
             name += &format!(", no. {number}");
-        }
-        if *several > 1 {
-            name += &format!(", {several} numbers");
         }
         let text = format!("{name} ({})", cells.len());
         sheet = sheet.legend(LegendEntry::new(LegendKey::Area(colour, 100), text));
@@ -301,7 +293,7 @@ mod tests {
             .map(|(column, values)| Scanned { column: column.into(), ..scanned(values, false) });
         let sheet = map("", [&x, &y], &table).unwrap();
         let texts: Vec<&str> = sheet.legend.iter().map(|e| e.text.as_str()).collect();
-        assert_eq!(texts, ["period-1, 20 numbers (20)", "rest (1)"]);
+        assert_eq!(texts, ["period-1 (20)", "rest (1)"]);
     }
 
     #[test]
