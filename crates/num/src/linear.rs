@@ -120,9 +120,9 @@ const CONTRADICTS: f64 = 1e-3;
 const MOST_ITERATIONS: usize = 60;
 
 /// The eigenvalues (real part, imaginary part) of a real matrix of `n` rows, given row by row:
-/// balanced ([`balance`]), brought to Hessenberg form by elimination, and then the shifted QR
-/// algorithm (Martin, Peters & Wilkinson 1970; EISPACK's `elmhes` and `hqr`). `None` if an entry is
-/// not finite, or an eigenvalue does not settle.
+/// balanced (Parlett & Reinsch 1969), brought to Hessenberg form by elimination, and then the
+/// shifted QR algorithm (Martin, Peters & Wilkinson 1970; EISPACK's `elmhes` and `hqr`). `None` if
+/// an entry is not finite, or an eigenvalue does not settle.
 ///
 /// ```
 /// use twofold_num::linear::eigenvalues;
