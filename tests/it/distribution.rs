@@ -3,7 +3,7 @@
 //!
 //! A package made of this repository has no workflows; there nothing is tested here.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -235,5 +235,66 @@ fn the_package_holds_what_it_embeds() {
         "rust-toolchain.toml",
     ] {
         assert!(packed.iter().any(|f| f == name), "{name}");
+    }
+}
+
+/// Names of the packages that a manifest's package is compiled with, from its dependencies and
+/// those of its build script on any platform; whether it can do without.
+fn compiled_with(manifest: &toml::Table) -> BTreeMap<String, bool> {
+    let kinds = ["dependencies", "build-dependencies"];
+    let targets = manifest.get("target").and_then(|t| t.as_table()).into_iter().flatten();
+    let tables = targets.filter_map(|(_, target)| target.as_table());
+    std::iter::once(manifest)
+        .chain(tables)
+        .flat_map(|table| kinds.map(|kind| table.get(kind)))
+        .flatten()
+        .filter_map(|dependencies| dependencies.as_table())
+        .flatten()
+        .map(|(name, of)| {
+            let renamed = of.get("package").and_then(|package| package.as_str());
+            let optional = of.get("optional").and_then(|of| of.as_bool());
+            (renamed.unwrap_or(name).to_owned(), optional.unwrap_or(false))
+        })
+        .collect()
+}
+
+const REMEDY: &str = "run cargo there once without --locked";
+
+#[test]
+fn locks_of_their_own_follow_the_manifests() {
+    // Peers, fuzzing and tools are no members of the workspace: nothing else notices when a crate
+    // is given another dependency, until `--locked` refuses to build them.
+    let mut manifests = BTreeMap::new();
+    for folder in ["", "systems", "papers", "papers/jeffrey-2013/code"]
+        .map(PathBuf::from)
+        .into_iter()
+        .chain(fs::read_dir(root().join("crates")).unwrap().map(|e| e.unwrap().path()))
+    {
+        let manifest: toml::Table = text(folder.join("Cargo.toml")).parse().unwrap();
+        let name = manifest["package"]["name"].as_str().unwrap().to_owned();
+        manifests.insert(name, compiled_with(&manifest));
+    }
+    for lock in ["benches/peers/ours/Cargo.lock", "fuzz/Cargo.lock"] {
+        let locked: toml::Table = text(lock).parse().unwrap();
+        let mut seen = 0;
+        for package in locked["package"].as_array().unwrap() {
+            let name = package["name"].as_str().unwrap();
+            let Some(wanted) = manifests.get(name) else { continue };
+            let listed = package.get("dependencies").and_then(|of| of.as_array());
+            // "rand" or, where there are two of a name, "rand 0.9.1".
+            let listed: BTreeSet<String> = listed
+                .into_iter()
+                .flatten()
+                .map(|of| of.as_str().unwrap().split(' ').next().unwrap().to_owned())
+                .collect();
+            for of in &listed {
+                assert!(wanted.contains_key(of), "{lock}: {name} has {of} no more, {REMEDY}");
+            }
+            for (of, optional) in wanted {
+                assert!(*optional || listed.contains(of), "{lock}: {name} lacks {of}, {REMEDY}");
+            }
+            seen += 1;
+        }
+        assert!(seen > 10, "{lock}: only {seen} crates of ours");
     }
 }
