@@ -9,10 +9,10 @@
 use serde_json::json;
 use twofold::rigor::cycle::Search;
 use twofold::rigor::{FlowOptions, prove_cycle};
-use twofold_proofs::{SECTION, cycle, equation, print_cycle, refuse, statement, write};
+use twofold_proofs::{Equation, SECTION, cycle, print_cycle, refuse, statement, write};
 
 fn main() {
-    let alpha = 0.1;
+    let equation = Equation::of("coexistence");
     println!("{}", statement("coexistence"));
     let search =
         |near, crossings| Search { plane: SECTION, near, radius: 1e-10, crossings, longest: 40.0 };
@@ -21,7 +21,7 @@ fn main() {
         [("period one", [0.8063, 0.0], 2), ("period three", [1.2073, 0.0003], 6)]
     {
         println!("{name}:");
-        let c = prove_cycle(&equation(alpha), FlowOptions::PLAIN, &search(near, crossings))
+        let c = prove_cycle(&equation.tape(), FlowOptions::PLAIN, &search(near, crossings))
             .unwrap_or_else(|e| refuse(&e.to_string()));
         print_cycle(&c);
         if !c.attracts() {
@@ -46,6 +46,6 @@ fn main() {
     println!("PROVED: both exist and attract.");
     write(
         "coexistence",
-        json!({ "period one": cycle(one, alpha), "period three": cycle(three, alpha) }),
+        json!({ "period one": cycle(one, &equation), "period three": cycle(three, &equation) }),
     );
 }

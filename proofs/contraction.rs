@@ -12,21 +12,19 @@ use nalgebra::SVector;
 use serde_json::{Value, json};
 use twofold::num::{Arithmetic, Ball, Elementary, Enclosure, FromDecimal, Interval};
 use twofold::rigor::{Flow, FlowOptions, Set};
-use twofold_proofs::{
-    SECTION, ball, bounds, digits, equation, parameters, refuse, statement, write,
-};
+use twofold_proofs::{Equation, SECTION, ball, bounds, digits, refuse, statement, write};
 
 /// Starts of the orbits: x and z on y = 0, as decimal numbers.
 const STARTS: [[f64; 2]; 3] = [[0.2, -1.0], [0.21, -1.0], [0.2, -0.99]];
 
 fn main() {
-    let alpha = 0.1;
+    let equation = Equation::of("contraction");
     println!("{}", statement("contraction"));
     let decimal = |x: f64| Ball::from_decimal(&x.into());
     let mut ends: Vec<[Ball; 2]> = Vec::new();
     let mut rows: Vec<Value> = Vec::new();
     for [x, z] in STARTS {
-        let mut flow = Flow::<Ball, 3>::new(&equation(alpha), FlowOptions::EXTENDED);
+        let mut flow = Flow::<Ball, 3>::new(&equation.tape(), FlowOptions::EXTENDED);
         let start = SVector::from([decimal(x), Ball::zero(), decimal(z)]);
         let mut set = Set::on_plane(start, SECTION.axis, SECTION.value, false);
         let mut points = Vec::new();
@@ -74,6 +72,6 @@ fn main() {
     let distances: Vec<Value> = distances.into_iter().map(bounds).collect();
     write(
         "contraction",
-        json!({ "equation": parameters(alpha), "orbits": rows, "distances": distances }),
+        json!({ "equation": equation.parameters(), "orbits": rows, "distances": distances }),
     );
 }

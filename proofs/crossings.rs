@@ -8,24 +8,28 @@
 //! project in 113-bit arithmetic, lies in the enclosure, up to the uncertainty that the row claims
 //! and its own printed digits.
 
+use std::fs;
+
 use nalgebra::SVector;
 use serde_json::{Value, json};
 use twofold::num::{Arithmetic, Ball, Enclosure, FromDecimal, Interval};
 use twofold::rigor::{Flow, FlowOptions, Set};
-use twofold_proofs::{SECTION, ball, equation, parameters, refuse, statement, write};
+use twofold_proofs::{Equation, SECTION, ball, refuse, statement, write};
 
-const PRINTED: &str = include_str!("../crates/verify/data/crossings-printed.csv");
-const RECONSTRUCTED: &str = include_str!("../crates/verify/data/crossings-reconstructed.csv");
+/// Where the paper's folder keeps the tables.
+const TABLES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../papers/jeffrey-2013/reference");
 
 /// Proves a table: (what was printed, the certificate's rows).
-fn table(alpha: f64, text: &str) -> Result<(String, Vec<Value>), String> {
-    let mut flow = Flow::<Ball, 3>::new(&equation(alpha), FlowOptions::EXTENDED);
+fn table(name: &str, equation: Equation, n_rows: usize) -> Result<(String, Vec<Value>), String> {
+    let path = format!("{TABLES}/crossings-{name}.csv");
+    let text = fs::read_to_string(&path).map_err(|e| format!("{path}: {e}"))?;
+    let mut flow = Flow::<Ball, 3>::new(&equation.tape(), FlowOptions::EXTENDED);
     let start = SVector::from([Ball::from_decimal(&0.2.into()), Ball::zero(), -Ball::one()]);
     let mut set = Set::on_plane(start, SECTION.axis, SECTION.value, false);
     let (mut report, mut rows) = (String::new(), Vec::new());
-    let lines = text.lines().filter(|l| !l.starts_with('#') && !l.starts_with("t,"));
+    let lines = text.lines().filter(|l| !l.starts_with('#') && !l.starts_with("t,")).take(n_rows);
     for (n, line) in lines.enumerate() {
-        let at = |e: &dyn std::fmt::Display| format!("alpha = {alpha}, row {}: {e}", n + 1);
+        let at = |e: &dyn std::fmt::Display| format!("{name}, row {}: {e}", n + 1);
         let fields: Vec<&str> = line.split(',').collect();
         let [t, x, z, direction, uncertainty] = fields[..] else { return Err(at(&"not a row")) };
         let crossing = flow.next_crossing(&set, SECTION, 1000.0).map_err(|e| at(&e))?;
@@ -58,27 +62,31 @@ fn table(alpha: f64, text: &str) -> Result<(String, Vec<Value>), String> {
                 "upward": crossing.upward,
         }));
     }
+    if rows.len() < n_rows {
+        return Err(format!("{path} has {} rows, the theorem {n_rows}", rows.len()));
+    }
     Ok((report, rows))
 }
 
 fn main() {
     println!("{}", statement("crossings"));
-    // Two independent jobs, collected in order.
-    let (printed, reconstructed) = std::thread::scope(|s| {
-        let first = s.spawn(|| table(1e-3, PRINTED));
-        let second = s.spawn(|| table(0.1, RECONSTRUCTED));
-        (first.join(), second.join())
+    let tables = Equation::of_tables("crossings");
+    // Independent jobs, collected in order.
+    let proved: Vec<_> = std::thread::scope(|s| {
+        let prove = |(name, equation, rows): &(String, Equation, usize)| {
+            let (name, equation, rows) = (name.clone(), *equation, *rows);
+            s.spawn(move || table(&name, equation, rows))
+        };
+        let jobs: Vec<_> = tables.iter().map(prove).collect();
+        jobs.into_iter().map(|job| job.join()).collect()
     });
     let mut data = serde_json::Map::new();
-    for (name, alpha, result) in [("printed", 1e-3, printed), ("reconstructed", 0.1, reconstructed)]
-    {
+    for ((name, equation, _), result) in tables.iter().zip(proved) {
         match result {
             Ok(Ok((report, rows))) => {
                 print!("{name} reading:\n{report}");
-                data.insert(
-                    name.into(),
-                    json!({ "equation": parameters(alpha), "crossings": rows }),
-                );
+                let equation = equation.parameters();
+                data.insert(name.clone(), json!({ "equation": equation, "crossings": rows }));
             }
             Ok(Err(e)) => refuse(&e),
             Err(_) => refuse("the computation stopped"),

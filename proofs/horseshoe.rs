@@ -25,7 +25,7 @@ use serde_json::{Value, json};
 use twofold::num::{Arithmetic, Ball, Enclosure, Interval, elementary};
 use twofold::rigor::covering::Image;
 use twofold::rigor::{Covering, Flow, FlowOptions, HSet, Return, Set, prove_covering};
-use twofold_proofs::{SECTION, bounds, equation, parameters, refuse, statement, write};
+use twofold_proofs::{Equation, SECTION, bounds, refuse, statement, write};
 
 /// The saddle orbit at the hub, in two parts each (double-double).
 const HUB: [[f64; 2]; 2] = [
@@ -102,9 +102,9 @@ fn piece(image: &Image) -> Value {
 }
 
 fn main() {
-    let alpha = 0.1;
+    let equation = Equation::of("horseshoe");
     println!("{}", statement("horseshoe"));
-    let tape = equation(alpha);
+    let tape = equation.tape();
     let mut flow = Flow::<Ball, 3>::new(&tape, FlowOptions::EXTENDED);
     let hub = HUB.map(|[high, low]| Ball::from_f64(high) + Ball::from_f64(low));
     let beside = [0, 1].map(|i| hub[i] + Ball::from_f64(UNSTABLE[i]) * Ball::from_f64(OFFSET));
@@ -180,6 +180,6 @@ fn main() {
         .collect();
     write(
         "horseshoe",
-        json!({ "equation": parameters(alpha), "sets": sets, "coverings": coverings }),
+        json!({ "equation": equation.parameters(), "sets": sets, "coverings": coverings }),
     );
 }

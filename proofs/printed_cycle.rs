@@ -8,10 +8,10 @@
 
 use twofold::rigor::cycle::Search;
 use twofold::rigor::{FlowOptions, prove_cycle};
-use twofold_proofs::{SECTION, cycle, equation, print_cycle, refuse, statement, write};
+use twofold_proofs::{Equation, SECTION, cycle, print_cycle, refuse, statement, write};
 
 fn main() {
-    let alpha = 1e-3;
+    let equation = Equation::of("printed-cycle");
     let search = Search {
         plane: SECTION,
         near: [17.057344142481766, -0.015417177803876677],
@@ -20,7 +20,7 @@ fn main() {
         longest: 40.0,
     };
     println!("{}", statement("printed-cycle"));
-    let found = prove_cycle(&equation(alpha), FlowOptions::PLAIN, &search)
+    let found = prove_cycle(&equation.tape(), FlowOptions::PLAIN, &search)
         .unwrap_or_else(|e| refuse(&e.to_string()));
     print_cycle(&found);
     if !found.attracts() {
@@ -30,5 +30,5 @@ fn main() {
         refuse("the enclosures are wider than the statement says");
     }
     println!("PROVED: it exists, is unique there, and attracts.");
-    write("printed-cycle", cycle(&found, alpha));
+    write("printed-cycle", cycle(&found, &equation));
 }

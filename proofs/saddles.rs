@@ -12,7 +12,7 @@ use serde_json::{Map, Value};
 use twofold::num::{Arithmetic, Elementary, Interval};
 use twofold::rigor::cycle::Search;
 use twofold::rigor::{Cycle, FlowOptions, prove_cycle};
-use twofold_proofs::{SECTION, cycle, digits, equation, print_cycle, refuse, statement, write};
+use twofold_proofs::{Equation, SECTION, cycle, digits, print_cycle, refuse, statement, write};
 
 /// Names, places near the orbits on y = 0, crossings a turn.
 const ORBITS: [(&str, [f64; 2], usize); 4] = [
@@ -27,14 +27,14 @@ fn upward(c: &Cycle) -> impl Iterator<Item = [Interval; 2]> {
 }
 
 fn main() {
-    let alpha = 0.1;
+    let equation = Equation::of("saddles");
     println!("{}", statement("saddles"));
     let mut points: Vec<[Interval; 2]> = Vec::new();
     let mut data = Map::<String, Value>::new();
     for (name, near, crossings) in ORBITS {
         println!("{name}:");
         let search = Search { plane: SECTION, near, radius: 1e-10, crossings, longest: 40.0 };
-        let c = prove_cycle(&equation(alpha), FlowOptions::PLAIN, &search)
+        let c = prove_cycle(&equation.tape(), FlowOptions::PLAIN, &search)
             .unwrap_or_else(|e| refuse(&e.to_string()));
         print_cycle(&c);
         if !c.is_saddle() {
@@ -55,7 +55,7 @@ fn main() {
             }
             points.push(point);
         }
-        data.insert(name.into(), cycle(&c, alpha));
+        data.insert(name.into(), cycle(&c, &equation));
     }
     println!("PROVED: all four exist and are saddles.");
     write("saddles", Value::Object(data));

@@ -13,16 +13,14 @@ use nalgebra::SVector;
 use serde_json::{Value, json};
 use twofold::num::{Arithmetic, Ball, Elementary, Enclosure, FromDecimal};
 use twofold::rigor::{Flow, FlowOptions, Set};
-use twofold_proofs::{
-    SECTION, ball, bounds, digits, equation, parameters, refuse, statement, write,
-};
+use twofold_proofs::{Equation, SECTION, ball, bounds, digits, refuse, statement, write};
 
 const Z: f64 = 8.14695211321934e-14;
 const STATES: [f64; 2] = [4.99176529062235e-5, 4.99176538962235e-5];
 const CROSSINGS: usize = 3;
 
 fn main() {
-    let alpha = 0.1;
+    let equation = Equation::of("sensitivity");
     println!("{}", statement("sensitivity"));
     println!("  states: (x, 0, z) with z = {Z:e} and x = {:e} or {:e}", STATES[0], STATES[1]);
     let decimal = |x: f64| Ball::from_decimal(&x.into());
@@ -32,7 +30,7 @@ fn main() {
     }
     let mut orbits = Vec::new();
     for (i, x) in STATES.into_iter().enumerate() {
-        let mut flow = Flow::<Ball, 3>::new(&equation(alpha), FlowOptions::EXTENDED);
+        let mut flow = Flow::<Ball, 3>::new(&equation.tape(), FlowOptions::EXTENDED);
         let start = SVector::from([decimal(x), Ball::zero(), decimal(Z)]);
         let mut set = Set::on_plane(start, SECTION.axis, SECTION.value, i == 0);
         let mut points = Vec::new();
@@ -87,7 +85,7 @@ fn main() {
     }
     println!("PROVED: less than 1e-12 becomes more than 0.3.");
     let data = json!({
-        "equation": parameters(alpha), "states": { "x": STATES.map(|x| format!("{x:e}")), "y": "0",
+        "equation": equation.parameters(), "states": { "x": STATES.map(|x| format!("{x:e}")), "y": "0",
             "z": format!("{Z:e}") },
         "crossings": rows, "growth_until_first_crossing": derivative,
     });

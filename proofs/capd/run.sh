@@ -32,7 +32,7 @@ flags() { sed -n "s/^$1: *//p" "$settings"; }
 "${CXX:-c++}" "$here/printed_cycle.cpp" $(flags Cflags) $(flags Libs) -o "$out/printed_cycle"
 echo "CAPD $(sed -n 's/^Version: *//p' "$settings"), $("${CXX:-c++}" --version | head -n 1)"
 "$out/printed_cycle"
-data=$here/../../crates/verify/data
+data=$here/../../papers/jeffrey-2013/reference
 # Up to where the orbits begin to slide (an exp that overflows ends filib's programs).
 "$out/printed_cycle" crossings "$data/crossings-printed.csv" 1e-3 4
 "$out/printed_cycle" crossings "$data/crossings-reconstructed.csv" 0.1 2

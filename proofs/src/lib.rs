@@ -12,20 +12,64 @@ use twofold::system::{Caricature, Smoothed, Transition, VectorField};
 /// y = 0, on which all statements are made.
 pub const SECTION: AxisPlane = AxisPlane { axis: 1, value: 0.0 };
 
-/// beta of both readings.
-pub const BETA: f64 = 1e-5;
-/// eps of both readings.
-pub const EPS: f64 = 1e-3;
+/// The smoothed caricature (eqs. 5, 8 and 9 of the paper) with tanh, at a theorem's parameters.
+#[derive(Clone, Copy, Debug)]
+pub struct Equation {
+    caricature: Caricature,
+    eps: f64,
+}
 
-/// The smoothed caricature (eqs. 5, 8 and 9 of the paper) with beta = 1e-5, eps = 1e-3, v+ = -1.2,
-/// v- = -1.4, all of them the decimal numbers that are written here.
-pub fn equation(alpha: f64) -> Arc<Tape> {
-    Smoothed {
-        system: Caricature::with_reinjection(alpha, BETA),
-        transition: Transition::Tanh,
-        eps: EPS,
+impl Equation {
+    /// The equation of a theorem.
+    ///
+    /// # Panics
+    /// If the paper's folder has no such theorem, or it has no equation.
+    pub fn of(name: &str) -> Self {
+        let shows = &theorem(name)["shows"];
+        let kind = shows.as_table().and_then(|kinds| kinds.values().next());
+        Self::read(&kind.expect("a theorem shows something")["equation"])
     }
-    .tape()
+
+    /// The name, the equation and the number of rows of each table that a theorem is about.
+    ///
+    /// # Panics
+    /// As `of`.
+    pub fn of_tables(name: &str) -> Vec<(String, Self, usize)> {
+        let theorem = theorem(name);
+        let tables = theorem["shows"]["tables"]["tables"].as_array().expect("an array");
+        let rows = |table: &toml::Value| table["rows"].as_integer().map(|n| n as usize);
+        tables
+            .iter()
+            .map(|table| {
+                let name = table["name"].as_str().expect("a text").to_owned();
+                (name, Self::read(&table["equation"]), rows(table).expect("a number"))
+            })
+            .collect()
+    }
+
+    fn read(table: &toml::Value) -> Self {
+        let text = |key: &str| table[key].as_str().expect("numbers are texts");
+        assert_eq!([text("system"), text("transition")], ["caricature", "tanh"]);
+        let number = |key: &str| text(key).parse().expect("a decimal number");
+        let mut caricature = Caricature::with_reinjection(number("alpha"), number("beta"));
+        (caricature.v_plus, caricature.v_minus) = (number("v_plus"), number("v_minus"));
+        Self { caricature, eps: number("eps") }
+    }
+
+    /// Its operations, whose constants are the decimal numbers that the theorem names.
+    pub fn tape(&self) -> Arc<Tape> {
+        Smoothed { system: self.caricature, transition: Transition::Tanh, eps: self.eps }.tape()
+    }
+
+    /// The equation in a certificate.
+    pub fn parameters(&self) -> Value {
+        let Caricature { alpha, beta, v_plus, v_minus, .. } = self.caricature;
+        json!({
+            "system": "caricature", "transition": "tanh", "alpha": alpha.to_string(),
+            "beta": beta.to_string(), "eps": self.eps.to_string(),
+            "v_plus": v_plus.to_string(), "v_minus": v_minus.to_string(),
+        })
+    }
 }
 
 /// A number's enclosure, for people: its common digits, and its width.
@@ -50,17 +94,8 @@ pub fn ball(x: Ball) -> Value {
     json!({ "high": x.midpoint().high(), "low": x.midpoint().low(), "radius": x.radius() })
 }
 
-/// The equation in a certificate.
-pub fn parameters(alpha: f64) -> Value {
-    json!({
-        "system": "caricature", "transition": "tanh", "alpha": alpha.to_string(),
-            "beta": BETA.to_string(),
-        "eps": EPS.to_string(), "v_plus": "-1.2", "v_minus": "-1.4",
-    })
-}
-
 /// A closed orbit in a certificate: all that the inclusion and the stability test need.
-pub fn cycle(c: &Cycle, alpha: f64) -> Value {
+pub fn cycle(c: &Cycle, equation: &Equation) -> Value {
     let row = |r: [Interval; 2]| json!([bounds(r[0]), bounds(r[1])]);
     let square = |m: [[Interval; 2]; 2]| json!([row(m[0]), row(m[1])]);
     let crossings: Vec<Value> = c
@@ -69,7 +104,7 @@ pub fn cycle(c: &Cycle, alpha: f64) -> Value {
         .map(|(t, x, upward)| json!({ "time": bounds(*t), "point": row(*x), "upward": upward }))
         .collect();
     json!({
-        "equation": parameters(alpha), "candidate": row(c.candidate),
+        "equation": equation.parameters(), "candidate": row(c.candidate),
             "value_at_midpoint": row(c.value),
         "derivative_on_candidate": square(c.slope), "preconditioner": c.preconditioner,
             "image": row(c.image),
@@ -95,17 +130,22 @@ pub fn print_cycle(c: &Cycle) {
     println!("  1 + det - tr   >= {:.4e}", (one + c.determinant - c.trace).lower());
 }
 
-/// A theorem's statement, as the paper's folder has it.
-///
-/// # Panics
-/// If the folder has no such theorem.
-pub fn statement(name: &str) -> String {
+/// A theorem, as the paper's folder has it.
+fn theorem(name: &str) -> toml::Value {
     let file: toml::Table =
         twofold_papers::jeffrey_2013("theorems.toml").parse().expect("the file is TOML");
     let mut theorems = file["theorem"].as_array().into_iter().flatten();
     let found = theorems.find(|theorem| theorem["name"].as_str() == Some(name));
-    let text = found.and_then(|theorem| theorem["statement"].as_str());
-    let text = text.unwrap_or_else(|| panic!("theorems.toml has no {name}"));
+    found.unwrap_or_else(|| panic!("theorems.toml has no {name}")).clone()
+}
+
+/// A theorem's statement.
+///
+/// # Panics
+/// If the paper's folder has no such theorem.
+pub fn statement(name: &str) -> String {
+    let theorem = theorem(name);
+    let text = theorem["statement"].as_str().expect("a text");
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 

@@ -2,10 +2,10 @@
 //! nothing with this one but the equations.
 
 #[allow(dead_code)] // the examples' own main functions
-#[path = "../../examples/delay_growth.rs"]
+#[path = "../../papers/jeffrey-2013/examples/delay_growth.rs"]
 mod delay_growth;
 #[allow(dead_code)]
-#[path = "../../examples/delay_runs.rs"]
+#[path = "../../papers/jeffrey-2013/examples/delay_runs.rs"]
 mod delay_runs;
 
 use std::process::Command;

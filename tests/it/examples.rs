@@ -13,10 +13,10 @@ mod own_method;
 #[path = "../../examples/own_system.rs"]
 mod own_system;
 #[allow(dead_code)]
-#[path = "../../examples/returns.rs"]
+#[path = "../../papers/jeffrey-2013/examples/returns.rs"]
 mod returns;
 #[allow(dead_code)]
-#[path = "../../examples/visits.rs"]
+#[path = "../../papers/jeffrey-2013/examples/visits.rs"]
 pub mod visits;
 
 use twofold::integrate::filippov::EventKind;

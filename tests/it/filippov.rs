@@ -946,7 +946,7 @@ fn points_of_the_chaotic_set_are_connected_through_the_singularity() {
 /// y = 0 crossings of the smoothed system in 113-bit arithmetic: (t, x, z).
 fn reference(name: &str, rows: usize) -> Vec<[f64; 3]> {
     let text = std::fs::read_to_string(format!(
-        "{}/crates/verify/data/{name}",
+        "{}/papers/jeffrey-2013/reference/{name}",
         env!("CARGO_MANIFEST_DIR")
     ))
     .unwrap();
