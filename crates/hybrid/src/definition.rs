@@ -832,6 +832,9 @@ impl Definition {
                     };
                     let read = times.iter().map(|c| parse(at.clone(), &c.text(), &constants));
                     let read: Vec<Expression> = read.collect::<Result<_, _>>().map_err(listed)?;
+                    if read.is_empty() {
+                        return problem(at, "`at` names no time", Some("give one time or more"));
+                    }
                     let moments: Vec<f64> = read.iter().map(constant).collect();
                     for (k, time) in moments.iter().enumerate() {
                         if !time.is_finite() {
@@ -1039,6 +1042,9 @@ fn conditions<'a>(d: &'a Document, names: &[&str]) -> Vec<&'a str> {
     found
 }
 
+/// Columns of a recorded table beside the time and the states.
+const COLUMNS_OF_WORDS: [&str; 4] = ["mode", "signs", "direction", "event"];
+
 /// All names that expressions may use, each sound and given once, with its place.
 fn names(d: &Document) -> Result<Vec<(Place, &str)>, Problem> {
     let states =
@@ -1060,6 +1066,10 @@ fn names(d: &Document) -> Result<Vec<(Place, &str)>, Problem> {
         if is_reserved_in_general(name) {
             let message = format!("`{name}` has a meaning of its own in expressions");
             return problem(place, message, Some("choose another name"));
+        }
+        if d.states.iter().any(|s| s.name == name) && COLUMNS_OF_WORDS.contains(&name) {
+            let message = format!("recorded tables have a column `{name}` of their own");
+            return problem(place, message, Some("rename the state"));
         }
         if names.iter().any(|(_, n)| *n == name) {
             let message = format!("the name `{name}` is given twice");

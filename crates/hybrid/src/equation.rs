@@ -1599,7 +1599,8 @@ impl Writer<'_> {
             }
             General::Atan2 => {
                 let right = self.is_positive(&list[1]);
-                let up = if right { true } else { self.is_positive(&list[0]) };
+                // On the axis to the left the angle is pi, as a number's is.
+                let up = right || !self.is_positive(&mirrored(&list[0]));
                 let (y, x) = (self.number(&list[0]), self.number(&list[1]));
                 // To the right the half angle keeps away from its branch; to the left it is
                 // measured from the axis.

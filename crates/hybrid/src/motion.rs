@@ -806,11 +806,10 @@ fn scale_now(follower: &Follower, step: &Step, out: &mut Vec<f64>) {
                 let moved = (step.y[i] - step.x[i]).abs();
                 let speed = step.k.iter().map(|k| k[i].abs()).fold(0.0, f64::max);
                 let least = (0.1 * moved).max(1e-6 * span * speed);
-                let noise = follower.noise[i];
                 // A rounding error without a bound leaves the old size.
                 let size = size.max(0.01 * follower.scale_of(i)).max(least);
                 options.rtol * size
-                    + if noise.is_finite() { 4.0 * step.h * noise } else { 0.0 }
+                    + follower.noise_in(step.h, i).unwrap_or(0.0)
                     + follower.least_of(i)
             }
         }
@@ -1200,6 +1199,9 @@ impl<'a> Follower<'a> {
                 }
                 return Err(self.left_domain(step.t, &step.x));
             }
+            if self.is_blind(step.h) && self.is_at_a_pole(&room) {
+                return Err(self.left_domain(step.t, &step.x));
+            }
             step.jacobian = None;
             if self.options.method == Method::Radau5 {
                 step.jacobian = Some(self.finite_jacobian(step.t, &step.x));
@@ -1230,12 +1232,12 @@ impl<'a> Follower<'a> {
                     Some(_) if self.land_at_an_edge()? || self.comes_to_rest(self.t, true) => {
                         continue;
                     }
-                    Some(state) if leaving == MOST_LEAVING => {
+                    Some(state) if leaving == MOST_LEAVING && !self.overflows() => {
                         return Err(self.has_no_series(&step, state));
                     }
                     // Implicit steps leave a root of zero.
                     Some(_) => {
-                        leaving += 1;
+                        leaving = (leaving + 1).min(MOST_LEAVING);
                         step.series = None;
                         step.jacobian = Some(self.finite_jacobian(step.t, &step.x));
                         if implicit == 0.0 {
@@ -1317,6 +1319,12 @@ impl<'a> Follower<'a> {
             if earliest.is_finite() {
                 self.tell_poles(&step, earliest, &mut met);
                 self.land(&mut step, earliest * wanted, wanted, met[0]);
+                // A layer just before what is met, as |x|/(|x| + 1e-9) has one, is seen by the
+                // step that ends there alone.
+                if let Some(shorter) = self.landed_too_far(&step) {
+                    h = shorter;
+                    continue;
+                }
             }
             // The step stands.
             let length = step.h;
@@ -1405,6 +1413,18 @@ impl<'a> Follower<'a> {
                 return Ok(ending);
             }
         }
+    }
+
+    /// The rounding error that a state's speed makes in a step of length `h`, as far as it is
+    /// known. Of a free state that is far smaller than it was it is no more than the tolerance of its
+    /// former size: what would grow so far is none that the step resolves.
+    fn noise_in(&self, h: f64, i: usize) -> Option<f64> {
+        const FALLEN: f64 = 1e-3;
+        let noise = 4.0 * h * self.noise[i];
+        let free = self.sliding.is_empty() && self.contacts.is_empty();
+        let fallen = free && self.x[i].abs() < FALLEN * self.size[i];
+        let most = if fallen { self.options.rtol * self.size[i] } else { f64::INFINITY };
+        self.noise[i].is_finite().then(|| noise.min(most))
     }
 
     /// By no less the errors of a state are measured.

@@ -52,6 +52,14 @@ impl Range {
         Self::new(middle, if radius > most + middle.abs() { most + middle.abs() } else { radius })
     }
 
+    /// A rising function: flat where it is flat, however far its argument reaches.
+    fn rising(self, f: impl Fn(f64) -> f64) -> Self {
+        let [low, middle, high] = [-self.radius, 0.0, self.radius].map(|r| f(self.middle + r));
+        // Not-a-number stays.
+        let radius = if low <= high { (high - middle).max(middle - low) } else { low + high };
+        Self::new(middle, radius + ROUNDING * middle.abs())
+    }
+
     /// The least number, if all are positive; else not-a-number.
     fn positive(self) -> f64 {
         let least = self.middle - self.radius;
@@ -125,7 +133,7 @@ impl Arithmetic for Range {
 
 impl Elementary for Range {
     fn tanh(self) -> Self {
-        self.within(Elementary::tanh(self.middle), 1.0, 1.0)
+        self.rising(Elementary::tanh)
     }
     fn exp(self) -> Self {
         // e^r - 1 is at most r + r^2 up to r = 1.79.
@@ -152,10 +160,10 @@ impl Elementary for Range {
         self.within(Elementary::ln(self.middle), 1.0 / self.positive(), f64::INFINITY)
     }
     fn atan(self) -> Self {
-        self.within(Elementary::atan(self.middle), 1.0, 2.0)
+        self.rising(Elementary::atan)
     }
     fn erf(self) -> Self {
-        self.within(Elementary::erf(self.middle), std::f64::consts::FRAC_2_SQRT_PI, 1.0)
+        self.rising(Elementary::erf)
     }
     fn pi() -> Self {
         Self::new(std::f64::consts::PI, 0.0)

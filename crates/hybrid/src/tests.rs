@@ -509,6 +509,18 @@ fn errors_point_into_the_file() {
             "a time above 0",
         ),
         (
+            "states = ['x']\nf = ['1']\n[[event]]\nat = []",
+            "4:6",
+            "`at` names no time",
+            "one time or more",
+        ),
+        (
+            "states = ['x', 'event']\nf = ['1', '0']",
+            "1:16",
+            "recorded tables have a column `event`",
+            "rename the state",
+        ),
+        (
             "states = ['x']\nf = ['1']\n[[event]]\nat = [2, 1, 1]",
             "4:6",
             "the time 1 stands twice",
@@ -4175,6 +4187,134 @@ fn no_method_crosses_a_pole() {
             assert!(said.contains("leaves the domain"), "{method:?} {f}: {said}");
         }
     }
+}
+
+/// Poles that the motion runs over at a finite speed, where steps end up as short as rounding: of
+/// each end of a run, since where steps fall depends on it.
+#[test]
+fn poles_beside_the_motion_are_not_passed() {
+    let poles = [
+        "1/(x - 1)",
+        "1/abs(x - 1)",
+        "1/(x - 1)^2",
+        "tan(x)",
+        "tan(t)",
+        "1/sin(3*x)",
+        "x/(x^2 - 1)",
+        "1/(t - 1)",
+        "1e-6/(x - 1)",
+        "1e6/(x*x*x - 1)",
+        "if(y > 100, 0, 1/(1 - x))",
+    ];
+    for method in Method::ALL {
+        for f in poles {
+            for (start, t_end) in [(0.1, 3.0), (0.1, 2.2), (0.037, 4.7), (-1.0 / 3.0, 2.9)] {
+                let text = format!("states = ['x', 'y']\nstart = [{start}, 1]\nf = ['1', '{f}']");
+                let said = end_of(&text, t_end, method);
+                let refused = said.as_ref().is_err_and(|said| said.contains("leaves the domain"));
+                assert!(refused, "{method:?} {f} to {t_end}: {said:?}");
+            }
+        }
+        // What is continued through a zero of its divisor has no pole, whatever the scale.
+        for (f, want) in [
+            ("sin(x - 1)/(x - 1)", 2.465_9),
+            ("(x^2 - 1)/(x - 1)", 7.395),
+            ("1/(2 + sin(30*x))", 1.674),
+            ("1e9*(x - 1)/abs(2*x - 2)", 5.5e8),
+        ] {
+            let text = format!("states = ['x', 'y']\nstart = [0.1, 0]\nf = ['1', '{f}']");
+            let end = end_of(&text, 2.9, method).unwrap_or_else(|e| panic!("{method:?} {f}: {e}"));
+            near(end[1], want, 1e-2 * want);
+        }
+    }
+}
+
+/// A layer of regularisation that ends at a kink or an event, far thinner than the steps beside it:
+/// closed forms, z = a - K ln((a + K)/K) for both sides of a.
+#[test]
+fn thin_layers_beside_a_kink_are_seen() {
+    for method in Method::ALL {
+        for k in [1e-8, 1e-9, 1e-10, 1e-12_f64] {
+            let side = |a: f64| a - k * ((a + k) / k).ln();
+            for (f, want) in [
+                (format!("abs(x)/(abs(x) + {k:e})"), side(0.73) + side(1.0)),
+                (format!("max(x, 0)/(max(x, 0) + {k:e})"), side(1.0)),
+                (format!("abs(t - 0.73)/({k:e} + abs(0.73 - t))"), side(0.73) + side(1.0)),
+            ] {
+                let text = format!("states = ['x', 'z']\nstart = [-0.73, 0]\nf = ['1', '{f}']");
+                let end = end_of(&text, 1.73, method).unwrap();
+                near(end[1], want, 1e-8);
+            }
+            let event = format!(
+                "states = ['x', 'z']\nstart = [-0.73, 0]\nf = ['1', '-x/(-x + {k:e})']\n\
+                    [[event]]\nwhen = 'x'\nstop = true"
+            );
+            let options = Options { t_end: 2.0, method, ..Options::default() };
+            let outcome = follow(&model(&event), &options, &mut |_| true).unwrap();
+            near(outcome.x[1], side(0.73), 1e-8);
+        }
+        // Rounding errors of a state that has come to nothing allow no step across a pole.
+        let uptake = "states = ['x']\nstart = [1]\nf = ['-x/(x + 1e-6) + 0.4*heaviside(t - 5)']";
+        near(end_of(uptake, 5.5, method).unwrap()[0], 2e-6 / 3.0, 1e-11);
+        // Attraction by a unit force: quarters of sqrt(2) time units.
+        let force = "states = ['x', 'v']\nstart = [1, 0]\nf = ['v', '-x/(abs(x) + 1e-9)']";
+        let end = end_of(force, 2.0 * 2.0_f64.sqrt(), method).unwrap();
+        near(end[0], -1.0, 1e-6);
+    }
+}
+
+/// Steep friction: SciPy's DOP853 at 1e-13 with the layer of 1e-12 as a switch.
+#[test]
+fn friction_of_any_steepness_is_a_switch() {
+    for method in Method::ALL {
+        for k in ["1e-6", "1e-9", "1e-12"] {
+            let text =
+                format!("states = ['x', 'v']\nstart = [3, 0]\nf = ['v', '-x - 0.3*tanh(v/{k})']");
+            let end = end_of(&text, 9.0, method).unwrap();
+            near(end[0], -1.066_695_392_6, 2e-6);
+            near(end[1], -0.618_177_727_8, 2e-6);
+        }
+    }
+}
+
+/// Jumps of a bounded function over a pole of its argument, and terms that overflow on the way to
+/// nothing: by quadrature.
+#[test]
+fn poles_and_overflows_inside_bounded_functions_are_followed() {
+    for method in Method::ALL {
+        for (f, start, t_end, want) in [
+            ("tanh(1/(x - 0.3))", 1.0, 3.0, -0.970_945_69),
+            ("erf(1/(x - 0.3))", 1.0, 10.0, -2.625_461_21),
+            ("tanh(tan(t))", 1.0, 10.0, 0.165_004_60),
+            ("1/(1 + exp(-1e6*(x - 0.3)))", 1.0, 3.0, 0.7),
+            ("1/(1 + exp(-100*(1 - t)))", 1.0, 10.0, 1.0),
+            ("1/(1 + exp(-1000*sin(t)))", 1.0, 10.0, 6.283_185_307_2 - 0.000_693_147_2),
+            ("1/cosh(t)", 1.0, 1000.0, 1.570_796_33),
+            ("1/(1 + t^64*t^64)", 1.0, 10.0, 1.000_100_41),
+        ] {
+            let text = format!("states = ['x', 'z']\nstart = [{start}, 0]\nf = ['-1', '{f}']");
+            let end = end_of(&text, t_end, method).unwrap_or_else(|e| panic!("{method:?} {e}"));
+            near(end[1], want, 1e-7);
+        }
+        let lost = "states = ['x', 'z']\nstart = [1, 0]\n\
+            f = ['-1', 'sinh(800*(x - 0.3))/cosh(800*(x - 0.3))']";
+        assert!(end_of(lost, 3.0, method).unwrap_err().contains("leaves the domain"));
+    }
+}
+
+/// On the axis to the left the angle is pi, in equations as in numbers; what has no sign has none
+/// in a reset.
+#[test]
+fn zero_has_no_side_in_angles_and_resets() {
+    for method in Method::ALL {
+        for f in ["atan2(0, -1)", "atan2(y, x - 10)", "atan2(0*t, -1)"] {
+            let text = format!("states = ['x', 'y']\nstart = [0, 0]\nf = ['{f}', '0']");
+            near(end_of(&text, 1.0, method).unwrap()[0], std::f64::consts::PI, 1e-9);
+        }
+    }
+    let reset = "states = ['x', 'y']\nstart = [0, 0]\nf = ['1', '0']\n[[event]]\nat = 0.5\n\
+        set = { x = '3 + sign(y)' }";
+    near(end(reset, 0.5)[0], 3.0, 0.0);
 }
 
 /// Force as a function of place with an edge where it is continuous: SciPy's DOP853 at 1e-13. The

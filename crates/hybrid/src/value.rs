@@ -2,7 +2,7 @@
 
 use twofold_num::{Scalar, elementary};
 use twofold_system::Expression;
-use twofold_system::expression::General;
+use twofold_system::expression::{Function, General};
 
 /// The value of an expression with the value of each name; not-a-number where a name has none.
 /// Numbers with derivatives have those of the side that their values are on.
@@ -21,6 +21,11 @@ pub fn evaluate<S: Scalar>(e: &Expression, name: &dyn Fn(&str) -> Option<S>) -> 
         Expression::Mul(a, b) => at(a) * at(b),
         Expression::Div(a, b) => at(a) / at(b),
         Expression::Power(a, n) => at(a).power(*n),
+        // Zero has no sign.
+        Expression::Call(Function::Sign, a) => match at(a) {
+            zero if zero.to_f64() == 0.0 => number(0.0),
+            a => a.sign(),
+        },
         Expression::Call(f, a) => f.apply(at(a)),
         Expression::RealPower(a, b) => real_power(at(a), at(b)),
         Expression::Greater(a, b) => truth(at(a) > at(b)),

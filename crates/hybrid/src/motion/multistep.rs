@@ -97,11 +97,9 @@ impl Follower<'_> {
     /// of the time if it moves by little.
     fn add_noise(&mut self, step: &Step, h: f64, scale: &mut [f64]) {
         for i in 0..self.n {
-            let noise = self.noise[i];
-            scale[i] = if noise.is_finite() {
-                scale[i] + 4.0 * h * noise
-            } else {
-                scale[i].max(0.01 * self.options.rtol * self.size[i])
+            scale[i] = match self.noise_in(h, i) {
+                Some(noise) => scale[i] + noise,
+                None => scale[i].max(0.01 * self.options.rtol * self.size[i]),
             };
         }
         self.noisy = h <= 1e8 * f64::EPSILON * step.t.abs();

@@ -17,6 +17,8 @@ const DEEPEST: usize = 16;
 /// By so much of what its error is measured by the derivative of the continuous extension, which is
 /// of lower order than the step, may miss the field.
 const LARGEST_DEFECT: f64 = 1e3;
+/// Steps of this part of a run may be rounding beside a pole.
+const BLIND: f64 = 1e-9;
 
 /// A switch that the motion is about to come to.
 struct Edge {
@@ -517,6 +519,18 @@ impl Follower<'_> {
         Some(parts)
     }
 
+    /// Whether an exponential is so large at the present place that its derivatives overflow: the
+    /// field may be smooth there, as 1/(1 + exp(x)) is.
+    pub(super) fn overflows(&mut self) -> bool {
+        const LARGE: f64 = 100.0;
+        let compiled = self.compiled.clone();
+        self.variables[..self.n].copy_from_slice(&self.x);
+        self.variables[self.n] = self.t;
+        let mut exponents = vec![0.0; compiled.gates.len()];
+        compiled.gate_arguments.evaluate(&self.variables, &mut exponents);
+        compiled.gates.iter().zip(exponents).any(|(gate, x)| *gate == Gate::Exp && x > LARGE)
+    }
+
     /// The place in a step before which all is as the step saw it, if there is something that it
     /// did not see: an operation that is flat at the step's stages and steep between them. Where
     /// arguments move far, the field along the continuous extension is compared with the
@@ -530,7 +544,18 @@ impl Follower<'_> {
         let arguments = |follower: &mut Self, theta: f64| {
             follower.arguments(&compiled.gate_arguments, compiled.gates.len(), step, theta)
         };
-        let mut open = vec![(0.0, 1.0, 0, arguments(self, 0.0), arguments(self, 1.0))];
+        let ends = [arguments(self, 0.0), arguments(self, 1.0)];
+        let divides = |(i, gate): (usize, &Gate)| {
+            *gate == Gate::Divisor && ends[0][i] != 0.0 && !same_sign(ends[0][i], ends[1][i])
+        };
+        if compiled.gates.iter().enumerate().any(divides) && self.is_blind_to_poles(step) {
+            return Some(0.0);
+        }
+        let [first, last] = ends;
+        if let Some(theta) = self.thin_pole(step, scale, &first, &last) {
+            return Some(theta);
+        }
+        let mut open = vec![(0.0, 1.0, 0, first, last)];
         let mut looked = 0;
         let (mut at, mut slope, mut field) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
         while let Some((a, b, depth, first, last)) = open.pop() {
@@ -557,7 +582,7 @@ impl Follower<'_> {
             if !quiet && depth < DEEPEST {
                 open.push((middle, b, depth + 1, between.clone(), last));
                 open.push((a, middle, depth + 1, first, between));
-            } else if !quiet && self.has_pole(step, middle, &field) {
+            } else if !quiet && self.has_pole(step, middle, &field, scale) {
                 return Some(a);
             }
         }
@@ -567,9 +592,11 @@ impl Follower<'_> {
     /// Whether the field, which has this value at a place of a step where a divisor is as good as
     /// zero, has a pole there, integrable or not: it grows towards it. What is continued through
     /// such a place, as sin(x)/x is, has none.
-    fn has_pole(&mut self, step: &Step, theta: f64, there: &[f64]) -> bool {
+    /// Nor has what is too small to matter, as 1/cosh(x) is where its divisor overflows.
+    fn has_pole(&mut self, step: &Step, theta: f64, there: &[f64], scale: &[f64]) -> bool {
         const DISTANCE: f64 = 1.0 / 256.0;
         const GROWTH: f64 = 3.0;
+        const MATTERS: f64 = 1e-6;
         if !self.compiled.gates.contains(&Gate::Divisor) {
             return false;
         }
@@ -582,7 +609,92 @@ impl Follower<'_> {
                 least.iter_mut().zip(&field).for_each(|(l, f)| *l = l.min(f.abs()));
             }
         }
-        (0..self.n).any(|i| there[i].abs() > GROWTH * least[i])
+        let least_part = step.h / f64::from(1 << DEEPEST);
+        let matters = |i: usize| there[i].abs() * least_part > MATTERS * scale[i];
+        (0..self.n).any(|i| matters(i) && there[i].abs() > GROWTH * least[i])
+    }
+
+    /// The place of a pole in a step, if a divisor changes its sign on it: however thin it is, as
+    /// that of x/(x + 1e-9).
+    fn thin_pole(
+        &mut self,
+        step: &Step,
+        scale: &[f64],
+        first: &[f64],
+        last: &[f64],
+    ) -> Option<f64> {
+        const HALVINGS: usize = 52;
+        let compiled = self.compiled.clone();
+        let (mut at, mut field) = (vec![0.0; self.n], vec![0.0; self.n]);
+        let divisors = (0..first.len()).filter(|i| compiled.gates[*i] == Gate::Divisor);
+        let mut nearest: Option<f64> = None;
+        for i in divisors.filter(|i| first[*i] * last[*i] < 0.0) {
+            let (mut low, mut high) = (0.0, 1.0);
+            for _ in 0..HALVINGS {
+                let middle = 0.5 * (low + high);
+                let d = self.arguments(&compiled.gate_arguments, first.len(), step, middle)[i];
+                if same_sign(d, first[i]) { low = middle } else { high = middle }
+            }
+            step.at(low, &mut at);
+            self.rhs(step.t + low * step.h, &at, &mut field);
+            if self.has_pole(step, low, &field, scale) {
+                nearest = Some(nearest.map_or(low, |theta| theta.min(low)));
+            }
+        }
+        nearest
+    }
+
+    /// Whether a step in which a divisor changes its sign is so short that rounding hides a pole
+    /// there: the field is large, and changes in the step.
+    fn is_blind_to_poles(&mut self, step: &Step) -> bool {
+        const CHANGE: f64 = 0.1;
+        if !self.is_blind(step.h) {
+            return false;
+        }
+        let (mut at, mut field) = (vec![0.0; self.n], vec![0.0; self.n]);
+        let mut bounds: Vec<[f64; 2]> = step.k[0].iter().map(|f| [*f, *f]).collect();
+        for theta in [0.25, 0.5, 0.75, 1.0] {
+            step.at(theta, &mut at);
+            self.rhs(step.t + theta * step.h, &at, &mut field);
+            for ([low, high], f) in bounds.iter_mut().zip(&field) {
+                (*low, *high) =
+                    (low.min(*f), if f.is_nan() { f64::INFINITY } else { high.max(*f) });
+            }
+        }
+        (0..self.n).any(|i| {
+            let [low, high] = bounds[i];
+            let most = low.abs().max(high.abs());
+            self.is_large(i, most) && high - low > CHANGE * most
+        })
+    }
+
+    /// Whether a step is so short that a pole may hide in it.
+    pub(super) fn is_blind(&self, h: f64) -> bool {
+        h <= BLIND * (self.options.t_end - self.options.t_start)
+    }
+
+    /// Whether a speed would move a state by more than its size in a small part of the run.
+    fn is_large(&self, i: usize, speed: f64) -> bool {
+        BLIND * (self.options.t_end - self.options.t_start) * speed.abs() > self.size[i]
+    }
+
+    /// Whether a divisor is zero to rounding at the present place, and the field there is large.
+    pub(super) fn is_at_a_pole(&self, field: &[f64]) -> bool {
+        let compiled = &self.compiled;
+        let large = |(i, f): (usize, &f64)| self.is_large(i, *f);
+        if !compiled.gates.contains(&Gate::Divisor) || !field.iter().enumerate().any(large) {
+            return false;
+        }
+        let rounded = |v: &f64| Range::new(*v, 2.0 * f64::EPSILON * v.abs());
+        let place: Vec<Range> = self.x.iter().chain([&self.t]).map(rounded).collect();
+        let rest = self.variables[self.n + 1..].iter().map(|v| Range::from_f64(*v));
+        let place: Vec<Range> = place.into_iter().chain(rest).collect();
+        let mut arguments = vec![Range::default(); compiled.gates.len()];
+        compiled.gate_arguments.evaluate(&place, &mut arguments);
+        let is_zero = |(gate, d): (&Gate, &Range)| {
+            *gate == Gate::Divisor && !d.is_beyond(0.0, 1.0) && !d.is_beyond(0.0, -1.0)
+        };
+        compiled.gates.iter().zip(&arguments).any(is_zero)
     }
 
     /// The division by a number that comes to zero at once, if the motion from this point meets
@@ -677,6 +789,20 @@ impl Follower<'_> {
         if !matches!(sought, Sought::Pole(_)) {
             self.land_beyond(step, longest, sought, before, slope);
         }
+    }
+
+    /// The length of a step to make instead of one that has been made to end where something is
+    /// met, if its error is larger than the tolerance allows.
+    pub(super) fn landed_too_far(&mut self, step: &Step) -> Option<f64> {
+        if step.series.is_some() || step.multistep.is_some() {
+            return None;
+        }
+        let mut scale = std::mem::take(&mut self.scale);
+        scale_now(self, step, &mut scale);
+        let error = step.error(&|i| scale[i]);
+        self.scale = scale;
+        let shorter = 0.5 * step.h;
+        (error > 1.0 && error.is_finite() && self.t + shorter > self.t).then_some(shorter)
     }
 
     /// Stages at the end of a root's domain may be no numbers: a step that is shorter by little
@@ -1307,7 +1433,7 @@ fn are_quiet(gates: &[Gate], first: &[f64], between: &[f64], last: &[f64]) -> bo
             return true;
         }
         // A parabola's reach beyond its three points.
-        let bend = (0.5 * (p + r) - q).abs() * 0.5;
+        let bend = (0.5 * p + 0.5 * r - q).abs() * 0.5;
         gate.is_quiet(p.min(q).min(r) - bend, p.max(q).max(r) + bend)
     })
 }

@@ -178,7 +178,12 @@ impl Follower<'_> {
         self.expansions.present = Some(key);
         series.rounding = followed.into_iter().map(|what| self.rounding_of(what)).collect();
         let broken = |terms: &Vec<f64>| !terms.iter().all(|c| c.is_finite());
-        match series.terms[..n].iter().position(broken) {
+        let found = series.terms[..n].iter().position(broken);
+        if found.is_some() && self.overflows() {
+            return Ok(found);
+        }
+        let series = step.series.get_or_insert_default();
+        match found {
             None => Ok(None),
             // Fast growth of large numbers, far from a pole; of small ones beside a root of zero.
             Some(i)
