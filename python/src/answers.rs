@@ -142,6 +142,10 @@ pub fn ask<'py>(
             let hash = Hash::of(&encode::bits(std::slice::from_ref(&found.table)));
             Ok((hash, facts, vec![found.table]))
         })?,
+        Asked::Sweep(_) => {
+            let text = "a sweep has rows and their bytes: ask by outcomes";
+            return Err(errors::SpecError::new_err((text, "command")));
+        }
     };
     handed(py, hash.as_str(), &facts, tables)
 }
@@ -215,6 +219,32 @@ pub fn sweep<'py>(
         .collect::<PyResult<_>>()?;
     let random = random.map(|(count, seed)| Draws { count, seed });
     let sweep = Sweep::new(spec(text)?, axes, random).map_err(|e| wrong(e.to_string()))?;
+    swept(py, sweep, threads, show)
+}
+
+/// The sweep that these flags of `twofold sweep` describe, in the same form.
+#[pyfunction]
+#[pyo3(signature = (flags, threads, show=None))]
+pub fn outcomes<'py>(
+    py: Python<'py>,
+    flags: Vec<String>,
+    threads: usize,
+    show: Option<&Bound<'py, PyAny>>,
+) -> PyResult<(Bound<'py, PyDict>, Vec<u8>)> {
+    let wrong = |what: String| errors::SpecError::new_err((what, "flags"));
+    match asked("sweep", flags).map_err(|e| wrong(e.to_string()))? {
+        Asked::Sweep(sweep) => swept(py, *sweep, threads, show),
+        _ => Err(wrong("no sweep".into())),
+    }
+}
+
+/// Rows of a sweep as arrays, and as bytes.
+fn swept<'py>(
+    py: Python<'py>,
+    sweep: Sweep,
+    threads: usize,
+    show: Option<&Bound<'py, PyAny>>,
+) -> PyResult<(Bound<'py, PyDict>, Vec<u8>)> {
     let rows = supervise(py, show, move |work| {
         let numbers: Vec<u64> = Shard::WHOLE.rows(&sweep).collect();
         let made = side_by_side(numbers, threads, work, |_, number| sweep.row(number, work))?;

@@ -46,6 +46,7 @@ pub fn job(problem: &JobError) -> PyErr {
         JobError::Spec(wrong) => spec(wrong),
         JobError::Dimension(wrong) => SpecError::new_err((wrong.to_string(), "system")),
         JobError::Interrupted => PyKeyboardInterrupt::new_err(()),
+        other if other.is_bad_question() => SpecError::new_err((other.to_string(), "question")),
         other => ComputationError::new_err((other.to_string(),)),
     }
 }

@@ -22,7 +22,7 @@ mod system;
 #[pyo3::pymodule]
 mod _native {
     #[pymodule_export]
-    use super::answers::{ask, classify, fates, run, sweep, written};
+    use super::answers::{ask, classify, fates, outcomes, run, sweep, written};
     #[pymodule_export]
     use super::folder::{paper, paper_answer, paper_claims, paper_verdicts};
     #[pymodule_export]

@@ -3,6 +3,7 @@
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
+use twofold::hybrid;
 use twofold::num::tape::Program;
 use twofold::num::{Decimal, decimal::DecimalError};
 use twofold::system::diagnostic::nearest;
@@ -18,6 +19,14 @@ pub struct Definition(system::System);
 /// h, f+ and f- at a point.
 type Fields<'py> = (f64, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
 
+/// A general system where one with h, plus and minus is needed.
+fn general(name: &str) -> PyErr {
+    errors::definition(format!(
+        "{name} is a general system, and this call needs one with h, plus and minus: ask follow, \
+            orbit, lyapunov, rests, scan, sensitivities or outcomes"
+    ))
+}
+
 /// The names of the built-in systems.
 #[pyfunction]
 pub fn builtin_names() -> Vec<&'static str> {
@@ -29,8 +38,11 @@ impl Definition {
     /// Reads TOML; `origin` names the text in errors.
     #[staticmethod]
     fn from_toml(text: &str, origin: &str) -> PyResult<Self> {
-        let definition =
-            system::Definition::from_toml(text, origin).map_err(|e| errors::diagnostic(&e))?;
+        let read = system::Definition::from_toml(text, origin);
+        let definition = read.map_err(|e| match hybrid::Definition::from_toml(text, origin) {
+            Ok(_) => general(origin),
+            Err(_) => errors::diagnostic(&e),
+        })?;
         Ok(Self(system::System::new(definition)))
     }
 
@@ -46,6 +58,9 @@ impl Definition {
     #[staticmethod]
     fn builtin(name: &str) -> PyResult<Self> {
         system::System::builtin(name).map(Self).ok_or_else(|| {
+            if library::general(name).is_some() {
+                return general(name);
+            }
             let known: Vec<&str> = library::names().collect();
             let help = nearest(name, &known).map_or(String::new(), |near| {
                 format!(

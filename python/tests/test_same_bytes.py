@@ -174,6 +174,30 @@ def test_a_sweep_has_the_same_bytes(command, caricature):
     assert lottery.csv == command(*flags, "--runs", "3", "--shift", "1e-9")
 
 
+def test_outcomes_of_a_general_system_have_the_same_bytes(command):
+    flags = "--system impact-oscillator --section v=0 --t-end 60 --over params.w=2,2.1 --quiet"
+    ours = twofold.outcomes(
+        "impact-oscillator", {"params.w": [2, 2.1]}, section="v=0", t_end=60, threads=2
+    )
+    assert ours.csv == command("sweep", *flags.split()) and len(ours.ends) == 2
+    for wrong in (dict(over={"params.q": [1]}), dict(over={}, section="v")):
+        with pytest.raises(twofold.SpecError):
+            twofold.outcomes("impact-oscillator", t_end=60, **{"section": "v=0", **wrong})
+    for general in ("impact-oscillator", "states = ['x']\nf = ['-x']"):
+        with pytest.raises(twofold.DefinitionError, match="ask follow, orbit, .* or outcomes"):
+            twofold.solve(general, [1], 1.0)
+
+
+def test_wrong_numbers_are_no_failed_computations():
+    for wrong in (dict(t_end=float("nan")), dict(t_end=-1), dict(tend=1)):
+        with pytest.raises(twofold.SpecError):
+            twofold.follow("bouncing-ball", **wrong)
+    with pytest.raises(twofold.SpecError, match="choose one of fig5, fig6"):
+        twofold.panels("fig77")
+    with pytest.raises(TypeError, match="give a name, a file"):
+        twofold.follow(None)
+
+
 def test_figures_have_their_published_hashes():
     panels = twofold.panels("fig5")
     assert {p.reading for p in panels} == {"printed", "reconstructed"}

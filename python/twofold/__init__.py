@@ -16,6 +16,7 @@ system itself in Filippov's sense, whose future at a two-fold is a set.
 :func:`lyapunov`                Lyapunov exponents with their intervals
 :func:`rests`                   equilibria and pseudo-equilibria
 :func:`scan`                    an orbit diagram over one setting, or a map of endings over two
+:func:`outcomes`                where each of many runs of any system ends
 :func:`sensitivities`           derivatives of a run's end by its start and parameters
 :func:`spec`, :func:`run_spec`  a run as data, as ``twofold run --spec`` reads it
 :func:`panels`                  the panels of the paper's figures, as runs with their hashes
@@ -37,7 +38,7 @@ from . import errors
 from ._native import NUMERICS as _NUMERICS, VERSION as __version__
 from ._folder import Answer, Claim, Figure, Paper
 from ._paper import Panel, Verdict, panels, verdict_table, verdicts
-from ._questions import follow, lyapunov, orbit, rests, scan, sensitivities
+from ._questions import follow, lyapunov, orbit, outcomes, rests, scan, sensitivities
 from ._runs import (
     Classification,
     Funnel,
@@ -99,6 +100,7 @@ __all__ = [
     "lyapunov",
     "numerics",
     "orbit",
+    "outcomes",
     "panels",
     "rests",
     "run_spec",

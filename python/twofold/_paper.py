@@ -9,6 +9,7 @@ from typing import Any, Dict, List, Optional
 
 from . import _native
 from ._system import System
+from .errors import SpecError
 
 __all__ = ["Panel", "Verdict", "panels", "verdicts", "verdict_table"]
 
@@ -62,7 +63,12 @@ def panels(figure: Optional[str] = None, reading: Optional[str] = None) -> List[
     """The panels that are made of runs, in the paper's order; of one figure or one reading, if
     given."""
     found = []
-    for row in json.loads(_native.panels()):
+    rows = json.loads(_native.panels())
+    for key, asked in (("figure", figure), ("reading", reading)):
+        known = list(dict.fromkeys(row[key] for row in rows))
+        if asked is not None and asked not in known:
+            raise SpecError(f"there is no {key} {asked!r}; choose one of {', '.join(known)}", key)
+    for row in rows:
         if figure not in (None, row["figure"]) or reading not in (None, row["reading"]):
             continue
         verdict = row["verdict"] and Verdict(

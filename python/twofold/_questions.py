@@ -6,20 +6,21 @@ from __future__ import annotations
 import os
 import tempfile
 from pathlib import Path
-from typing import Any, Dict, Iterable, List, Mapping, Sequence, Union
+from typing import Any, Callable, Iterable, List, Mapping, Sequence, TypeVar, Union
 
 import numpy as np
 
 from . import _native
 from ._folder import Answer
 from ._progress import Shown
-from ._runs import Progress
+from ._runs import Progress, Sweep, Table
 from ._system import System
 
 SystemLike = Union[System, str, "os.PathLike[str]"]
 Values = Union[str, Sequence[float]]
+T = TypeVar("T")
 
-__all__ = ["follow", "lyapunov", "orbit", "rests", "scan", "sensitivities"]
+__all__ = ["follow", "lyapunov", "orbit", "outcomes", "rests", "scan", "sensitivities"]
 
 
 def _one(value: Any) -> str:
@@ -62,6 +63,19 @@ def _flags(given: Mapping[str, Any]) -> List[str]:
 def _ask(
     command: str, system: SystemLike, given: Mapping[str, Any], progress: Progress, threads: int = 0
 ) -> Answer:
+    def asked(flags: List[str]) -> Answer:
+        with Shown(progress) as show:
+            return Answer(_native.ask(command, flags, threads, show))
+
+    return _asked(system, given, asked)
+
+
+def _asked(system: SystemLike, given: Mapping[str, Any], ask: Callable[[List[str]], T]) -> T:
+    """The answer to a command's flags, those of its system among them."""
+    if not isinstance(system, (System, str, os.PathLike)):
+        raise TypeError(
+            f"the system is {system!r}: give a name, a file, the text of one, or a System"
+        )
     with tempfile.TemporaryDirectory() as folder:
         flags = _flags(given)
         if isinstance(system, System) or (
@@ -78,8 +92,7 @@ def _ask(
                 ] + flags
         else:
             name = os.fspath(system)
-        with Shown(progress) as show:
-            return Answer(_native.ask(command, [f"--system={name}", *flags], threads, show))
+        return ask([f"--system={name}", *flags])
 
 
 def follow(system: SystemLike, *, progress: Progress = False, **flags: Any) -> Answer:
@@ -180,6 +193,35 @@ def scan(
     2
     """
     return _ask("scan", system, {"over": over, **flags}, progress, threads)
+
+
+def outcomes(
+    system: SystemLike,
+    over: Mapping[str, Values],
+    *,
+    threads: int = 0,
+    progress: Progress = False,
+    **flags: Any,
+) -> Sweep:
+    """Where each of many runs of any system ends, as ``twofold sweep`` has it: a row for every
+    combination of what is varied, the last axis fastest.
+
+    ``over={"params.belt": "0.1..1:10", "start.x": [0, 1]}``; ``section="x=0"`` or ``period=1`` says
+    where runs are looked at; ``random=100`` draws ``"start.x": "-1..1"``. See :func:`follow` for
+    ``system``, ``params`` and the errors, :func:`sweep` for lists of starts.
+
+    >>> import twofold
+    >>> text = "states = ['x', 'v']\\nstart = [1, 0]\\nf = ['v', '-x - k*v']\\nparameters = { k = 1 }"
+    >>> twofold.outcomes(text, {"params.k": [1, 2]}, section="v=0", t_end=50).ends
+    ['rest', 'rest']
+    """
+
+    def asked(given: List[str]) -> Sweep:
+        with Shown(progress) as show:
+            columns, csv = _native.outcomes(given, threads, show)
+        return Sweep(Table(columns), bytes(csv))
+
+    return _asked(system, {"over": over, **flags}, asked)
 
 
 def sensitivities(system: SystemLike, *, progress: Progress = False, **flags: Any) -> Answer:

@@ -6,23 +6,27 @@ use std::sync::Arc;
 use clap::{Args, Command};
 
 use super::CliError;
-use super::commands::{lyapunov, orbit, rests, scan, sensitivities};
+use super::commands::{lyapunov, orbit, rests, scan, sensitivities, sweep};
 use super::flags::{RunFlags, Use};
 use super::general;
 use crate::job::AnyQuestion;
 use crate::job::scan::Scan;
+use crate::job::sweep::Sweep;
 use crate::paper::plots::Recorded;
 
 /// The question of a command.
 pub enum Asked {
     /// One question.
     Question(AnyQuestion),
-    /// Many runs.
+    /// Many runs, and how they move.
     Scan(Box<Scan>),
+    /// Many runs, and where they end.
+    Sweep(Box<Sweep>),
 }
 
 /// The commands that ask something.
-pub const COMMANDS: [&str; 6] = ["run", "orbit", "lyapunov", "rests", "scan", "sensitivities"];
+pub const COMMANDS: [&str; 7] =
+    ["run", "orbit", "lyapunov", "rests", "scan", "sensitivities", "sweep"];
 
 /// The flags of `T` that can be given, without dashes.
 pub fn known<T: Args>() -> Vec<String> {
@@ -71,6 +75,7 @@ pub fn asked(command: &str, flags: Vec<String>) -> Result<Asked, CliError> {
         "rests" => Arc::new(read::<rests::Arguments>(flags)?.question()?),
         "sensitivities" => Arc::new(read::<sensitivities::Arguments>(flags)?.question()?),
         "scan" => return Ok(Asked::Scan(Box::new(read::<scan::Arguments>(flags)?.scan()?))),
+        "sweep" => return Ok(Asked::Sweep(Box::new(read::<sweep::Arguments>(flags)?.sweep()?))),
         other => {
             return Err(CliError::Usage(format!(
                 "{other}: there is no such command; choose among {}",
