@@ -158,6 +158,9 @@ fn advice(error: &FileError) -> &'static str {
         io::ErrorKind::NotADirectory | io::ErrorKind::AlreadyExists => {
             "; a part of this path is a file, choose another place (--out, if the command has it)"
         }
+        io::ErrorKind::InvalidData if error.action == "open the journal" => {
+            "; delete it to compute all rows anew, or keep it and give another --out"
+        }
         _ if error.action.starts_with("find") => {
             "; something else removed or changed it meanwhile: run this again"
         }
@@ -203,6 +206,8 @@ mod tests {
             error("write", io::ErrorKind::NotADirectory)
                 .contains("is a file, choose another place")
         );
+        let damaged = error("open the journal", io::ErrorKind::InvalidData);
+        assert!(damaged.contains("delete it to compute"), "{damaged}");
         assert!(!error("read", io::ErrorKind::PermissionDenied).contains("--out"));
         assert!(error("find again", io::ErrorKind::NotFound).contains("run this again"));
     }

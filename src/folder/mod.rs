@@ -706,6 +706,12 @@ impl Folder {
         let mut pictures = Vec::new();
         for reading in shown {
             let picture = self.picture(&origin, id, &figure, columns, reading)?;
+            let mut others = self.figures.iter().flat_map(|figure| &figure.pictures);
+            if others.any(|other| other.name == picture.name) {
+                let why = format!("another figure has a picture called {}, too", picture.name);
+                let help = "rename the figure's file, or the reading".to_owned();
+                return Err(FolderError::at(&origin, 0..0, why, Some(help)));
+            }
             pictures.push(picture);
         }
         self.figures.push(Figure {

@@ -775,6 +775,19 @@ fn names_that_differ_in_case_alone_are_refused() {
     }
 }
 
+#[test]
+fn two_figures_have_no_picture_of_one_name() {
+    let place = small();
+    let root = place.path().join("p");
+    fs::remove_dir_all(root.join("expected")).ok();
+    let text = fs::read_to_string(root.join("paper.toml")).unwrap();
+    let readings = "\n[readings.b]\nabout = \"x\"\n[readings.a-b]\nabout = \"y\"\n";
+    fs::write(root.join("paper.toml"), text + readings).unwrap();
+    fs::copy(root.join("figures/fig1.toml"), root.join("figures/fig1-a.toml")).unwrap();
+    let (code, _, said) = paper(&["make", "--quiet"], &root);
+    assert!(code == 2 && said.contains("another figure has a picture called fig1-a-b"), "{said}");
+}
+
 /// Points of the paper are data of a picture, though their marker may not move by a pixel.
 #[test]
 fn points_are_part_of_the_data() {
