@@ -153,6 +153,30 @@ fn mirrored(e: &Expression) -> Expression {
     }
 }
 
+/// An expression over a divisor.
+struct Fraction {
+    above: Expression,
+    /// The factors of the divisor that change their sign.
+    below: Option<Expression>,
+    /// All of it.
+    full: Option<Expression>,
+}
+
+fn product(a: Expression, b: Option<Expression>) -> Expression {
+    match b {
+        Some(b) => Expression::Mul(Box::new(a), Box::new(b)),
+        None => a,
+    }
+}
+
+/// The product of what there is.
+fn both(a: Option<Expression>, b: Option<Expression>) -> Option<Expression> {
+    match (a, b) {
+        (Some(a), b) => Some(product(a, b)),
+        (None, b) => b,
+    }
+}
+
 /// Whether an expression has a root, a power that is none of a whole number, a logarithm or a
 /// division.
 fn has_domain_ends(e: &Expression) -> bool {
@@ -792,7 +816,84 @@ impl Equation {
             Expression::Apply(General::Sinh | General::Asin, list) if list.len() == 1 => {
                 self.bare(&list[0])
             }
+            Expression::Add(..) | Expression::Sub(..) | Expression::Call(Function::Tan, _) => {
+                match self.fraction(e) {
+                    // What is zero at a pole changes its sign there, too.
+                    Some(Fraction { above, below, .. }) => (product(above, below), false),
+                    None => (e.clone(), false),
+                }
+            }
             other => (other.clone(), false),
+        }
+    }
+
+    /// An expression over a common divisor, if one in it may be zero.
+    fn fraction(&self, e: &Expression) -> Option<Fraction> {
+        let whole = |e: &Expression| Fraction { above: e.clone(), below: None, full: None };
+        let of = |e: &Expression| self.fraction(e);
+        match e {
+            Expression::Name(name) => of(self.term(name)?),
+            Expression::Neg(a) => {
+                let a = of(a)?;
+                Some(Fraction { above: Expression::Neg(Box::new(a.above)), ..a })
+            }
+            Expression::Add(a, b) | Expression::Sub(a, b) => {
+                let (p, q) = (of(a), of(b));
+                if p.is_none() && q.is_none() {
+                    return None;
+                }
+                let (p, q) = (p.unwrap_or_else(|| whole(a)), q.unwrap_or_else(|| whole(b)));
+                let (left, right) = if p.full == q.full {
+                    (p.above, q.above)
+                } else {
+                    (product(p.above, q.full.clone()), product(q.above, p.full.clone()))
+                };
+                let sum = if matches!(e, Expression::Add(..)) {
+                    Expression::Add
+                } else {
+                    Expression::Sub
+                };
+                let above = sum(Box::new(left), Box::new(right));
+                if p.full == q.full {
+                    return Some(Fraction { above, ..p });
+                }
+                Some(Fraction { above, below: both(p.below, q.below), full: both(p.full, q.full) })
+            }
+            Expression::Mul(a, b) => {
+                let (p, q) = (of(a), of(b));
+                if p.is_none() && q.is_none() {
+                    return None;
+                }
+                let (p, q) = (p.unwrap_or_else(|| whole(a)), q.unwrap_or_else(|| whole(b)));
+                Some(Fraction {
+                    above: product(p.above, Some(q.above)),
+                    below: both(p.below, q.below),
+                    full: both(p.full, q.full),
+                })
+            }
+            Expression::Div(a, b) if self.constant(b).is_none() => {
+                let p = of(a).unwrap_or_else(|| whole(a));
+                if of(b).is_some() {
+                    return None;
+                }
+                let below = (!self.is_never_negative(b)).then(|| (**b).clone());
+                Some(Fraction {
+                    above: p.above,
+                    below: both(p.below, below),
+                    full: both(p.full, Some((**b).clone())),
+                })
+            }
+            Expression::Div(a, b) => {
+                let a = of(a)?;
+                let above = Expression::Div(Box::new(a.above), b.clone());
+                Some(Fraction { above, ..a })
+            }
+            Expression::Call(Function::Tan, a) => {
+                let [above, below] =
+                    [Function::Sin, Function::Cos].map(|f| Expression::Call(f, a.clone()));
+                Some(Fraction { above, below: Some(below.clone()), full: Some(below) })
+            }
+            _ => None,
         }
     }
 
