@@ -618,7 +618,8 @@ impl Equation {
         match e {
             _ if self.constant(e).is_some_and(|v| v >= 0.0) => true,
             Expression::Name(name) => self.term(name).is_some_and(is),
-            Expression::Call(Function::Abs, _) => true,
+            Expression::Call(Function::Abs | Function::Sqrt | Function::Exp, _)
+            | Expression::Apply(General::Cosh, _) => true,
             Expression::Apply(General::Max, list) => list.iter().any(is),
             Expression::Apply(General::Min, list) => list.iter().all(is),
             Expression::Apply(General::Clip, list) => is(&list[1]),

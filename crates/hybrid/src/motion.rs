@@ -804,7 +804,9 @@ fn scale_now(follower: &Follower, step: &Step, out: &mut Vec<f64>) {
             // millionth of the run.
             None => {
                 let moved = (step.y[i] - step.x[i]).abs();
+                // A speed that is large at one place alone says little.
                 let speed = step.k.iter().map(|k| k[i].abs()).fold(0.0, f64::max);
+                let speed = if moved > 0.0 { speed.min(1e3 * moved / step.h) } else { speed };
                 let least = (0.1 * moved).max(1e-6 * span * speed);
                 // A rounding error without a bound leaves the old size.
                 let size = size.max(0.01 * follower.scale_of(i)).max(least);

@@ -40,6 +40,10 @@ const D: [f64; 7] = [
 /// The real eigenvalue of the inverse of Radau IIA's matrix.
 const REAL_EIGENVALUE: f64 = 3.637_834_252_744_496;
 
+/// A state moves no farther by its first speed than this many times what it has been moved.
+const FARTHER: f64 = 1e6;
+/// Farther movement than this counts there: at the root of zero smaller ones come to nothing.
+const TINY: f64 = 1e-50;
 /// Iterations for the stages of an implicit step have settled when they change a state by no more
 /// than this part of itself.
 pub(crate) const SETTLED: f64 = 1e-14;
@@ -319,7 +323,14 @@ impl Step {
                     again = again.max(relative);
                 }
             }
-            if size <= SETTLED || (size <= 1e-11 && size >= 0.5 * last) {
+            // A speed that is large at the start alone says nothing about how far states go.
+            let by_speed_alone = |i: usize| {
+                let speed = (h * self.k[0][i]).abs();
+                let moved = (0..3).map(|s| z[s * n + i].abs()).fold(0.0, f64::max);
+                speed > self.x[i].abs().max(TINY) && speed > FARTHER * moved && moved > 0.0
+            };
+            let small = size <= SETTLED || (size <= 1e-11 && size >= 0.5 * last);
+            if small && !(0..n).any(by_speed_alone) {
                 settled = true;
                 break;
             }

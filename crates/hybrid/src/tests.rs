@@ -4302,6 +4302,32 @@ fn poles_and_overflows_inside_bounded_functions_are_followed() {
     }
 }
 
+/// Switching functions that change their sign at poles, too, and starts beside one: by quadrature.
+#[test]
+fn switches_over_a_divisor_switch_at_its_zeros() {
+    let pi = std::f64::consts::PI;
+    for method in Method::ALL {
+        for (f, t_end, want) in [
+            ("sign(tan(t))", 10.0, 10.0 - 3.0 * pi),
+            ("if(tan(t) > 1, 1, 0)", 10.0, 0.75 * pi),
+            ("heaviside(1/(t - 1) - 2)", 3.0, 0.5),
+            ("heaviside(2 - 1/(t - 1))", 3.0, 2.5),
+            ("if(t/(t - 1) > 3, 1, 0)", 3.0, 0.5),
+            ("heaviside(r - 2)", 3.0, 0.5),
+            ("if(1/(t - 1)^2 > 4, 1, 0)", 3.0, 1.0),
+            ("clip(tan(t), -1, 1)", 10.0, 0.175_459_321_0),
+        ] {
+            let text = format!("states = ['z']\nstart = [0]\nf = ['{f}']\n[let]\nr = '1/(t - 1)'");
+            let end = end_of(&text, t_end, method).unwrap_or_else(|e| panic!("{method:?} {e}"));
+            near(end[0], want, 1e-8);
+        }
+        for e in [1e-8, 1e-10, 1e-12_f64] {
+            let text = format!("states = ['x']\nstart = [0]\nf = ['1/(x + {e:e})']");
+            near(end_of(&text, 2.0, method).unwrap()[0], (e * e + 4.0).sqrt() - e, 1e-4);
+        }
+    }
+}
+
 /// On the axis to the left the angle is pi, in equations as in numbers; what has no sign has none
 /// in a reset.
 #[test]
