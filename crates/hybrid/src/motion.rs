@@ -783,6 +783,8 @@ const MOST_LEAVING: u32 = 1000;
 /// So many steps that take a run less than this part of its time would not end.
 const STEPS_BETWEEN_LOOKS: u64 = 16384;
 const NO_TIME: f64 = 1e-12;
+/// Nor would so many steps in a row of a few roundings of the time each.
+const MOST_CREEPING: u32 = 256;
 /// Taylor series that move a run by so small a part of the time it has come would not end, either.
 const LITTLE_TIME: f64 = 1e-6;
 /// A run is looked at each time its steps have doubled, from so many on. If twice the steps make
@@ -1081,7 +1083,7 @@ impl<'a> Follower<'a> {
         let mut step = Step::new(self.n);
         let mut h = 0.0;
         // The next implicit step where there is no series, and how many there were.
-        let (mut implicit, mut leaving) = (0.0, 0);
+        let (mut implicit, mut leaving, mut creeping) = (0.0, 0, 0);
         let mut quiet = 0;
         // Whether the last step was made shorter than its tolerance asked for.
         let mut shortened = false;
@@ -1140,7 +1142,17 @@ impl<'a> Follower<'a> {
                 }
                 let Outcome { steps, switches, events, .. } = self.outcome;
                 let (t_end, most) = (self.options.t_end, self.options.max_steps);
-                if pace.is_hopeless(steps, self.t, t_end, most) && switches + events > steps / 100 {
+                let hopeless = pace.is_hopeless(steps, self.t, t_end, most);
+                if hopeless && switches + events <= steps / 100 {
+                    let why = format!(
+                        "steps stay too short ({steps} so far; if it goes on so, the end takes \
+                            more than --max-steps allows): give another --method, end the run \
+                            before (--t-end), or smooth what turns so fast there, as \
+                            sqrt(x^2 + y^2 + 1e-12) for a length"
+                    );
+                    return Err(HybridError::Stuck { t: self.t, x: self.x.clone(), why });
+                }
+                if hopeless {
                     let why = format!(
                         "switches or events follow each other ever faster, as chatter ({steps} \
                         steps so far; if it goes on so, the end takes more than --max-steps \
@@ -1152,6 +1164,10 @@ impl<'a> Follower<'a> {
             }
             if self.outcome.steps >= self.options.max_steps {
                 return Err(HybridError::Budget { steps: self.outcome.steps, t: self.t });
+            }
+            creeping = if step.h <= 4.0 * f64::EPSILON * self.t.abs() { creeping + 1 } else { 0 };
+            if creeping == MOST_CREEPING && self.breaks_ahead(256.0 * step.h) {
+                return Err(self.left_domain(self.t, &self.x.clone()));
             }
             let short = step.h < SHORT_STEP * (self.options.t_end - self.options.t_start);
             if short && let Some(met) = self.lands_at_a_root(clock.next().unwrap_or(f64::INFINITY))
@@ -1418,8 +1434,8 @@ impl<'a> Follower<'a> {
     }
 
     /// The rounding error that a state's speed makes in a step of length `h`, as far as it is
-    /// known. Of a free state that is far smaller than it was it is no more than the tolerance of its
-    /// former size: what would grow so far is none that the step resolves.
+    /// known. Of a free state that is far smaller than it was it is no more than the tolerance of
+    /// its former size: what would grow so far is none that the step resolves.
     fn noise_in(&self, h: f64, i: usize) -> Option<f64> {
         const FALLEN: f64 = 1e-3;
         let noise = 4.0 * h * self.noise[i];

@@ -4215,6 +4215,11 @@ fn poles_beside_the_motion_are_not_passed() {
                 assert!(refused, "{method:?} {f} to {t_end}: {said:?}");
             }
         }
+        for f in ["acos(x)", "(1 - x)^0.5", "1 + 0*sqrt(1 - t)"] {
+            let text = format!("states = ['x', 'y']\nstart = [0.13, 0]\nf = ['1', '{f}']");
+            let said = end_of(&text, 2.0, method).unwrap_err();
+            assert!(said.contains("leaves the domain"), "{method:?} {f}: {said}");
+        }
         // What is continued through a zero of its divisor has no pole, whatever the scale.
         for (f, want) in [
             ("sin(x - 1)/(x - 1)", 2.465_9),
