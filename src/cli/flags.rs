@@ -214,7 +214,8 @@ pub struct RunFlags {
     /// less than 0.003 at most a thousandth of that [default: 0.001; of a picture 0.0001].
     #[arg(long, value_parser = plain, allow_hyphen_values = true, help_heading = "Recording")]
     pub chord: Option<f64>,
-    /// Record the state at the multiples of this time, instead of points that follow the path.
+    /// Record the state at the multiples of this time, instead of points that follow the path; of a
+    /// general system also before and after each event.
     #[arg(
         long,
         value_parser = time,
