@@ -639,6 +639,38 @@ fn a_sweep_says_what_runs_settle_on() {
     assert!(table.numbers("x").iter().all(|x| (x - 0.3).abs() < 1e-9 || (x - 0.8).abs() < 1e-9));
 }
 
+/// Runs are looked at by multiples of --period and go on to --t-end, where an event may stop them.
+#[test]
+fn runs_seen_every_period_go_on_to_their_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let text = "states = ['x', 'n']\nstart = [1, 0]\nf = ['-x + a*cos(2*pi*t)', '0']\n\
+        parameters = { a = 1 }\n[[event]]\nname = 'late'\nat = 50.8\nset = { n = '1' }\n\
+        stop = true";
+    fs::write(at.join("late.toml"), text).unwrap();
+    let late = ["--system", "late.toml", "--period", "1", "--over", "params.a=1"];
+    let sweep = [&["sweep", "--quiet", "--t-end", "50.9"][..], &late].concat();
+    let table = from_csv(&good(at, &sweep)).unwrap().1;
+    assert_eq!(table.words("outcome").next(), Some("stopped"));
+    assert_eq!((table.numbers("end"), table.numbers("end.n")), (&[50.8][..], &[1.0][..]));
+    let scan = ["--t-start", "0.5", "--t-end", "4.2"];
+    let times =
+        |more: &[&str]| scanned(at, &[&late[..], &scan, more].concat()).numbers("t").to_vec();
+    assert_eq!(times(&[]), [3.0, 4.0]);
+    assert_eq!(times(&["--follow", "up"]), [3.0, 4.0]);
+    // A followed state is handed on a whole number of periods after the start.
+    let both = |end: &str| {
+        let over = ["--over", "params.a=1,2", "--t-start", "0.5", "--t-end", end];
+        let base = ["--system", "late.toml", "--period", "1", "--follow", "up"];
+        scanned(at, &[&base[..], &over].concat()).numbers("x")[..].to_vec()
+    };
+    let (whole, more) = (both("4.5"), both("4.6"));
+    assert_eq!(whole.len(), more.len());
+    for (x, y) in whole.iter().zip(&more) {
+        near(*x, *y, 1e-9);
+    }
+}
+
 /// Periods of the logistic map and of the converter that ships, wherever the origin of a state
 /// lies: what is the same is measured by the swing.
 #[test]
