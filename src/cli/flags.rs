@@ -663,8 +663,8 @@ enum Misuse {
     )]
     FunnelInSweep,
     #[error(
-        "{file} is not a spec of one run: {reason}; make one with `--only PANEL --reading READING \
-            --print-spec`"
+        "{file} is not a spec of one run: {reason}; make one with `twofold run ... \
+            --print-spec`, or `twofold figure FIGURE --only PANEL --reading READING --print-spec`"
     )]
     Spec { file: String, reason: String },
 }

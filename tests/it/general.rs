@@ -874,7 +874,7 @@ fn new_begins_with_a_general_system() {
     good(at, &["run", "--quiet", "--system", "sub/tank.toml", "--t-end", "1"]);
     fs::write(at.join("sub/inflow.csv"), "mine").unwrap();
     let again = ["new", "sub/other.toml", "--from", "driven-by-data"];
-    refused(at, &again, 2, &["inflow.csv is there already", "--force"]);
+    refused(at, &again, 2, &["inflow.csv is there already; choose another folder", "--force"]);
     assert!(table() == "mine" && !at.join("sub/other.toml").exists());
     good(at, &[&again[..], &["--force"]].concat());
     assert!(table() != "mine");
@@ -885,6 +885,24 @@ fn new_begins_with_a_general_system() {
         &["inflow.csv", "give a file's name"],
     );
     refused(at, &["new", "a.toml", "--from", "bouncing-bal"], 2, &["did you mean bouncing-ball?"]);
+}
+
+/// Systems and specs that a command does not take: advice names another that it does.
+#[test]
+fn advice_about_another_kind_of_file_can_be_followed() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let text = library::text("two-blocks").unwrap();
+    fs::write(at.join("blocks.toml"), text).unwrap();
+    let json = serde_json::to_string(&text.parse::<toml::Table>().unwrap()).unwrap();
+    fs::write(at.join("blocks.json"), json).unwrap();
+    for system in ["two-blocks", "blocks.toml", "blocks.json"] {
+        let rests = ["rests", "--system", system];
+        refused(at, &rests, 2, &["it has two switching surfaces (h and [second])"]);
+    }
+    fs::write(at.join("spec.json"), "{}").unwrap();
+    let spec = ["run", "--spec", "spec.json"];
+    refused(at, &spec, 2, &["make one with `twofold run ... --print-spec`", "`twofold figure FIG"]);
 }
 
 const FOLDS: &str = "states = ['x']\nstart = [-1]\nf = ['p + x - x^3']\n[parameters]\np = 0\n";
