@@ -188,6 +188,23 @@ def test_outcomes_of_a_general_system_have_the_same_bytes(command):
             twofold.solve(general, [1], 1.0)
 
 
+def test_a_text_of_one_line_is_no_name(tmp_path, monkeypatch):
+    line = '{"states": ["x"], "start": [1], "f": ["-x"]}'
+    for text in (line, "  " + line, line.replace(", ", ",\n")):
+        x = twofold.follow(text, t_end=1.0).tables["path"]["x"]
+        assert abs(x[-1] - np.exp(-1.0)) < 1e-8
+    for text, why in (
+        ("states = ['x']; f = ['-x']", "expected newline"),
+        ("{", "EOF while parsing"),
+        ("states: [x]", "no such built-in system"),
+    ):
+        with pytest.raises(twofold.SpecError, match=why):
+            twofold.follow(text, t_end=1.0)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "x=1.json").write_text(line, encoding="utf-8")
+    assert twofold.follow("x=1.json", t_end=1.0).tables["path"]["x"][0] == 1
+
+
 def test_wrong_numbers_are_no_failed_computations():
     for wrong in (dict(t_end=float("nan")), dict(t_end=-1), dict(tend=1)):
         with pytest.raises(twofold.SpecError):

@@ -70,6 +70,13 @@ def _ask(
     return _asked(system, given, asked)
 
 
+def _is_text(system: str) -> bool:
+    """Whether this is the text of a system, TOML or JSON, rather than a name or a file's."""
+    if os.path.isfile(system):
+        return False
+    return "\n" in system or "=" in system or system.lstrip().startswith("{")
+
+
 def _asked(system: SystemLike, given: Mapping[str, Any], ask: Callable[[List[str]], T]) -> T:
     """The answer to a command's flags, those of its system among them."""
     if not isinstance(system, (System, str, os.PathLike)):
@@ -78,9 +85,7 @@ def _asked(system: SystemLike, given: Mapping[str, Any], ask: Callable[[List[str
         )
     with tempfile.TemporaryDirectory() as folder:
         flags = _flags(given)
-        if isinstance(system, System) or (
-            isinstance(system, str) and ("\n" in system or "=" in system)
-        ):
+        if isinstance(system, System) or (isinstance(system, str) and _is_text(system)):
             text = system.to_toml() if isinstance(system, System) else system
             json = text.lstrip().startswith("{")
             file = Path(folder) / ("system.json" if json else "system.toml")
@@ -211,7 +216,7 @@ def outcomes(
     ``system``, ``params`` and the errors, :func:`sweep` for lists of starts.
 
     >>> import twofold
-    >>> text = "states = ['x', 'v']\\nstart = [1, 0]\\nf = ['v', '-x - k*v']\\nparameters = { k = 1 }"
+    >>> text = "states = ['x', 'v']\\nstart = [1, 0]\\nf = ['v', '-x-k*v']\\nparameters = { k = 1 }"
     >>> twofold.outcomes(text, {"params.k": [1, 2]}, section="v=0", t_end=50).ends
     ['rest', 'rest']
     """

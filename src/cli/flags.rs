@@ -214,7 +214,8 @@ pub struct RunFlags {
     /// less than 0.003 at most a thousandth of that [default: 0.001; of a picture 0.0001].
     #[arg(long, value_parser = plain, allow_hyphen_values = true, help_heading = "Recording")]
     pub chord: Option<f64>,
-    /// Record the state at the multiples of this time, instead of points that follow the path.
+    /// Record the state at the multiples of this time, instead of points that follow the path; of a
+    /// general system also before and after each event.
     #[arg(
         long,
         value_parser = time,
@@ -662,8 +663,8 @@ enum Misuse {
     )]
     FunnelInSweep,
     #[error(
-        "{file} is not a spec of one run: {reason}; make one with `--only PANEL --reading READING \
-            --print-spec`"
+        "{file} is not a spec of one run: {reason}; make one with `twofold run ... \
+            --print-spec`, or `twofold figure FIGURE --only PANEL --reading READING --print-spec`"
     )]
     Spec { file: String, reason: String },
 }

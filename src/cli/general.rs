@@ -10,7 +10,7 @@ use crate::hybrid::{HybridError, Model, Options};
 use crate::integrate::StepCap;
 use crate::integrate::filippov::{self, ExitRule};
 use crate::job::JobError;
-use crate::job::general::{GeneralRun, expression, model_of};
+use crate::job::general::{GeneralRun, expression, last_of_phase, model_of};
 use crate::job::spec::SwitchSpec;
 use crate::system::Expression;
 
@@ -178,16 +178,15 @@ pub fn looked_at(flags: &RunFlags, period: Option<f64>) -> Result<Option<General
             ));
         }
         (Some(period), _) if period.is_finite() && period > 0.0 => {
-            // A whole number of periods, so that the next run can begin at the same phase.
-            let (whole, length) = (1.0 + 1e-12, options.t_end - options.t_start);
-            let periods = (length / period * whole).floor();
-            if periods < 1.0 {
+            let Some((last, ends)) = last_of_phase(options, period) else {
                 return Err(usage(format!(
                     "--period {period}: the run is shorter; give a later --t-end, or a shorter \
                         period"
                 )));
+            };
+            if ends {
+                options.t_end = last;
             }
-            options.t_end = options.t_start + periods * period;
             options.record = Record::Times { every: period };
         }
         (Some(period), _) => {

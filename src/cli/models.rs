@@ -83,6 +83,19 @@ fn definition(path: &Path, text: &str, name: &str) -> Result<Definition, Box<Dia
     read.map_err(Box::new)
 }
 
+const TWO_SURFACES: &str = "it has two switching surfaces (h and [second]), and this command takes \
+    systems with one, or general ones: write both with sign(...) in f = [...]";
+
+/// Whether the text of a system has a table [second] beside its h.
+fn has_two_surfaces(text: &str, path: &Path) -> bool {
+    if is_json(path) {
+        let read = serde_json::from_str::<serde_json::Value>(text);
+        return read.is_ok_and(|json| ["h", "second"].iter().all(|key| json.get(key).is_some()));
+    }
+    let read = text.parse::<toml::Table>();
+    read.is_ok_and(|table| ["h", "second"].iter().all(|key| table.contains_key(*key)))
+}
+
 fn is_json(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"))
 }
@@ -123,7 +136,11 @@ pub fn named(name: &str, set: &[String], any: bool) -> Result<Option<Model>, Cli
         }
     };
     let wrong = |problem: String| CliError::Usage(format!("--system {name}: {problem}"));
-    let mut model = Model::new(definition.map_err(|e| wrong(e.to_string()))?);
+    let text = file.as_ref().map_or(built_in.unwrap_or_default(), |(_, text)| text);
+    let mut model = Model::new(definition.map_err(|e| match has_two_surfaces(text, path) {
+        true => wrong(TWO_SURFACES.to_owned()),
+        false => wrong(e.to_string()),
+    })?);
     for (table, entry) in model.definition().tables().to_vec() {
         let Some((folder, text)) = &file else {
             let data = library::table(&entry.file).unwrap_or_default();

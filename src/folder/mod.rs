@@ -22,13 +22,15 @@ mod page;
 pub mod words;
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
 use std::io::ErrorKind::{NotADirectory, NotFound};
 use std::ops::Range;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
-use serde::Deserialize;
-use serde::de::DeserializeOwned;
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{DeserializeOwned, Error as _, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer};
 use toml::Spanned;
 use toml::value::Datetime;
 
@@ -218,6 +220,7 @@ struct FigureFile {
     /// States on the axes of panels that do not say it.
     axes: Option<Spanned<Vec<String>>>,
     /// Azimuth and elevation in degrees, of panels in space that do not say it.
+    #[serde(default, deserialize_with = "two")]
     camera: Option<Spanned<[f64; 2]>>,
     /// Its panels.
     panel: Vec<Spanned<PanelFile>>,
@@ -239,8 +242,9 @@ struct PanelFile {
     #[serde(default)]
     r#in: BTreeMap<Spanned<String>, Spanned<Words>>,
     /// The paper's claim about a panel drawn as `halves` or `surface`; the picture shows the
-    /// verdict: `{ section = "periodic" }`, `"chaos"`, `"partly-washed-out"` or `{ period = 3 }` of
-    /// a section, `"less-organised-than-next"` or `"differs-from-next"` of a path.
+    /// verdict: of a section `{ section = "periodic" }`, `{ section = "chaos" }`, `{ section =
+    /// "partly-washed-out" }` or `{ section = { period = 3 } }`, of a path
+    /// `"less-organised-than-next"` or `"differs-from-next"`.
     says: Option<Spanned<PanelClaim>>,
     /// Committed runs that repeat it, "STUDY/PANEL" such as "census/7(i)"; the picture shows the
     /// share that supports the claim.
@@ -248,6 +252,7 @@ struct PanelFile {
     /// States on the axes.
     axes: Option<Spanned<Vec<String>>>,
     /// Azimuth and elevation in degrees, of a panel in space.
+    #[serde(default, deserialize_with = "two")]
     camera: Option<Spanned<[f64; 2]>>,
     /// The measure whose table is drawn; of a map one with `scan` or `sweep` over two settings.
     of: Option<Spanned<String>>,
@@ -260,6 +265,7 @@ struct PanelFile {
     /// Dots instead of a line.
     dots: Option<Spanned<bool>>,
     /// Titles of the two axes of columns or a map [default: the columns' names].
+    #[serde(default, deserialize_with = "two")]
     labels: Option<Spanned<[String; 2]>>,
     /// Names of the vertical columns in the legend [default: their own].
     names: Option<Spanned<Vec<String>>>,
@@ -396,14 +402,47 @@ struct Drawn<'a> {
     camera: Option<&'a Spanned<[f64; 2]>>,
 }
 
+/// Reads a list of two; a list in TOML may be longer than the array that is read from it.
+fn two<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
+    from: D,
+) -> Result<Option<Spanned<[T; 2]>>, D::Error> {
+    let list = Spanned::<Vec<T>>::deserialize(from)?;
+    let place = list.span();
+    let two = list.into_inner().try_into().map_err(|list: Vec<T>| {
+        D::Error::custom(format!("there are {} entries; give two", list.len()))
+    })?;
+    Ok(Some(Spanned::new(place, two)))
+}
+
 /// Numbers read off the paper.
 #[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+#[serde(deny_unknown_fields, rename_all = "kebab-case", remote = "Self")]
 struct PointsFile {
     /// Name of the numbers.
     name: String,
     /// A CSV file of the folder whose first two columns are the horizontal and the vertical values.
     file: String,
+}
+
+impl<'de> Deserialize<'de> for PointsFile {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        /// Refuses a list, whose first entry serde would read as the name.
+        struct OneTable;
+
+        impl<'de> Visitor<'de> for OneTable {
+            type Value = PointsFile;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("one table, { name = \"...\", file = \"...\" }")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<PointsFile, A::Error> {
+                PointsFile::deserialize(MapAccessDeserializer::new(map))
+            }
+        }
+
+        from.deserialize_any(OneTable)
+    }
 }
 
 /// A measure: `[NAME]` of measures.toml.

@@ -639,6 +639,38 @@ fn a_sweep_says_what_runs_settle_on() {
     assert!(table.numbers("x").iter().all(|x| (x - 0.3).abs() < 1e-9 || (x - 0.8).abs() < 1e-9));
 }
 
+/// Runs are looked at by multiples of --period and go on to --t-end, where an event may stop them.
+#[test]
+fn runs_seen_every_period_go_on_to_their_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let text = "states = ['x', 'n']\nstart = [1, 0]\nf = ['-x + a*cos(2*pi*t)', '0']\n\
+        parameters = { a = 1 }\n[[event]]\nname = 'late'\nat = 50.8\nset = { n = '1' }\n\
+        stop = true";
+    fs::write(at.join("late.toml"), text).unwrap();
+    let late = ["--system", "late.toml", "--period", "1", "--over", "params.a=1"];
+    let sweep = [&["sweep", "--quiet", "--t-end", "50.9"][..], &late].concat();
+    let table = from_csv(&good(at, &sweep)).unwrap().1;
+    assert_eq!(table.words("outcome").next(), Some("stopped"));
+    assert_eq!((table.numbers("end"), table.numbers("end.n")), (&[50.8][..], &[1.0][..]));
+    let scan = ["--t-start", "0.5", "--t-end", "4.2"];
+    let times =
+        |more: &[&str]| scanned(at, &[&late[..], &scan, more].concat()).numbers("t").to_vec();
+    assert_eq!(times(&[]), [3.0, 4.0]);
+    assert_eq!(times(&["--follow", "up"]), [3.0, 4.0]);
+    // A followed state is handed on a whole number of periods after the start.
+    let both = |end: &str| {
+        let over = ["--over", "params.a=1,2", "--t-start", "0.5", "--t-end", end];
+        let base = ["--system", "late.toml", "--period", "1", "--follow", "up"];
+        scanned(at, &[&base[..], &over].concat()).numbers("x")[..].to_vec()
+    };
+    let (whole, more) = (both("4.5"), both("4.6"));
+    assert_eq!(whole.len(), more.len());
+    for (x, y) in whole.iter().zip(&more) {
+        near(*x, *y, 1e-9);
+    }
+}
+
 /// Periods of the logistic map and of the converter that ships, wherever the origin of a state
 /// lies: what is the same is measured by the swing.
 #[test]
@@ -842,7 +874,7 @@ fn new_begins_with_a_general_system() {
     good(at, &["run", "--quiet", "--system", "sub/tank.toml", "--t-end", "1"]);
     fs::write(at.join("sub/inflow.csv"), "mine").unwrap();
     let again = ["new", "sub/other.toml", "--from", "driven-by-data"];
-    refused(at, &again, 2, &["inflow.csv is there already", "--force"]);
+    refused(at, &again, 2, &["inflow.csv is there already; choose another folder", "--force"]);
     assert!(table() == "mine" && !at.join("sub/other.toml").exists());
     good(at, &[&again[..], &["--force"]].concat());
     assert!(table() != "mine");
@@ -853,6 +885,24 @@ fn new_begins_with_a_general_system() {
         &["inflow.csv", "give a file's name"],
     );
     refused(at, &["new", "a.toml", "--from", "bouncing-bal"], 2, &["did you mean bouncing-ball?"]);
+}
+
+/// Systems and specs that a command does not take: advice names another that it does.
+#[test]
+fn advice_about_another_kind_of_file_can_be_followed() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let text = library::text("two-blocks").unwrap();
+    fs::write(at.join("blocks.toml"), text).unwrap();
+    let json = serde_json::to_string(&text.parse::<toml::Table>().unwrap()).unwrap();
+    fs::write(at.join("blocks.json"), json).unwrap();
+    for system in ["two-blocks", "blocks.toml", "blocks.json"] {
+        let rests = ["rests", "--system", system];
+        refused(at, &rests, 2, &["it has two switching surfaces (h and [second])"]);
+    }
+    fs::write(at.join("spec.json"), "{}").unwrap();
+    let spec = ["run", "--spec", "spec.json"];
+    refused(at, &spec, 2, &["make one with `twofold run ... --print-spec`", "`twofold figure FIG"]);
 }
 
 const FOLDS: &str = "states = ['x']\nstart = [-1]\nf = ['p + x - x^3']\n[parameters]\np = 0\n";

@@ -1272,6 +1272,15 @@ run = { t-end = 11 }
     for (text, from, to, said) in [
         (halves, "says", "in.two = { t-end = 11 }\nsays", ["`in.two` has no effect", "8:4"]),
         (halves, "says", "in.too = { t-end = 11 }\nsays", ["no reading `too`", "8:4"]),
+        (halves, "says", "labels = ['a', 'b', 'c']\nsays", ["3 entries; give two", "8:10"]),
+        (halves, "says", "camera = [1, 2, 3]\nsays", ["3 entries; give two", "8:10"]),
+        (
+            halves,
+            "says",
+            "points = [{ name = 'a', file = 'p.csv' }]\nsays",
+            ["expected one table, { name = ", "8:10"],
+        ),
+        (halves, "says", "points = { label = 'a' }\nsays", ["unknown field `label`", "8:"]),
         (halves, "period = 1", "period = 0", ["a period is one crossing", "8:8"]),
         (
             halves,

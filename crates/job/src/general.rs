@@ -80,6 +80,17 @@ pub fn expression(text: &str, model: &Model) -> Result<Expression, String> {
     })
 }
 
+/// The last time of a run that lies a whole number of periods after its start, and whether that is
+/// its end but for rounding; nothing if the run is shorter than one.
+pub fn last_of_phase(options: &Options, period: f64) -> Option<(f64, bool)> {
+    const ROUNDING: f64 = 1e-12;
+    let length = options.t_end - options.t_start;
+    let periods = (length / period * (1.0 + ROUNDING)).floor();
+    let last = options.t_start + periods * period;
+    let near = ROUNDING * length.max(options.t_end.abs());
+    (periods >= 1.0).then(|| (last, (options.t_end - last).abs() <= near))
+}
+
 /// Rows are handed on in parts of so many.
 const PART: usize = 4096;
 
@@ -676,6 +687,17 @@ mod tests {
             )
         };
         assert_ne!(Question::json(&of("a", "b")), Question::json(&of("b", "a")));
+    }
+
+    #[test]
+    fn a_phase_is_counted_from_the_start() {
+        let last = |t_start, t_end, period| {
+            last_of_phase(&Options { t_start, t_end, ..Options::default() }, period)
+        };
+        assert_eq!(last(0.0, 1.0, 400e-6), Some((1.0, true)));
+        assert_eq!(last(0.0, 50.9, 1.0), Some((50.0, false)));
+        assert_eq!(last(0.5, 4.2, 1.0), Some((3.5, false)));
+        assert_eq!(last(0.5, 1.2, 1.0), None);
     }
 
     #[test]

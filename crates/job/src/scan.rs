@@ -14,7 +14,7 @@ use twofold_integrate::Monitor;
 
 use super::classification::Classification;
 use super::executor::{Executor, JobMonitor, Progress};
-use super::general::GeneralRun;
+use super::general::{GeneralRun, last_of_phase};
 use super::question::{AnyQuestion, Ask, JobError, Question};
 use super::run::Run;
 use super::spec::{RunSpec, SwitchSpec};
@@ -367,9 +367,16 @@ impl Scan {
             }
             true
         };
-        let outcome = follow_watched(&run.model, &run.options, &mut observe, &|t| {
-            asked.reached(t).is_continue()
-        })?;
+        let goes_on = |t| asked.reached(t).is_continue();
+        let mut outcome = follow_watched(&run.model, &run.options, &mut observe, &goes_on)?;
+        // The next run begins at the phase of this one's start.
+        if let (Outcome::Finished, Some(_), Record::Times { every }) =
+            (&outcome.ending, self.follow, &run.options.record)
+            && let Some((last, false)) = last_of_phase(&run.options, *every)
+        {
+            run.options.t_end = last;
+            outcome = follow_watched(&run.model, &run.options, &mut |_| true, &goes_on)?;
+        }
         if outcome.ending == Outcome::Interrupted {
             return Err(JobError::Interrupted);
         }

@@ -75,8 +75,10 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     if let Some((there, _)) =
         files.iter().find(|(f, _)| f.symlink_metadata().is_ok() && !arguments.force)
     {
+        // A table keeps the name that the system reads.
+        let choose = if there == file { "another name or folder" } else { "another folder" };
         return Err(CliError::Usage(format!(
-            "{} is there already; choose another name or folder, or replace it with --force",
+            "{} is there already; choose {choose}, or replace it with --force",
             there.display()
         )));
     }

@@ -103,6 +103,14 @@ impl GeneralOutcome {
         let strobed = matches!(options.record, Record::Times { .. });
         let free = free(&self.0);
         let looks = is_looked_at(options);
+        // The start is recorded, too, wherever it lies.
+        let is_multiple = |t: f64| match options.record {
+            Record::Times { every } if every.is_finite() && t == options.t_start => {
+                let count = t / every;
+                (count - count.round()).abs() <= 1e-12 * count.abs().max(1.0)
+            }
+            _ => true,
+        };
         let section = RefCell::new(Vec::<SectionPoint>::new());
         let states = RefCell::new(Vec::<Vec<f64>>::new());
         let mut observe = |point: &twofold_hybrid::Point<'_>| {
@@ -119,7 +127,8 @@ impl GeneralOutcome {
                 states.pop();
                 states.push(x.clone());
             }
-            if point.event.is_none() && (strobed || point.direction.is_some()) {
+            let seen = if strobed { is_multiple(point.t) } else { point.direction.is_some() };
+            if point.event.is_none() && seen {
                 section.push(SectionPoint {
                     t: point.t,
                     u,
@@ -610,6 +619,27 @@ mod tests {
         };
         let options = Options { record, t_end, ..Options::default() };
         GeneralOutcome(GeneralRun { model, options }).ending(&()).unwrap().outcome.word
+    }
+
+    /// A decay to a driven cycle, from a start between two multiples of the period to an end there:
+    /// the multiples 1 to 60 are looked at, and a stop after the last of them is met.
+    #[test]
+    fn a_run_is_looked_at_by_multiples_and_goes_on_to_its_end() {
+        let ending = |more: &str| {
+            let text = format!("states = ['x']\nstart = [1]\nf = ['-x + cos(2*pi*t)']{more}");
+            let model = Model::new(Definition::from_toml(&text, "f").unwrap());
+            let record = Record::Times { every: 1.0 };
+            let options = Options { t_start: 0.5, t_end: 60.9, record, ..Options::default() };
+            GeneralOutcome(GeneralRun { model, options }).ending(&()).unwrap()
+        };
+        let found = ending("");
+        assert_eq!((&*found.outcome.word, found.outcome.crossings), ("period-1", 60));
+        let phase = 2.0 * std::f64::consts::PI * 60.9;
+        let w = 2.0 * std::f64::consts::PI;
+        let exact = (phase.cos() + w * phase.sin()) / (1.0 + w * w);
+        assert!((found.state[0] - exact).abs() < 1e-8, "{} {exact}", found.state[0]);
+        let found = ending("\n[[event]]\nat = 60.8\nstop = true");
+        assert_eq!((&*found.outcome.word, found.outcome.end), ("stopped", 60.8));
     }
 
     fn map(states: &str, start: &str, sets: &[&str]) -> String {
