@@ -85,8 +85,8 @@ fn main() {
     }
     println!("PROVED: less than 1e-12 becomes more than 0.3.");
     let data = json!({
-        "equation": equation.parameters(), "states": { "x": STATES.map(|x| format!("{x:e}")), "y": "0",
-            "z": format!("{Z:e}") },
+        "equation": equation.parameters(),
+        "states": { "x": STATES.map(|x| format!("{x:e}")), "y": "0", "z": format!("{Z:e}") },
         "crossings": rows, "growth_until_first_crossing": derivative,
     });
     write("sensitivity", data);

@@ -126,6 +126,8 @@ fn sources() -> Vec<Source> {
     for folder in ["crates", "src", "figures", "papers"] {
         rust_files(&root().join(folder), &mut files);
     }
+    // As those of the library, a paper's examples are programs of their own.
+    files.retain(|file| !file.components().any(|part| part.as_os_str() == "examples"));
     let mut tests = BTreeSet::new();
     let mut found = Vec::new();
     for file in files {

@@ -75,19 +75,19 @@ fn agrees(alpha: f64, text: &str, rows: usize) {
 
 #[test]
 fn dopri5_follows_the_printed_reading_to_the_first_visit() {
-    agrees(1e-3, include_str!("../../papers/jeffrey-2013/reference/crossings-printed.csv"), 5);
+    agrees(1e-3, crate::common::CROSSINGS_PRINTED, 5);
 }
 
 #[test]
 fn dopri5_follows_the_reconstructed_reading_to_the_first_visit() {
-    agrees(1e-1, include_str!("../../papers/jeffrey-2013/reference/crossings-reconstructed.csv"), 3);
+    agrees(1e-1, crate::common::CROSSINGS_RECONSTRUCTED, 3);
 }
 
 #[test]
 fn every_method_follows_the_orbit_to_the_first_visit() {
     // At 1e-10 each method keeps the rows before the visit to 1e-6; what it does after it is its
     // own affair.
-    let want = reference(include_str!("../../papers/jeffrey-2013/reference/crossings-reconstructed.csv"));
+    let want = reference(crate::common::CROSSINGS_RECONSTRUCTED);
     for method in
         [Method::Lsoda, Method::Radau5, Method::Taylor, Method::TaylorExtended, Method::Layered]
     {

@@ -79,9 +79,8 @@ fn against_the_reference(found: &[Crossing], text: &str, rows: usize) -> f64 {
 
 #[test]
 fn before_the_first_visit_its_error_is_no_larger_than_dormand_princes() {
-    let printed = (1e-3, include_str!("../../papers/jeffrey-2013/reference/crossings-printed.csv"), 4, 29.5);
-    let reconstructed =
-        (1e-1, include_str!("../../papers/jeffrey-2013/reference/crossings-reconstructed.csv"), 2, 4.8);
+    let printed = (1e-3, crate::common::CROSSINGS_PRINTED, 4, 29.5);
+    let reconstructed = (1e-1, crate::common::CROSSINGS_RECONSTRUCTED, 2, 4.8);
     for (alpha, text, rows, t_end) in [printed, reconstructed] {
         let field = caricature(alpha, 1e-5, Transition::Tanh);
         for size in [1e-6, 1.0536712e-8, 1e-10, 1e-12] {

@@ -135,8 +135,8 @@ fn follow<S: Enclosure>(alpha: f64, text: &str, rows: usize, settings: FlowOptio
 
 #[test]
 fn both_arithmetics_enclose_the_orbit_before_the_singularity() {
-    let printed = include_str!("../../papers/jeffrey-2013/reference/crossings-printed.csv");
-    let reconstructed = include_str!("../../papers/jeffrey-2013/reference/crossings-reconstructed.csv");
+    let printed = crate::common::CROSSINGS_PRINTED;
+    let reconstructed = crate::common::CROSSINGS_RECONSTRUCTED;
     for (alpha, text) in [(1e-3, printed), (0.1, reconstructed)] {
         let plain = follow::<Interval>(alpha, text, 2, FlowOptions::PLAIN);
         let extended = follow::<Ball>(alpha, text, 2, FlowOptions::EXTENDED);
@@ -147,7 +147,7 @@ fn both_arithmetics_enclose_the_orbit_before_the_singularity() {
 #[test]
 #[ignore = "a minute; `make proofs` goes through all rows"]
 fn the_orbit_is_enclosed_through_the_singularity() {
-    let reconstructed = include_str!("../../papers/jeffrey-2013/reference/crossings-reconstructed.csv");
+    let reconstructed = crate::common::CROSSINGS_RECONSTRUCTED;
     assert!(follow::<Ball>(0.1, reconstructed, 6, FlowOptions::EXTENDED) < 1e-13);
 }
 

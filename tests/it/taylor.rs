@@ -1,5 +1,5 @@
 //! The project's own ground truth: Taylor series in double-double arithmetic, against crossings
-//! computed in 113-bit arithmetic outside this project (papers/jeffrey-2013/reference/crossings-*.csv).
+//! computed in 113-bit arithmetic outside this project (crossings-*.csv of its reference folder).
 
 use crate::wheel::Wheel;
 use nalgebra::{SVector, Vector3, Vector4};
@@ -29,9 +29,8 @@ fn rows(text: &str) -> Vec<Row> {
         .collect()
 }
 
-const PRINTED: (f64, &str) = (1e-3, include_str!("../../papers/jeffrey-2013/reference/crossings-printed.csv"));
-const RECONSTRUCTED: (f64, &str) =
-    (1e-1, include_str!("../../papers/jeffrey-2013/reference/crossings-reconstructed.csv"));
+const PRINTED: (f64, &str) = (1e-3, crate::common::CROSSINGS_PRINTED);
+const RECONSTRUCTED: (f64, &str) = (1e-1, crate::common::CROSSINGS_RECONSTRUCTED);
 const START: [f64; 3] = [0.2, 0.0, -1.0];
 const SECTION: SectionPlane = SectionPlane { coordinate: 1, value: 0.0 };
 
@@ -236,7 +235,7 @@ fn a_run_by_name_is_the_reference() {
     };
     let answer = Executor::quiet().ask(&Run(run)).unwrap();
     let table = answer.table("section").unwrap();
-    let wanted = rows(include_str!("../../papers/jeffrey-2013/reference/crossings-reconstructed.csv"));
+    let wanted = rows(crate::common::CROSSINGS_RECONSTRUCTED);
     assert!(table.len() >= 5, "{} crossings", table.len());
     for (i, want) in wanted.iter().take(table.len()).enumerate() {
         for (column, w) in [("t", want.t), ("x", want.x[0]), ("z", want.x[2])] {

@@ -159,6 +159,8 @@ const FEW_STARTS: usize = 4;
 /// Functions of which all sets of answers are tried.
 const MOST_UNMET: usize = 6;
 const MOST_ITERATIONS: usize = 60;
+/// Where steps still become shorter, as they do at a zero of higher order.
+const MANY_ITERATIONS: usize = 400;
 /// Surfaces on which a rest can lie at once.
 const MOST_TOGETHER: usize = 4;
 /// Larger sets of surfaces are not looked at if there are more of one size than this.
@@ -747,7 +749,8 @@ impl Search<'_> {
     ) -> Option<Zero> {
         let (n, k) = (self.n, on.len());
         let (mut x, mut weights) = (start.to_vec(), weights.to_vec());
-        for _ in 0..MOST_ITERATIONS {
+        let mut last = f64::INFINITY;
+        for iteration in 0..MANY_ITERATIONS {
             let m = self.mixture(config, on, &x, &weights);
             // Unknowns in widths of the box, equations in units of their own gradients.
             let field = (0..n).map(|i| {
@@ -771,10 +774,38 @@ impl Search<'_> {
             let settled = step.by.iter().zip(x.iter().zip(&self.widths)).all(close);
             if settled && step.by[n..].iter().all(|s| s.abs() <= 1e-12) {
                 let open = step.open(n);
-                return (step.left_over <= 1e-9).then_some(Zero { x, weights, open });
+                let is_zero = step.left_over <= 1e-9 && !(k == 0 && self.is_pole(config, &x));
+                return is_zero.then_some(Zero { x, weights, open });
             }
+            // A zero of order m is come to by (1 - 1/m) a step.
+            let size = step.by.iter().fold(0.0_f64, |most, s| most.max(s.abs()));
+            if iteration >= MOST_ITERATIONS && !(size < 1e-2 && size < 0.97 * last) {
+                return None;
+            }
+            last = size;
         }
         None
+    }
+
+    /// Whether a component of a field is larger at a state than beside it: Newton's method comes to
+    /// poles, too, by steps that halve.
+    fn is_pole(&self, config: &Configuration, x: &[f64]) -> bool {
+        const BESIDE: f64 = 1e-6;
+        let here = self.local(config, x).field;
+        let beside = [BESIDE, -BESIDE].map(|by| {
+            let moved: Vec<f64> = x.iter().zip(&self.widths).map(|(x, w)| x + by * w).collect();
+            self.local(config, &moved)
+        });
+        (0..self.n).any(|i| {
+            let varies = |b: &Local| -> f64 {
+                (0..self.n).map(|j| (b.jacobian[i * self.n + j] * self.widths[j]).abs()).sum()
+            };
+            // Where one side has no value the other one tells.
+            let defined = || beside.iter().filter(|b| b.field[i].is_finite());
+            let largest = defined().map(|b| b.field[i].abs()).fold(0.0, f64::max);
+            let rate = defined().map(varies).fold(0.0, f64::max);
+            here[i].abs() > 1.5 * largest && here[i].abs() > KNOWN_TO * rate
+        })
     }
 
     /// The switching function, none of those in `on`, that is zero at a state, to rounding, and on

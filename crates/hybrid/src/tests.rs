@@ -4220,7 +4220,7 @@ fn poles_beside_the_motion_are_not_passed() {
             let said = end_of(&text, 2.0, method).unwrap_err();
             assert!(said.contains("leaves the domain"), "{method:?} {f}: {said}");
         }
-        // What is continued through a zero of its divisor has no pole, whatever the scale.
+        // Continued through a zero of its divisor a quotient has no pole, whatever the scale.
         for (f, want) in [
             ("sin(x - 1)/(x - 1)", 2.465_9),
             ("(x^2 - 1)/(x - 1)", 7.395),
@@ -4330,6 +4330,29 @@ fn switches_over_a_divisor_switch_at_its_zeros() {
             let text = format!("states = ['x']\nstart = [0]\nf = ['1/(x + {e:e})']");
             near(end_of(&text, 2.0, method).unwrap()[0], (e * e + 4.0).sqrt() - e, 1e-4);
         }
+    }
+}
+
+/// Poles are no rests, and zeros of high order are.
+#[test]
+fn rests_are_zeros_of_any_order_and_no_poles() {
+    let rests = |f: &str| -> Vec<f64> {
+        let model = model(&format!("states = ['x']\nf = ['{f}']"));
+        crate::rests::rests(&model, &[(-4.0, 4.0)]).unwrap().iter().map(|r| r.x[0]).collect()
+    };
+    let pi = std::f64::consts::PI;
+    for (f, want) in [
+        ("-tan(x)", &[-pi, 0.0, pi][..]),
+        ("ln(abs(x - 0.3))", &[-0.7, 1.3]),
+        ("x/(x - 1)", &[0.0]),
+        ("1/(x - 1)", &[]),
+        ("-(x - 1)^5", &[1.0]),
+        ("(x - 0.37)^4", &[0.37]),
+        ("(x - 0.37)^3*(x + 1)", &[-1.0, 0.37]),
+    ] {
+        let found = rests(f);
+        assert_eq!(found.len(), want.len(), "{f}: {found:?}");
+        found.iter().zip(want).for_each(|(x, want)| near(*x, *want, 1e-9));
     }
 }
 

@@ -96,3 +96,10 @@ pub fn write_references(made: &Path, expected: &Path) {
         fs::write(target.join("expected.json"), manifest.to_json()).unwrap();
     }
 }
+
+/// Crossings of y = 0 by the paper's orbits, computed in 113-bit arithmetic outside this project.
+pub const CROSSINGS_PRINTED: &str =
+    include_str!("../../../papers/jeffrey-2013/reference/crossings-printed.csv");
+/// The same in the other reading.
+pub const CROSSINGS_RECONSTRUCTED: &str =
+    include_str!("../../../papers/jeffrey-2013/reference/crossings-reconstructed.csv");
