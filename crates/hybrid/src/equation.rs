@@ -819,7 +819,7 @@ impl Equation {
             }
             Expression::Add(..) | Expression::Sub(..) | Expression::Call(Function::Tan, _) => {
                 match self.fraction(e) {
-                    // What is zero at a pole changes its sign there, too.
+                    // At a pole it changes its sign, too.
                     Some(Fraction { above, below, .. }) => (product(above, below), false),
                     None => (e.clone(), false),
                 }
