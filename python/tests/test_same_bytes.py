@@ -209,7 +209,7 @@ def test_wrong_numbers_are_no_failed_computations():
     for wrong in (dict(t_end=float("nan")), dict(t_end=-1), dict(tend=1)):
         with pytest.raises(twofold.SpecError):
             twofold.follow("bouncing-ball", **wrong)
-    with pytest.raises(twofold.SpecError, match="choose one of fig5, fig6"):
+    with pytest.raises(twofold.SpecError, match="choose one of fig2, fig4, fig5"):
         twofold.panels("fig77")
     with pytest.raises(TypeError, match="give a name, a file"):
         twofold.follow(None)
