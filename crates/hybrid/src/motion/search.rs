@@ -794,7 +794,9 @@ impl Follower<'_> {
     /// The length of a step to make instead of one that has been made to end where something is
     /// met, if its error is larger than the tolerance allows.
     pub(super) fn landed_too_far(&mut self, step: &Step) -> Option<f64> {
-        if step.series.is_some() || step.multistep.is_some() {
+        // Of polynomials and waves shorter steps have smaller errors.
+        let is_plain = self.compiled.gates.iter().all(|gate| *gate == Gate::Wave);
+        if is_plain || step.series.is_some() || step.multistep.is_some() {
             return None;
         }
         let mut scale = std::mem::take(&mut self.scale);
