@@ -624,11 +624,15 @@ impl Follower<'_> {
         last: &[f64],
     ) -> Option<f64> {
         const HALVINGS: usize = 52;
+        let changes = |i: &usize| first[*i] * last[*i] < 0.0;
+        let divisors = |gate: &Gate| *gate == Gate::Divisor;
+        if !self.compiled.gates.iter().any(divisors) || !(0..first.len()).any(|i| changes(&i)) {
+            return None;
+        }
         let compiled = self.compiled.clone();
         let (mut at, mut field) = (vec![0.0; self.n], vec![0.0; self.n]);
-        let divisors = (0..first.len()).filter(|i| compiled.gates[*i] == Gate::Divisor);
         let mut nearest: Option<f64> = None;
-        for i in divisors.filter(|i| first[*i] * last[*i] < 0.0) {
+        for i in (0..first.len()).filter(|i| divisors(&compiled.gates[*i])).filter(changes) {
             let (mut low, mut high) = (0.0, 1.0);
             for _ in 0..HALVINGS {
                 let middle = 0.5 * (low + high);
