@@ -794,6 +794,9 @@ const STEPS_OF_A_PACE: u64 = 1 << 14;
 const FAR: u32 = 6;
 const NO_LONGER: f64 = 1.5;
 
+/// A speed counts up to so many times the mean one of a step, which that of t^12 is well within.
+const MOST_OF_MEAN: f64 = 1e3;
+
 /// Scale of each state's error in a step.
 fn scale_now(follower: &Follower, step: &Step, out: &mut Vec<f64>) {
     let options = follower.options;
@@ -808,7 +811,8 @@ fn scale_now(follower: &Follower, step: &Step, out: &mut Vec<f64>) {
                 let moved = (step.y[i] - step.x[i]).abs();
                 // A speed that is large at one place alone says little.
                 let speed = step.k.iter().map(|k| k[i].abs()).fold(0.0, f64::max);
-                let speed = if moved > 0.0 { speed.min(1e3 * moved / step.h) } else { speed };
+                let speed =
+                    if moved > 0.0 { speed.min(MOST_OF_MEAN * moved / step.h) } else { speed };
                 let least = (0.1 * moved).max(1e-6 * span * speed);
                 // A rounding error without a bound leaves the old size.
                 let size = size.max(0.01 * follower.scale_of(i)).max(least);
@@ -1166,7 +1170,7 @@ impl<'a> Follower<'a> {
                 return Err(HybridError::Budget { steps: self.outcome.steps, t: self.t });
             }
             creeping = if step.h <= 4.0 * f64::EPSILON * self.t.abs() { creeping + 1 } else { 0 };
-            if creeping == MOST_CREEPING && self.breaks_ahead(256.0 * step.h) {
+            if creeping == MOST_CREEPING && self.breaks_ahead(f64::from(creeping) * step.h) {
                 return Err(self.left_domain(self.t, &self.x.clone()));
             }
             let short = step.h < SHORT_STEP * (self.options.t_end - self.options.t_start);

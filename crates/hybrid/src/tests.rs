@@ -4328,7 +4328,9 @@ fn switches_over_a_divisor_switch_at_its_zeros() {
         }
         for e in [1e-8, 1e-10, 1e-12_f64] {
             let text = format!("states = ['x']\nstart = [0]\nf = ['1/(x + {e:e})']");
-            near(end_of(&text, 2.0, method).unwrap()[0], (e * e + 4.0).sqrt() - e, 1e-4);
+            // (The first step of dopri5 errs where it is the steepest: notes/defects.md.)
+            let within = if e < 1e-11 && method == Method::Dopri5 { 1e-4 } else { 1e-7 };
+            near(end_of(&text, 2.0, method).unwrap()[0], (e * e + 4.0).sqrt() - e, within);
         }
     }
 }
