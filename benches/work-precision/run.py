@@ -187,7 +187,8 @@ def tables(rows, head):
 def draw(found):
     """Error against time, a panel a problem: ours solid and warm, peers dotted and cold.
 
-    In a panel only programs that come within `DRAWN` times the fastest at one of its errors.
+    In a panel only programs that come within `DRAWN` times the fastest at one of its errors, and our
+    fastest ones.
     """
     plt.rcParams |= {
         "svg.fonttype": "none",
@@ -213,12 +214,15 @@ def draw(found):
             }
     drawn = {}
     for axis, (problem, title) in zip(axes.flat, PROBLEMS.items()):
-        for name, points in sorted(found.get(problem, {}).items()):
+        of = found.get(problem, {})
+        best_of_ours = {won[1] for k in DECADES if (won := best(of, 10.0**-k, True))}
+        for name, points in sorted(of.items()):
             # The compiled equation and the file's would cover each other.
-            if name.endswith(" (file)") and name.removesuffix(" (file)") in found[problem]:
+            if name.endswith(" (file)") and name.removesuffix(" (file)") in of:
                 continue
             shown = [(e, s) for e, s in points if e < ELSEWHERE]
-            if not any(s <= DRAWN * fastest(found[problem], e) for e, s in shown):
+            is_best = {name, f"{name} (file)"} & best_of_ours
+            if not is_best and not any(s <= DRAWN * fastest(of, e) for e, s in shown):
                 continue
             (line,) = axis.plot(*zip(*shown), **looks[name]) if shown else (None,)
             drawn |= {name: line} if shown else {}
