@@ -187,8 +187,8 @@ def tables(rows, head):
 def draw(found):
     """Error against time, a panel a problem: ours solid and warm, peers dotted and cold.
 
-    In a panel only programs that come within `DRAWN` times the fastest at one of its errors, and our
-    fastest ones.
+    In a panel only programs that come within `DRAWN` times the fastest at one of its errors, and
+    our fastest ones.
     """
     plt.rcParams |= {
         "svg.fonttype": "none",
