@@ -38,12 +38,14 @@ fn run(slides: bool, [y, z]: [&str; 2], switch: &str, t_end: f64) -> (i32, Strin
 }
 
 /// Fields, the expression whose domain ends, and when it does.
-const ENDS: [([&str; 2], &str, f64); 7] = [
+const ENDS: [([&str; 2], &str, f64); 8] = [
     (["-1/y", "1"], "-1/y", 0.5),
     (["-1/y^2", "1"], "-1/y^2", 1.0 / 3.0),
     (["-1", "1/y"], "1/y", 1.0),
     (["-1/(2 - z)", "1"], "-1/(2 - z)", 1.0),
     (["-1", "1 + sqrt(y)/10"], "sqrt(y)", 1.0),
+    // Where the state is far larger than its distance from the end.
+    (["1", "1 + sqrt(2 - y)/10"], "sqrt(2 - y)", 1.0),
     // e E1(1).
     (["ln(y) - 1", "1"], "ln(y)", 0.596_347_362_323_194),
     (["-1", "1 + 1/sqrt(y)"], "sqrt(y)", 1.0),

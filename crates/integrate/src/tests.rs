@@ -1087,7 +1087,7 @@ const LSODA: &str = "
     decay: 124 steps, 2 passages, 552d33bdfbafa9dd
     at rest: 3 steps, 0 passages, 96fdce7166643c56
     nearly at rest: 32 steps, 0 passages, 8ce29d39fdcd2147
-    explosion: 879 steps, 1 passages, 01d69c62ca2d7aa7
+    explosion: 819 steps, 1 passages, 4de21978d643c534
     root: 40 steps, 1 passages, 2d665179e8dfb285
     no number: 0 steps, 0 passages, 9ac0f41601ec5091
     absolute: 218 steps, 4 passages, 0c59fab09c943e99

@@ -794,8 +794,9 @@ where
         statistics.highest_order = statistics.highest_order.max(self.order as u64);
 
         // A first step may be below the spacing of numbers at t and soon grows; a run of such steps
-        // will not.
-        self.standing_still = if self.t > t0 { 0 } else { self.standing_still + 1 };
+        // will not, as before the end of a domain, where no state moves any more.
+        let moves = self.t - t0 > 4.0 * EPSILON * self.t.abs();
+        self.standing_still = if moves { 0 } else { self.standing_still + 1 };
         if !finite(self.history.x()) {
             return Err(Failure::NotFinite { t: t0, state: state(&x0) });
         }
