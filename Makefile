@@ -147,6 +147,7 @@ prose: ## spelling (typos; skipped without Python) and subjects of commits; the 
 lint: prose ## formatting, clippy and documentation with warnings denied, spelling, subjects of commits
 	@git ls-files '*.rs' | xargs rustfmt --edition 2024 --check
 	@$(CARGO) clippy --workspace --exclude twofold-python --locked --all-targets -- -D warnings
+	@$(CARGO) clippy --manifest-path benches/Cargo.toml --target-dir target --locked --all-targets -- -D warnings
 	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --exclude twofold-python --locked --no-deps --quiet
 
 torture: ## kill the program at random moments and look for losses: make torture KILLS=100
@@ -196,7 +197,7 @@ bench-work-precision: ## error against time on six problems, by us and by the pe
 	@sh benches/work-precision/run.sh
 
 bench-cost: ## cost against end time, layer and tolerance: benches/cost.csv, cost.md and cost.svg
-	@$(CARGO) build --release --locked --quiet --manifest-path benches/peers/ours/Cargo.toml --target-dir target --bin twofold-cost
+	@$(CARGO) build --release --locked --quiet --manifest-path benches/Cargo.toml --target-dir target --bin twofold-cost
 	@target/release/twofold-cost > benches/cost.csv
 	@python3 benches/cost.py
 
@@ -208,13 +209,15 @@ bench-hybrid: ## hybrid systems by us, SciPy, CVODE and nosnoc: error, seconds a
 	@[ -n "$$TWOFOLD" ] || $(CARGO) build --release --locked --bin twofold
 	@$(HYBRID)/bin/python benches/hybrid/compare.py $(HYBRID_FLAGS)
 
+BENCH = $(CARGO) bench --locked --manifest-path benches/Cargo.toml --target-dir target
+
 bench: ## benchmarks, compared with the last kept ones (make bench-keep)
 	@if ls target/criterion/*/*/kept >/dev/null 2>&1; then flags="--baseline kept"; fi; \
-	$(CARGO) bench --locked -p twofold-benches --bench steppers -- $$flags && $(CARGO) bench --locked -p twofold-benches --bench render -- $$flags
+	$(BENCH) --bench steppers -- $$flags && $(BENCH) --bench render -- $$flags
 
 bench-keep: ## benchmarks, kept as what `make bench` compares with
-	@$(CARGO) bench --locked -p twofold-benches --bench steppers -- --save-baseline kept
-	@$(CARGO) bench --locked -p twofold-benches --bench render -- --save-baseline kept
+	@$(BENCH) --bench steppers -- --save-baseline kept
+	@$(BENCH) --bench render -- --save-baseline kept
 
 .PHONY: rehearse
 rehearse: ## a job of a workflow, its own lines, in a fresh clone: make rehearse JOB=ci.yml/package (needs Python with PyYAML; scripts/rehearse.py)

@@ -1,4 +1,4 @@
-//! Work a second of general systems: `cargo bench -p twofold-benches --bench general`.
+//! Work a second of general systems: `cargo bench --bench general` in this folder.
 //!
 //! Each line is the fastest of five runs: a ball whose impacts do not accumulate; an oscillator
 //! with and without what a step is searched for; rows of blocks on a belt, where each step must

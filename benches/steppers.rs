@@ -2,7 +2,7 @@
 //! as the figures run it (tolerances 10^-7.97727, restart after each 100, step cap 10). Prints the
 //! counts of work first, then times.
 //!
-//! `cargo bench -p twofold-benches --bench steppers`; with `-- --counts` the counts only.
+//! `make bench`; `cargo bench --bench steppers -- --counts` in this folder prints the counts only.
 
 use std::hint::black_box;
 

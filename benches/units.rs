@@ -1,5 +1,5 @@
-//! The units of work W0 to W3 (benches/README.md), by our methods: `cargo bench -p twofold-benches
-//! --bench units -- W1 A dopri5 5`.
+//! The units of work W0 to W3 (benches/README.md), by our methods: `twofold-units W1 A
+//! dopri5 5`.
 //!
 //! Prints one line, as the programs in benches/peers do: program, unit, set, the least seconds of
 //! the given number of runs, steps, crossings, final state of the last run.
@@ -161,12 +161,10 @@ fn once(unit: &str, set: &str, method: &str) -> Option<Done> {
 }
 
 fn main() {
-    let words: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
+    let words: Vec<String> = std::env::args().skip(1).collect();
     let [unit, set, method, repeats] = words.iter().map(String::as_str).collect::<Vec<_>>()[..]
     else {
-        println!(
-            "usage: cargo bench -p twofold-benches --bench units -- W0|W1|W2|W3 A|B METHOD REPEATS"
-        );
+        println!("usage: twofold-units W0|W1|W2|W3 A|B METHOD REPEATS");
         return;
     };
     let mut best = f64::INFINITY;

@@ -19,6 +19,6 @@ if [ ! -x "$build/python/bin/python" ]; then
 fi
 cargo build --release --locked --quiet --manifest-path crates/Cargo.toml --target-dir "$build/crates" &&
     cp "$build/crates/release/crates-units" "$build/crates-units" || echo "the Rust crate: could not be built" >&2
-cargo build --release --locked --quiet --manifest-path ours/Cargo.toml --target-dir "$build/.."
+cargo build --release --locked --quiet --manifest-path ../Cargo.toml --target-dir "$build/.." --bin twofold-units
 cp "$build/../release/twofold-units" "$build/units"
 python3 run.py "$build" "${1:-3}"

@@ -17,7 +17,7 @@ if [ ! -x "$build/python/bin/python" ]; then
 fi
 cargo build --release --locked --quiet --manifest-path ../peers/crates/Cargo.toml --target-dir "$build/crates" --bin crates-work-precision &&
     cp "$build/crates/release/crates-work-precision" "$build/crates-work-precision" || echo "the Rust crate: could not be built" >&2
-cargo build --release --locked --quiet --manifest-path ../peers/ours/Cargo.toml --target-dir "$build/.." --bin twofold-work-precision
+cargo build --release --locked --quiet --manifest-path ../Cargo.toml --target-dir "$build/.." --bin twofold-work-precision
 cp "$build/../release/twofold-work-precision" "$build/ours"
 "$build/python/bin/python" reference.py "$build/ours"
 "$build/python/bin/python" run.py "$build"

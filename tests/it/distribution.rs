@@ -262,7 +262,7 @@ const REMEDY: &str = "run cargo there once without --locked";
 
 #[test]
 fn locks_of_their_own_follow_the_manifests() {
-    // Peers, fuzzing and tools are no members of the workspace: nothing else notices when a crate
+    // Benchmarks and fuzzing are no members of the workspace: nothing else notices when a crate
     // is given another dependency, until `--locked` refuses to build them.
     let mut manifests = BTreeMap::new();
     for folder in ["", "systems", "papers", "papers/jeffrey-2013/code"]
@@ -274,7 +274,7 @@ fn locks_of_their_own_follow_the_manifests() {
         let name = manifest["package"]["name"].as_str().unwrap().to_owned();
         manifests.insert(name, compiled_with(&manifest));
     }
-    for lock in ["benches/peers/ours/Cargo.lock", "fuzz/Cargo.lock"] {
+    for lock in ["benches/Cargo.lock", "fuzz/Cargo.lock"] {
         let locked: toml::Table = text(lock).parse().unwrap();
         let mut seen = 0;
         for package in locked["package"].as_array().unwrap() {
