@@ -14,7 +14,7 @@ use twofold_num::random::RandomStream;
 use twofold_num::tape::{Program, Recorded};
 use twofold_num::{Arithmetic, Decimal, Dual, Elementary, Scalar, Tape};
 use twofold_system::Expression;
-use twofold_system::expression::{Function, General};
+use twofold_system::expression::{Function, General, MAX_EXPONENT};
 
 use crate::data::Table;
 use crate::definition::{Definition, When, asks};
@@ -250,8 +250,25 @@ impl Equation {
             let known = e.names().into_iter().all(|name| values.contains_key(name)) && !asks(e);
             known.then(|| evaluate(e, &|name| values.get(name).copied()))
         };
-        definition.change_expressions(|e| *e = e.with_whole_powers(&value));
-        let section = section.map(|e| e.with_whole_powers(&value));
+        // What parameters decide: powers with a whole exponent, and kinks of constants.
+        let decided = |e: Expression| match &e {
+            Expression::RealPower(base, exponent) => match value(exponent) {
+                Some(n) if n.fract() == 0.0 && n.abs() <= f64::from(MAX_EXPONENT) => {
+                    Expression::Power(base.clone(), n as i32)
+                }
+                _ => e,
+            },
+            Expression::Call(Function::Abs, _)
+            | Expression::Apply(General::Min | General::Max | General::Clip, _)
+                if e.parts().into_iter().all(|part| value(part).is_some()) =>
+            {
+                let v = evaluate(&e, &|name| values.get(name).copied());
+                if v.is_finite() { Expression::Number(v.into()) } else { e }
+            }
+            _ => e,
+        };
+        definition.change_expressions(|e| *e = e.map(&decided));
+        let section = section.map(|e| e.map(&decided));
         let tables = model.tables()?.into_iter().map(|(_, t)| t.clone()).collect();
         let mut watched: Vec<Expression> = Vec::new();
         let mut conditions: Vec<Expression> = Vec::new();
@@ -1230,7 +1247,7 @@ impl Equation {
                     }
                     Operation::Ln(_) => "the logarithm of a number that is not positive",
                     Operation::Div(..) => "a division by zero",
-                    _ => "a number beyond the range of double precision",
+                    _ => OVERFLOW,
                 };
                 // The component that it spoils, and the expression that is written there.
                 let (fields, guards) = tape.outputs().split_at(n);
@@ -1251,6 +1268,9 @@ impl Equation {
         None
     }
 }
+
+/// What is told of an expression that overflows.
+pub(crate) const OVERFLOW: &str = "a number beyond the range of double precision";
 
 /// Whether a logarithm stands in a power, exp(b ln a).
 fn makes_a_power(tape: &Tape, logarithm: usize) -> bool {

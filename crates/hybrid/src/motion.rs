@@ -555,6 +555,9 @@ struct Follower<'a> {
     size: Vec<f64>,
     /// The same of late: forgotten as a state falls far below it, and where an event sets it.
     lately: Vec<f64>,
+    /// Each state's size before the steps below [`AT_THE_END`] of the time, and its time.
+    before: Vec<f64>,
+    before_at: f64,
     /// The rounding error of each speed, where a state has become small; else zero.
     noise: Vec<f64>,
     trains: Vec<Train>,
@@ -796,11 +799,16 @@ const NO_LONGER: f64 = 1.5;
 
 /// A speed counts up to so many times the mean one of a step, which that of t^12 is well within.
 const MOST_OF_MEAN: f64 = 1e3;
+/// What a state moves in a part of the run counts for its size up to so many times the one before,
+/// in steps below this part of the time.
+const AT_THE_END: f64 = 1e-12;
+const MOST_OF_SIZE: f64 = 1e6;
 
 /// Scale of each state's error in a step.
 fn scale_now(follower: &Follower, step: &Step, out: &mut Vec<f64>) {
     let options = follower.options;
     let span = options.t_end - options.t_start;
+    let is_lsoda = options.method == Method::Lsoda;
     let scale = |i: usize| {
         let size = step.x[i].abs().max(step.y[i].abs());
         match options.atol {
@@ -813,9 +821,15 @@ fn scale_now(follower: &Follower, step: &Step, out: &mut Vec<f64>) {
                 let speed = step.k.iter().map(|k| k[i].abs()).fold(0.0, f64::max);
                 let speed =
                     if moved > 0.0 { speed.min(MOST_OF_MEAN * moved / step.h) } else { speed };
-                let least = (0.1 * moved).max(1e-6 * span * speed);
+                // A solution that grows without bound is fast, too, but has a size.
+                let known = follower.scale_of(i);
+                let before = follower.before[i];
+                let grows = before > 0.0 && step.x[i].abs() > before.max(0.5 * follower.size[i]);
+                let ends = grows && is_lsoda && step.h < AT_THE_END * step.t.abs();
+                let most = if ends { MOST_OF_SIZE * before } else { f64::INFINITY };
+                let least = (0.1 * moved).max((1e-6 * span * speed).min(most));
                 // A rounding error without a bound leaves the old size.
-                let size = size.max(0.01 * follower.scale_of(i)).max(least);
+                let size = size.max(0.01 * known).max(least);
                 options.rtol * size
                     + follower.noise_in(step.h, i).unwrap_or(0.0)
                     + follower.least_of(i)
@@ -1016,6 +1030,8 @@ impl<'a> Follower<'a> {
             tables_step: false,
             size: x.iter().map(|v| v.abs()).collect(),
             lately: x.iter().map(|v| v.abs()).collect(),
+            before: x.iter().map(|v| v.abs()).collect(),
+            before_at: options.t_start,
             noise: vec![0.0; n],
             trains: vec![Train::default(); events.len()],
             switch_trains: vec![Train::default(); guards],
@@ -1367,6 +1383,10 @@ impl<'a> Follower<'a> {
             let progress = end > self.t;
             self.t = end;
             self.x.copy_from_slice(&step.y);
+            if end - self.before_at > AT_THE_END * end.abs() {
+                self.before.iter_mut().zip(&self.x).for_each(|(before, x)| *before = x.abs());
+                self.before_at = end;
+            }
             self.underflow(&mut step);
             self.note_growth(end);
             if !earliest.is_finite() && self.along.iter().any(|along| *along != 0.0) {

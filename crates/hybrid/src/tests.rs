@@ -5829,3 +5829,63 @@ fn kinks_that_follow_from_what_is_slid_upon_rest() {
         near(x[2], 3.89889839, 1e-6);
     }
 }
+
+/// A quantity that stands still meets nothing: where rounding has 0.3/0.1 just below 3 its whole
+/// part is 3, and stays; a counter passes the next ones.
+#[test]
+fn whole_parts_of_what_stands_still_do_not_change() {
+    let still = "states = ['x', 'y']\nstart = [0.3, 0]\nf = ['0', 'floor(x/0.1) - y']";
+    let given =
+        "states = ['y']\nstart = [0]\nf = ['floor(p/q) - y']\n[parameters]\np = 0.3\nq = 0.1";
+    let counter = "states = ['x', 'y']\nstart = [0, 0]\nf = ['0', 'floor(x/0.1)']\n[[event]]\n\
+        every = 1\nset = { x = 'x + 0.1' }";
+    for method in Method::ALL {
+        let end = |text: &str, t_end: f64| {
+            let x = end_of(text, t_end, method).unwrap_or_else(|e| panic!("{method:?}: {e}"));
+            x[x.len() - 1]
+        };
+        near(end(still, 2.0), 3.0 * (1.0 - (-2.0_f64).exp()), 1e-8);
+        near(end(given, 2.0), 3.0 * (1.0 - (-2.0_f64).exp()), 1e-8);
+        // 0.1 + 0.1 + ... is just below 0.8 and 1 in doubles.
+        near(end(counter, 10.5), 45.0 + 0.5 * 10.0, 1e-8);
+    }
+}
+
+/// The greatest of two constants is one of them: a root of it has a value.
+#[test]
+fn kinks_of_parameters_are_decided_by_their_values() {
+    for (f, want) in [
+        ("sqrt(max(p - 3*q, 0)) + 1", 1.0),
+        ("sqrt(-min(3*q - p, 0)) + 1", 1.0),
+        ("sqrt(abs(p - 3*q)) + 1", 1.0 + 5.551_115_123_125_783e-17_f64.sqrt()),
+        ("sqrt(clip(p - 3*q, 0, 1)) + clip(p, 0, 0.2)", 0.2),
+    ] {
+        let text =
+            format!("states = ['x']\nstart = [0]\nf = ['{f}']\n[parameters]\np = 0.3\nq = 0.1");
+        for method in Method::ALL {
+            near(end_of(&text, 1.0, method).unwrap()[0], want, 1e-12);
+        }
+    }
+}
+
+/// Solutions that leave every bound as a logarithm does, in steps that the time's rounding ends.
+#[test]
+fn no_method_goes_on_behind_a_logarithmic_blow_up() {
+    let grows = "a solution that grows without bound";
+    for method in Method::ALL {
+        for f in ["exp(x)", "exp(2*x)", "exp(x/3)", "x^2*abs(x)", "exp(x)*(2 + sin(t))"] {
+            for start in [0.5, 1.0, 1.3, 2.0, 3.0] {
+                let text = format!("states = ['x']\nstart = [{start}]\nf = ['{f}']");
+                let said = end_of(&text, 20.0, method).unwrap_err();
+                assert!(said.contains(grows), "{method:?} {f} from {start}: {said}");
+            }
+        }
+        for f in ["['exp(x)*(1 + y)', 'x']", "['exp(x) - y', '1']"] {
+            for start in [0.5, 1.0, 2.0] {
+                let text = format!("states = ['x', 'y']\nstart = [{start}, 0]\nf = {f}");
+                let said = end_of(&text, 20.0, method).unwrap_err();
+                assert!(said.contains("leaves the domain"), "{method:?} {f} from {start}: {said}");
+            }
+        }
+    }
+}

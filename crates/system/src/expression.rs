@@ -444,12 +444,11 @@ impl Expression {
         }
     }
 
-    /// The same, with powers whose exponent is a whole number by `value`, as by a parameter, as
-    /// such.
+    /// The same, with each part, from the innermost on, as `change` makes it.
     #[must_use]
-    pub fn with_whole_powers(&self, value: &dyn Fn(&Expression) -> Option<f64>) -> Self {
-        let of = |e: &Expression| Box::new(e.with_whole_powers(value));
-        match self {
+    pub fn map(&self, change: &dyn Fn(Self) -> Self) -> Self {
+        let of = |e: &Expression| Box::new(e.map(change));
+        change(match self {
             Expression::Number(_) | Expression::Pi | Expression::Name(_) => self.clone(),
             Expression::Neg(a) => Expression::Neg(of(a)),
             Expression::Power(a, n) => Expression::Power(of(a), *n),
@@ -459,19 +458,14 @@ impl Expression {
             Expression::Sub(a, b) => Expression::Sub(of(a), of(b)),
             Expression::Mul(a, b) => Expression::Mul(of(a), of(b)),
             Expression::Div(a, b) => Expression::Div(of(a), of(b)),
-            Expression::RealPower(a, b) => match value(b) {
-                Some(n) if n.fract() == 0.0 && n.abs() <= f64::from(MAX_EXPONENT) => {
-                    Expression::Power(of(a), n as i32)
-                }
-                _ => Expression::RealPower(of(a), of(b)),
-            },
+            Expression::RealPower(a, b) => Expression::RealPower(of(a), of(b)),
             Expression::Greater(a, b) => Expression::Greater(of(a), of(b)),
             Expression::And(a, b) => Expression::And(of(a), of(b)),
             Expression::Or(a, b) => Expression::Or(of(a), of(b)),
             Expression::Apply(f, list) => {
-                Expression::Apply(*f, list.iter().map(|e| *of(e)).collect())
+                Expression::Apply(*f, list.iter().map(|e| e.map(change)).collect())
             }
-        }
+        })
     }
 
     /// The names in the expression, in order of appearance, repeated where they are.

@@ -475,6 +475,7 @@ impl Follower<'_> {
         let kept = if mode.is_some() { self.kept_at_zero() } else { none };
         for i in (0..self.n).filter(|i| new[*i] != old[*i]) {
             self.lately[i] = new[i].abs();
+            self.before[i] = new[i].abs();
             self.size[i] = self.size[i].max(new[i].abs());
         }
         self.x = new;

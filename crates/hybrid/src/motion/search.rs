@@ -5,7 +5,7 @@ use twofold_num::tape::Program;
 
 use super::sliding::least_determinant;
 use super::*;
-use crate::equation::{Gate, same_sign};
+use crate::equation::{Gate, OVERFLOW, same_sign};
 use crate::range::Range;
 use twofold_num::Arithmetic as _;
 
@@ -45,14 +45,16 @@ impl Follower<'_> {
             }
             if self.equation.guards[*guard].whole {
                 for (upper, boundary, way) in [(false, side, 1.0), (true, side + 1.0, -1.0)] {
-                    if self.fresh_guard[*guard]
-                        || !self.stays_away(step, &ranges, place, boundary, way)
+                    if (self.fresh_guard[*guard]
+                        || !self.stays_away(step, &ranges, place, boundary, way))
+                        && !self.stands_still(step, place)
                     {
                         list.push((Sought::Guard { guard: *guard, upper }, 1.0));
                     }
                 }
             } else if (self.fresh_guard[*guard]
                 || !self.stays_away(step, &ranges, place, 0.0, side))
+                && !self.stands_still(step, place)
                 && !self.hides_a_kink(step, *guard)
             {
                 list.push((Sought::Guard { guard: *guard, upper: false }, side));
@@ -69,7 +71,10 @@ impl Follower<'_> {
             {
                 continue;
             }
-            if *side != 0.0 && !self.contacts.iter().any(|c| c.watched == i) {
+            if *side != 0.0
+                && !self.contacts.iter().any(|c| c.watched == i)
+                && !self.stands_still(step, place)
+            {
                 list.push((Sought::Watched(i), *side));
             }
         }
@@ -285,6 +290,16 @@ impl Follower<'_> {
         };
         let least = b.iter().fold(f64::INFINITY, |least, b| least.min(b * side));
         least > 1e-12 * size && crate::roots::keeps_away(&b, side)
+    }
+
+    /// Whether nothing that a watched value sees moves in a step: then it meets nothing, whatever
+    /// rounding makes of it.
+    fn stands_still(&self, step: &Step, place: usize) -> bool {
+        step.series.is_none()
+            && self.compiled.touches[place].iter().all(|variable| match *variable {
+                i if i < self.n => step.bernstein(i).iter().all(|b| *b == step.x[i]),
+                i => i > self.n && i <= self.n + self.equation.guards.len(),
+            })
     }
 
     /// The Bernstein coefficients of a sum of states along a step, and the size of its terms.
@@ -1320,6 +1335,9 @@ impl Follower<'_> {
                 }
                 self.variables[self.n] = t + ahead;
                 what = self.equation.broken(&self.compiled, &self.variables);
+                // Of a solution that grows without bound everything overflows at last.
+                let near = |i: usize| (ahead * field[i]).abs() <= self.size[i].max(x[i].abs());
+                what = what.filter(|what| !what.starts_with(OVERFLOW) || (0..self.n).all(near));
                 ahead *= 4.0;
             }
         }

@@ -5,11 +5,14 @@
 //! it comes earlier or later, and that the reset itself depends on the parameter (the jumps of
 //! parametric sensitivities: Galán, Feehery & Barton 1999, Applied Numerical Mathematics 31, 17).
 
+use std::collections::BTreeMap;
+
 use super::tangent::explicit;
 use super::{Ending, Follower, HybridError, Options, Record, same};
 use crate::Model;
 use crate::definition::{Constant, ParameterEntry, When};
-use twofold_num::Decimal;
+use crate::value::evaluate;
+use twofold_num::{Decimal, Dual};
 use twofold_system::Expression;
 use twofold_system::document::{About, StateEntry};
 
@@ -25,7 +28,8 @@ pub struct Sensitivities {
     /// and does not slide.
     pub by_start: Vec<Vec<f64>>,
     /// A row a state: its derivatives by the parameters, in the order in which they were asked for.
-    /// The start is held fixed. NaN as above, for one that moves such a surface.
+    /// Parameters that are given by the one that is changed change with it, all others and the
+    /// start are held fixed. NaN as above, for one that moves such a surface.
     pub by_parameter: Vec<Vec<f64>>,
 }
 
@@ -42,6 +46,7 @@ pub fn sensitivities(
 ) -> Result<Sensitivities, HybridError> {
     explicit(options)?;
     let n = model.coordinates().len();
+    let moved = by_parameters(model, parameters)?;
     let (model, values) = with_states(model, parameters)?;
     let start = match &options.start {
         Some(start) => start.clone(),
@@ -61,8 +66,13 @@ pub fn sensitivities(
         v[i] = 1.0;
         v
     };
-    follower.begin_tangents((0..whole.len()).map(unit).collect())?;
-    let one_sided = follower.begins_between_sides();
+    let beside = moved.iter().map(|of| [vec![0.0; n], of.clone()].concat());
+    follower.begin_tangents((0..n).map(unit).chain(beside).collect())?;
+    let mut one_sided = follower.begins_between_sides();
+    let parameters_between = one_sided[n..].to_vec();
+    for (one, of) in one_sided[n..].iter_mut().zip(&moved) {
+        *one = of.iter().zip(&parameters_between).any(|(by, between)| *by != 0.0 && *between);
+    }
     let (outcome, follower) = follower.run_whole(&mut |_| true)?;
     if outcome.ending != Ending::Finished {
         let why =
@@ -167,6 +177,27 @@ pub fn parameters(model: &Model) -> Vec<String> {
         reached.iter().any(|name| timed.contains(name))
     };
     parameters.iter().filter(|p| !sets(&p.name)).map(|p| p.name.clone()).collect()
+}
+
+/// The derivatives of these parameters' values by each of them, as far as they are given by one
+/// another: a row for each that is changed.
+fn by_parameters(model: &Model, parameters: &[&str]) -> Result<Vec<Vec<f64>>, HybridError> {
+    let values = model.values().map_err(|e| HybridError::Bad(e.to_string()))?;
+    let row = |changed: &&str| {
+        let mut duals: BTreeMap<&str, Dual<f64, 1>> = BTreeMap::new();
+        for p in model.definition().parameters() {
+            let dual = if p.name == *changed {
+                Dual::variable(values[&p.name], 0)
+            } else if model.is_given(&p.name) {
+                Dual::constant(values[&p.name])
+            } else {
+                evaluate(&p.value, &|name| duals.get(name).copied())
+            };
+            duals.insert(&p.name, dual);
+        }
+        parameters.iter().map(|name| duals.get(name).map_or(0.0, |d| d.partials[0])).collect()
+    };
+    Ok(parameters.iter().map(row).collect())
 }
 
 /// The model and the start that its file gives.
@@ -344,6 +375,44 @@ mod tests {
                 "{:?} {by_f:?}",
                 found.by_parameter
             );
+        }
+    }
+
+    /// A parameter that is given by another moves with it, as it does where that one is set,
+    /// whether or not both are asked for.
+    #[test]
+    fn derivatives_are_those_of_setting_a_parameter() {
+        let text = r#"
+            states = ["x"]
+            start = [1]
+            f = ["-r*x + p*cos(t)"]
+            [parameters]
+            p = 1
+            q = "2*p"
+            r = "q^2 - 2*q + p"
+        "#;
+        let end = |set: &[(&str, f64)]| {
+            let m = set.iter().fold(model(text), |m, (name, v)| m.with(name, *v).unwrap());
+            follow(&m, &Options { rtol: 1e-12, ..at(1.0) }, &mut |_| true).unwrap().x[0]
+        };
+        for (set, names) in [
+            (&[][..], &["p", "q", "r"][..]),
+            (&[], &["p"]),
+            (&[], &["r", "p"]),
+            (&[("q", 2.0)], &["p", "q", "r"]),
+            (&[("r", 1.0)], &["q", "p"]),
+        ] {
+            let m = set.iter().fold(model(text), |m, (name, v)| m.with(name, *v).unwrap());
+            let values = m.values().unwrap();
+            let found = sensitivities(&m, &at(1.0), names).unwrap();
+            for (name, found) in names.iter().zip(&found.by_parameter[0]) {
+                let moved = |by: f64| {
+                    let of = [set, &[(*name, values[*name] + by)]].concat();
+                    end(&of)
+                };
+                let right = (moved(1e-4) - moved(-1e-4)) / 2e-4;
+                assert!((found - right).abs() < 1e-6, "{name} of {names:?}: {found}, {right}");
+            }
         }
     }
 
