@@ -420,12 +420,13 @@ impl Equation {
         self.definition.modes.iter().flat_map(|m| &m.field).any(|e| self.sees_time(e))
     }
 
-    /// Whether an event's expression depends on the time.
+    /// Whether the expression of an event or of the section depends on the time.
     pub fn events_see_time(&self) -> bool {
-        self.definition.events.iter().any(|event| match &event.when {
-            When::At(_) | When::Every(_) => false,
-            When::Zero(e, _) | When::Becomes(e) => self.sees_time(e),
-        })
+        let conditions = self.definition.events.iter().filter_map(|event| match &event.when {
+            When::Becomes(e) => Some(e),
+            _ => None,
+        });
+        self.watched.iter().chain(conditions).any(|e| self.sees_time(e))
     }
 
     fn sees_time(&self, e: &Expression) -> bool {

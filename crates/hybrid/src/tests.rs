@@ -5889,3 +5889,71 @@ fn no_method_goes_on_behind_a_logarithmic_blow_up() {
         }
     }
 }
+
+/// What rests at a root's zero is moved by the clock again, and events and sections of the time
+/// are met meanwhile.
+#[test]
+fn the_clock_is_asked_while_everything_rests() {
+    let end = |states: &str, start: &str, f: &str, t_end: f64, method: Method| {
+        let text = format!("states = {states}\nstart = {start}\nf = {f}");
+        end_of(&text, t_end, method).unwrap_or_else(|e| panic!("{method:?} {f}: {e}"))
+    };
+    for method in Method::ALL {
+        for (f, want) in [
+            ("if(t > 1, 0.5, 0) - 2*max(h - 1, 0)^1.5", 1.396_561_051_13),
+            ("heaviside(t - 1)/2 - 2*sqrt(max(h - 1, 0))", 1.062_499_994_8),
+            ("if(t > 1, -0.5, 0) - 2*max(h - 1, 0)^1.5", -1.0),
+        ] {
+            near(end("['h']", "[1]", &format!("['{f}']"), 5.0, method)[0], want, 1e-8);
+        }
+        let pulled = "['x - 2*max(h - 1, 0)^1.5', 'if(t > 1, 0.2, 0)']";
+        near(end("['h', 'x']", "[1, 0]", pulled, 5.0, method)[0], 1.495_854_518_6, 1e-8);
+        // A body is stopped by a root of its speed, and pushed later.
+        let body = "['v', 'if(t > 10, 1, 0) - sign(v)*abs(v)^0.5']";
+        near(end("['x', 'v']", "[0, 2]", body, 20.0, method)[0], 10.228_872_579_7, 1e-7);
+        // A tank is empty from t = 1.095 on.
+        let tank = "states = ['h', 'n']\nstart = [1.2, 0]\nf = ['-2*sqrt(max(h, 0))', '0']\n\
+            [[event]]\nwhen = 'sin(t) - 0.5'\nset = { n = 'n + 1' }\n\
+            [[event]]\nwhen = 't - 10'\nstop = true";
+        let options = Options { t_end: 20.0, method, ..Options::default() };
+        let outcome = follow(&model(tank), &options, &mut |_| true).unwrap();
+        assert!(outcome.t == 10.0 && outcome.x[1] == 4.0, "{method:?}: {outcome:?}");
+        let tank = "states = ['h']\nstart = [1.2]\nf = ['-2*sqrt(max(h, 0))']";
+        let section = twofold_system::Expression::parse_general("sin(t) - 0.5", &["h", "t"]);
+        let record = Record::Section(section.unwrap());
+        let options = Options { t_end: 12.0, method, record, ..Options::default() };
+        let mut times = Vec::new();
+        let seen = follow(&model(tank), &options, &mut |point| {
+            times.push(point.t);
+            true
+        });
+        seen.unwrap();
+        let met = [1.0, 5.0, 13.0, 17.0].map(|k| k * std::f64::consts::PI / 6.0);
+        assert!(times.len() == 4 && times.iter().zip(met).all(|(t, met)| (t - met).abs() < 1e-9));
+    }
+}
+
+/// Powers between one and two have no second derivative at rest, and no series where a speed
+/// passes zero.
+#[test]
+fn powers_of_sizes_are_left_from_rest() {
+    for method in Method::ALL {
+        for (f, want) in [
+            ("t - x*abs(x)^0.5", 2.759_255_016_5),
+            ("t - x*sqrt(abs(x))", 2.759_255_016_5),
+            ("t - sign(x)*abs(x)^1.5", 2.759_255_016_5),
+            ("sin(t) - x*abs(x)^0.8", -0.657_762_432_7),
+            ("max(t - 1, 0) - x*abs(x)^0.5", 2.320_209_376_8),
+        ] {
+            let text = format!("states = ['x']\nstart = [0]\nf = ['{f}']");
+            near(end_of(&text, 5.0, method).unwrap()[0], want, 1e-8);
+        }
+        // A swing through rest, against the same in a spelling without powers.
+        let swings = |drag: &str| {
+            let text = format!("states = ['x', 'v']\nstart = [2, 0]\nf = ['v', '-x - 0.3*{drag}']");
+            end_of(&text, 12.0, method).unwrap_or_else(|e| panic!("{method:?} {drag}: {e}"))
+        };
+        let (powers, roots) = (swings("sign(v)*abs(v)^1.5"), swings("v*sqrt(abs(v))"));
+        assert!(powers.iter().zip(roots).all(|(a, b)| (a - b).abs() < 1e-7), "{method:?}");
+    }
+}

@@ -1648,7 +1648,9 @@ impl Follower<'_> {
             self.sliding.iter().copied().filter(|g| near.iter().all(|(_, o)| o != g)).collect();
         (self.x, self.t) = (x.to_vec(), t);
         let size = |i: usize| self.size[i].max(1e-3 * self.size.iter().fold(0.0, |a, b| b.max(a)));
-        self.rests = sliding.is_empty()
+        let sees_time = self.equation.depends_on_time() || self.equation.events_see_time();
+        self.rests = !sees_time
+            && sliding.is_empty()
             && self.contacts.is_empty()
             && (0..n).all(|i| field[i].abs() * left <= 1e-8 * size(i));
         self.adopt(config, sliding);

@@ -27,6 +27,13 @@ const LARGEST_MISS: f64 = 1e-6;
 /// states' own; near a pole it would be shorter, which is an error.
 const LEAST_FOLLOWED: f64 = 1e-7;
 
+/// Whether the terms of a series end since they grow too large, and not at a root of zero.
+fn overflows(terms: &[f64]) -> bool {
+    const LARGE: f64 = 1e100;
+    let last = terms.iter().take_while(|c| c.is_finite()).last();
+    terms[2].is_finite() && last.is_some_and(|last| last.abs() > LARGE)
+}
+
 /// Key of the equation that moves the state.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 struct Key {
@@ -187,7 +194,7 @@ impl Follower<'_> {
             None => Ok(None),
             // Fast growth of large numbers, far from a pole; of small ones beside a root of zero.
             Some(i)
-                if series.terms[i][2].is_finite()
+                if overflows(&series.terms[i])
                     && series.terms[i][0].abs() >= 1.0
                     && (series.terms[i][0] / series.terms[i][1]).abs()
                         > 1e3 * f64::EPSILON * step.t.abs() =>
@@ -200,7 +207,7 @@ impl Follower<'_> {
                 )))
             }
             // Numbers too large, as before a pole.
-            Some(i) if series.terms[i][2].is_finite() && series.terms[i][0].abs() >= 1.0 => {
+            Some(i) if overflows(&series.terms[i]) && series.terms[i][0].abs() >= 1.0 => {
                 Err(self.left_domain(step.t, &step.x))
             }
             root => Ok(root),

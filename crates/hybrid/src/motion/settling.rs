@@ -1184,10 +1184,14 @@ impl Follower<'_> {
                 }
                 [] => {
                     let idle = self.idle_kinks(&zero);
-                    if !idle.is_empty() {
-                        let rest: Vec<usize> =
-                            zero.iter().copied().filter(|guard| !idle.contains(guard)).collect();
-                        return self.decide(&rest, kept);
+                    let rest: Vec<usize> =
+                        zero.iter().copied().filter(|guard| !idle.contains(guard)).collect();
+                    if rest.len() < zero.len() {
+                        let before = self.left_out.len();
+                        self.left_out.extend(idle);
+                        let decided = self.decide(&rest, kept);
+                        self.left_out.truncate(before);
+                        return decided;
                     }
                     let names: Vec<usize> = set.iter().map(|i| zero[*i]).collect();
                     let here = self.rates(&self.config.clone()).1.field;

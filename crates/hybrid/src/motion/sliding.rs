@@ -1119,8 +1119,42 @@ impl Follower<'_> {
                 }
             }
             (self.variables, self.compiled) = kept;
+            if second.iter().any(|v| v.is_nan()) {
+                self.bend_by_difference(&compiled, config, &field, &slopes, &mut second);
+            }
         }
         (compiled, Rates { field, first: slopes, second, terms })
+    }
+}
+
+impl Follower<'_> {
+    /// Second derivatives that are no numbers, as that of x |x|^0.6 at zero, by how much the first
+    /// ones change a little later.
+    fn bend_by_difference(
+        &self,
+        compiled: &Compiled,
+        config: &Configuration,
+        field: &[f64],
+        first: &[f64],
+        second: &mut [f64],
+    ) {
+        /// Of the run, or of the time in which a state moves by its size.
+        const LATER: f64 = 1e-9;
+        let n = self.n;
+        let times = field.iter().zip(&self.size).map(|(f, size)| size / f.abs());
+        let span = self.options.t_end - self.options.t_start;
+        let later = LATER * times.filter(|time| *time > 0.0).fold(span, f64::min);
+        let mut variables = self.load(config);
+        (0..n).for_each(|i| variables[i] += later * field[i]);
+        variables[n] += later;
+        let mut then = vec![0.0; n];
+        compiled.field.evaluate(&variables, &mut then);
+        let rates = Self::along(compiled, &variables, &then);
+        for ((second, first), rate) in second.iter_mut().zip(first).zip(rates) {
+            if second.is_nan() {
+                *second = (rate - first) / later;
+            }
+        }
     }
 }
 
