@@ -924,9 +924,13 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         from: Option<Mode>,
         what: &'static str,
     ) -> Result<State<N>, FilippovError> {
-        let below = self.speed * LIMITS.rest;
-        if !self.rests_at(&self.x, &below) {
-            return Err(self.non_transversal(what));
+        if !self.rests_here() {
+            return match from {
+                Some(Mode::Plus) if self.root_begins() => self.land(Side::Plus, false),
+                Some(Mode::Minus) if self.root_begins() => self.land(Side::Minus, false),
+                _ if self.root_begins() => self.start(),
+                _ => Err(self.non_transversal(what)),
+            };
         }
         let mode = Mode::SlidingAttracting;
         let kind = match from {
@@ -938,6 +942,22 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             self.event(kind, from, Some(mode));
         }
         Ok(State::Rest)
+    }
+
+    /// Whether the motion may stay at the present state.
+    fn rests_here(&self) -> bool {
+        self.rests_at(&self.x, &(self.speed * LIMITS.rest))
+    }
+
+    /// Both fields are one here, along the surface, and without a derivative across it: the sides
+    /// to which they lead are seen beside the surface, each on its own, from here on. Whether that
+    /// is new.
+    fn root_begins(&mut self) -> bool {
+        let l = self.lie(&self.x);
+        let apart = (self.velocity(Side::Plus) - self.velocity(Side::Minus)).abs();
+        let is_one = (0..N).all(|i| apart[i] <= LIMITS.rest * self.speed[i]);
+        let is_tangent = l.p.abs() <= l.zero_p && l.q.abs() <= l.zero_q;
+        is_tangent && is_one && !(l.pp + l.mm).is_finite() && self.stay_inside()
     }
 
     /// Whether a convex combination of the two fields at `x` is zero, each component up to `below`:

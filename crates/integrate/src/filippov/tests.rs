@@ -823,6 +823,38 @@ fn rests_on_the_surface_are_seen_at_the_start() {
     }
 }
 
+/// A tank that empties by the root of its level stays empty, whatever moves beside it: the level
+/// x - c is (1 - t/2)^2 until t = 2.
+#[test]
+fn an_empty_tank_stays_empty_beside_what_moves() {
+    for c in [0.0, 0.3, 1.0, 20.0] {
+        let root = format!("sqrt(abs(x - {c}))");
+        let outer = format!("sqrt({c} - x)");
+        for (moves, want) in [
+            ("1", 0.5 + 5.0),
+            ("-1", 0.5 - 5.0),
+            ("y", 0.5 * 5.0_f64.exp()),
+            ("1 - y", 1.0 - 0.5 * (-5.0_f64).exp()),
+            ("-0.1*y", 0.5 * (-0.5_f64).exp()),
+        ] {
+            for minus in [&root, &outer, "0"] {
+                let [down, up] = [format!("'-{root}', '{moves}'"), format!("'{minus}', '{moves}'")];
+                let h = format!("x - {c}");
+                let end = plane_within(1e-9, [&h, &down, &up], [c + 1.0, 0.5], 5.0)
+                    .unwrap_or_else(|e| panic!("{h} {down} {up}: {e}"));
+                let off = [(end.x[0] - c).abs(), (end.x[1] - want).abs() / want.abs()];
+                assert!(off[0] < 1e-12 && off[1] < 1e-6, "{h} {down} {up}: {}", end.x);
+            }
+        }
+    }
+    // On the surface from the start; and where the fields differ along it nothing says how fast.
+    let at = |faces: [&str; 2]| plane(["x", faces[0], faces[1]], [0.0, 0.5], 3.0);
+    let end = at(["'-sqrt(abs(x))', '1'", "'sqrt(abs(x))', '1'"]).unwrap();
+    assert!(end.x[0] == 0.0 && (end.x[1] - 3.5).abs() < 1e-9, "{}", end.x);
+    assert!(at(["'sqrt(abs(x))', '1'", "'-sqrt(abs(x))', '1'"]).is_err());
+    assert!(at(["'-sqrt(abs(x))', '1'", "'sqrt(abs(x))', '2'"]).is_err());
+}
+
 /// Where a piece of the motion becomes stiff another method goes on from there, and not from the
 /// piece's beginning: in flight and in sliding.
 #[test]
