@@ -589,8 +589,8 @@ fn scan<const N: usize>(
 }
 
 fn first_in(q: &dyn Fn(f64) -> f64, a: f64, b: f64, depth: usize) -> Option<Zero> {
-    let (coefficients, size, sound) = polynomial(q, a, b);
-    if !sound && depth < DEEPEST {
+    let (coefficients, size, error) = polynomial(q, a, b);
+    if !is_sound(size, error) && depth < DEEPEST {
         let middle = 0.5 * (a + b);
         return first_in(q, a, middle, depth + 1).or_else(|| first_in(q, middle, b, depth + 1));
     }
@@ -602,25 +602,68 @@ const DEEPEST: usize = 10;
 
 /// Places in (a, b], the last of them b, that leave at most one zero of `q` between neighbours.
 fn separated(q: &dyn Fn(f64) -> f64, a: f64, b: f64, depth: usize, places: &mut Vec<f64>) {
-    let (coefficients, size, sound) = polynomial(q, a, b);
-    if !sound && depth < DEEPEST {
+    let (coefficients, size, error) = polynomial(q, a, b);
+    if !is_sound(size, error) && depth < DEEPEST {
         let middle = 0.5 * (a + b);
         separated(q, a, middle, depth + 1, places);
         separated(q, middle, b, depth + 1, places);
     } else {
-        separate(&coefficients, a, b, 0, 64.0 * f64::EPSILON * size, places);
+        let rounding = NOISE * size;
+        let doubt = if error <= rounding || depth >= DEEPEST { 0.0 } else { SAFE * error };
+        let mut separation = Separation { q, depth, rounding, doubt, width: b - a, places };
+        separation.of(&coefficients, a, b, 0);
     }
 }
 
-fn separate(c: &Coefficients, a: f64, b: f64, depth: usize, rounding: f64, places: &mut Vec<f64>) {
-    if sign_changes(c) <= 1 || depth >= 45 || c.iter().all(|v| v.abs() <= rounding) {
-        places.push(b);
-        return;
+/// Rounding of a polynomial's values, relative to the largest of its coefficients.
+const NOISE: f64 = 64.0 * f64::EPSILON;
+/// A polynomial of degree 8 differs from its function by less than this multiple of the largest
+/// difference seen between its nodes, and so does an eighth of its derivative: one of degree 9 has
+/// derivatives of at most 162 times its size (Markov).
+const SAFE: f64 = 32.0;
+
+/// The search for places that separate the zeros of `q`, by the polynomial that stands for it.
+struct Separation<'a> {
+    q: &'a dyn Fn(f64) -> f64,
+    /// Halvings of the step so far.
+    depth: usize,
+    rounding: f64,
+    /// Bound of the difference between the polynomial and `q`, and of an eighth of that between
+    /// their derivatives by the fraction of `width`; zero where it is not asked for.
+    doubt: f64,
+    width: f64,
+    places: &'a mut Vec<f64>,
+}
+
+impl Separation<'_> {
+    fn of(&mut self, c: &Coefficients, a: f64, b: f64, halvings: usize) {
+        let (middle, within) = (0.5 * (a + b), |bound: f64| c.iter().all(|v| v.abs() <= bound));
+        let one = sign_changes(c) <= 1;
+        if self.doubt > 0.0 && (within(self.doubt) || one && !self.is_certain(c, b - a)) {
+            // The polynomial is nearer to zero than to the function.
+            separated(self.q, a, middle, self.depth + 1, self.places);
+            separated(self.q, middle, b, self.depth + 1, self.places);
+        } else if one || halvings >= 45 || within(self.rounding) {
+            self.places.push(b);
+        } else {
+            let (left, right) = halves(c);
+            self.of(&left, a, middle, halvings + 1);
+            self.of(&right, middle, b, halvings + 1);
+        }
     }
-    let (left, right) = halves(c);
-    let middle = 0.5 * (a + b);
-    separate(&left, a, middle, depth + 1, rounding, places);
-    separate(&right, middle, b, depth + 1, rounding, places);
+
+    /// Whether the function, like the polynomial, has at most one zero on a part of this length:
+    /// it has none, or only grows, or only falls.
+    fn is_certain(&self, c: &Coefficients, length: f64) -> bool {
+        let beyond = |values: &mut dyn Iterator<Item = f64>, doubt: f64| {
+            let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
+                (low.min(v), high.max(v))
+            });
+            low > doubt || high < -doubt
+        };
+        beyond(&mut c.iter().copied(), self.doubt)
+            || beyond(&mut c.windows(2).map(|w| w[1] - w[0]), self.doubt * length / self.width)
+    }
 }
 
 /// By the variation-diminishing property not fewer than the zeros inside.
@@ -629,9 +672,14 @@ fn sign_changes(c: &Coefficients) -> usize {
     signs.clone().zip(signs.skip(1)).filter(|(x, y)| x != y).count()
 }
 
+/// Whether a polynomial with coefficients of this size and this error stands for its function.
+fn is_sound(size: f64, error: f64) -> bool {
+    error <= 1e-6 * size
+}
+
 /// The Bernstein coefficients of the polynomial that is `q` at the nodes, the largest of them, and
-/// whether it is `q` between the nodes, too.
-fn polynomial(q: &dyn Fn(f64) -> f64, a: f64, b: f64) -> (Coefficients, f64, bool) {
+/// its largest difference from `q` between the nodes, as far as four places show.
+fn polynomial(q: &dyn Fn(f64) -> f64, a: f64, b: f64) -> (Coefficients, f64, f64) {
     let basis = bernstein_basis();
     let at = |u: f64| q(if u >= 1.0 { b } else { a + (b - a) * u });
     let values: Coefficients = std::array::from_fn(|j| at(basis.nodes[j]));
@@ -640,11 +688,12 @@ fn polynomial(q: &dyn Fn(f64) -> f64, a: f64, b: f64) -> (Coefficients, f64, boo
     coefficients[0] = values[0];
     coefficients[DEGREE] = values[DEGREE];
     let size = coefficients.iter().fold(0.0_f64, |m, c| m.max(c.abs()));
-    let sound = [1, 3, 4, 6].iter().all(|&j| {
+    let error = [1, 3, 4, 6].into_iter().fold(0.0_f64, |most, j| {
         let u = 0.5 * (basis.nodes[j] + basis.nodes[j + 1]);
-        (at(u) - bernstein(&coefficients, u)).abs() <= 1e-6 * size
+        let here = (at(u) - bernstein(&coefficients, u)).abs();
+        if here > most || here.is_nan() { here } else { most }
     });
-    (coefficients, size, sound)
+    (coefficients, size, error)
 }
 
 fn isolate(
@@ -932,6 +981,24 @@ mod tests {
                 "{gap}: {found:?}"
             );
             assert!((found[0].theta - 0.437).abs() < 1e-9, "{gap}: {found:?}");
+        }
+        // Narrow windows of a function of any size beside them: cos(u) > 1 - depth.
+        for depth in [1e-4_f64, 1e-7, 1e-10] {
+            for turns in [0.6, 1.0, 3.3, 14.3] {
+                let all = turns * 2.0 * std::f64::consts::PI;
+                let gate = |x: &SVector<f64, 1>| cos(all * (x[0] - 0.3) - 2.0) - (1.0 - depth);
+                let found = CrossingFinder::starting(false).in_curved_step(&step, gate);
+                let half = 2.0 * (0.5 * depth).sqrt().asin();
+                let expected: Vec<f64> = (0..20)
+                    .map(|k| (2.0 + f64::from(k) * 2.0 * std::f64::consts::PI) / all)
+                    .filter(|s| *s < 1.0)
+                    .flat_map(|s| [s - half / all, s + half / all])
+                    .collect();
+                assert_eq!(found.len(), expected.len(), "{depth} {turns}: {found:?}");
+                for (f, e) in found.iter().zip(&expected) {
+                    assert!((f.theta - e).abs() < 1e-10, "{depth} {turns}: {f:?} {e}");
+                }
+            }
         }
     }
 

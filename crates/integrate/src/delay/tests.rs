@@ -860,6 +860,31 @@ fn thin_pulses_are_seen() {
     }
 }
 
+/// Windows of cos(w u) > c that last 4e-3 and less: each is passed, by every method.
+#[test]
+fn narrow_windows_of_a_wave_are_passed() {
+    let pi = std::f64::consts::PI;
+    for (w, c, t_end) in [(3.0, 0.999_999_9, 300.0), (3.0, 0.99999, 300.0), (0.3, 0.99999, 1000.0)]
+    {
+        let data = system(&format!(
+            "states = ['u', 'n']\nh = 'cos({w}*u) - {c}'\nplus = ['1', '1']\nminus = ['1', '0']"
+        ));
+        let half = 2.0 * (0.5_f64 * (1.0 - c)).sqrt().asin() / w;
+        let windows = (w * t_end / (2.0 * pi)).floor();
+        assert!(w * t_end - 2.0 * pi * windows > w * half);
+        let wanted = half * (1.0 + 2.0 * windows);
+        for (method, tolerance) in SHARP {
+            for how in [How::sharp(1e-6, t_end), How::relay(1e-12, t_end)] {
+                // The first ends late; those after it begin late, too.
+                let late = how.delay;
+                let (_, end) = How { method, tolerance, ..how }.run(&data, [0.0, 0.0]).unwrap();
+                let n = end.x[1];
+                assert!((n - wanted - late).abs() < 1e-6, "{method:?} {w} {c}: {n} {wanted}");
+            }
+        }
+    }
+}
+
 /// The failure of a run.
 struct Failing(SVector<f64, 2>);
 
