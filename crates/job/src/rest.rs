@@ -3,9 +3,9 @@
 //! A rest is a zero of the equation that holds there: of a smooth field, of f+ where h > 0, of f-
 //! where h < 0, or of a mixture of both on h = 0 (a pseudo-equilibrium; Filippov 1988, sec. 19; di
 //! Bernardo, Budd, Champneys & Kowalczyk 2008, sec. 5.1). It is found by Newton's method from where
-//! a run ended. That the run ends there is another statement: it is made if the distance from the
-//! rest goes on falling as the rest's eigenvalues say. Nothing here has a unit: distances are
-//! compared with distances.
+//! a run ended; where two surfaces meet, it is the point at which the motion stays. That the run
+//! ends at a rest is another statement: it is made if the distance from the rest goes on falling as
+//! the rest's eigenvalues say. Nothing here has a unit: distances are compared with distances.
 
 use serde::{Deserialize, Serialize};
 
@@ -180,8 +180,8 @@ pub fn near(system: &System, switch: SwitchSpec, from: &[f64]) -> Option<Rest> {
     if let Some(field) = field(system, switch) {
         return regular(&field);
     }
-    if system.definition().second().is_some() {
-        return None;
+    if let Some(faces) = system.faces() {
+        return of_faces(&faces, switch, from);
     }
     // A smooth switch that acts late rests where one that does not rests. Outside the layer it does
     // not matter when it acts.
@@ -213,13 +213,66 @@ pub fn near(system: &System, switch: SwitchSpec, from: &[f64]) -> Option<Rest> {
     candidates.into_iter().flatten().min_by(|a, b| there(a).total_cmp(&there(b)))
 }
 
+/// The same of a system with two switching surfaces off their intersection: there it is one of its
+/// faces, each as far as the other surface.
+fn of_faces(faces: &[[System; 2]; 2], switch: SwitchSpec, from: &[f64]) -> Option<Rest> {
+    let candidates = [(0, 0), (0, 1), (1, 0), (1, 1)].into_iter().filter_map(|(surface, below)| {
+        let rest = near(&faces[surface][below], switch, from)?;
+        let h = surface_at(&faces[1 - surface][0], &rest.state);
+        let sign = [1.0, -1.0][below];
+        (sign * h.value[0] > size(&h.rows) * blur(&rest.state, from)).then_some(rest)
+    });
+    let there = |r: &Rest| distance(&r.state, from);
+    candidates.min_by(|a, b| there(a).total_cmp(&there(b)))
+}
+
+/// The end of `run` as a rest, if it is where two switching surfaces meet and stays there.
+///
+/// # Errors
+///
+/// If it was interrupted.
+fn at_intersection(
+    executor: &dyn Ask,
+    run: &RunSpec,
+    end: &[f64],
+) -> Result<Option<Rest>, JobError> {
+    let (true, Some([[first, _], [second, _]])) =
+        (matches!(run.switch, SwitchSpec::Filippov { .. }), run.system.faces())
+    else {
+        return Ok(None);
+    };
+    let rounding = 1e-9 * size(end).max(size(&run.start));
+    let on = |face: &System| {
+        let h = surface_at(face, end);
+        h.value[0].abs() <= size(&h.rows) * rounding
+    };
+    if !(on(&first) && on(&second)) || moves_on(executor, run, end, run.method.tolerance.rtol)? {
+        return Ok(None);
+    }
+    Ok(Some(Rest {
+        kind: RestKind::PseudoEquilibrium,
+        state: end.to_vec(),
+        eigenvalues: Vec::new(),
+        stability: Stability::Attracts,
+    }))
+}
+
+/// The switching function and its gradient.
+fn surface_at(system: &System, x: &[f64]) -> Jet {
+    linearised(x.len(), &|x, out| out[0] = switching(system, x), 1, x)
+}
+
+/// Distance by which a rest at `x`, found from `from`, may miss a surface that it lies on.
+fn blur(x: &[f64], from: &[f64]) -> f64 {
+    1e-9 * size(x) + 1e-6 * distance(x, from)
+}
+
 /// The rest near `from` of both fields on the switching surface, if it is one. Where their Jacobian
 /// matrices differ the linear terms of neither decide.
 fn of_both(system: &System, fields: &[Field; 2], rests: [Rest; 2], from: &[f64]) -> Option<Rest> {
     let [here, there] = rests;
     let (n, x) = (from.len(), &here.state);
-    let h = linearised(n, &|x, out| out[0] = switching(system, x), 1, x);
-    let rounding = 1e-9 * size(x) + 1e-6 * distance(x, from);
+    let (h, rounding) = (surface_at(system, x), blur(x, from));
     let one = distance(x, &there.state) <= rounding;
     if !(one && h.value[0].abs() <= size(&h.rows) * rounding) {
         return None;
@@ -265,7 +318,7 @@ fn pseudo(system: &System, plus: &Field, minus: &Field, from: &[f64]) -> Option<
         // time).
         let left: Vec<f64> = m.iter().zip(&along).map(|(m, a)| m + weight * a).collect();
         let at_rest = size(&left) <= 1e-6 * size(&p).max(size(&m)) && (0.0..=1.0).contains(&weight);
-        let h = linearised(n, &|x, out| out[0] = switching(system, x), 1, from);
+        let h = surface_at(system, from);
         let on_surface = h.value[0].abs() <= 1e-9 * size(&h.rows) * size(from);
         let kind = RestKind::PseudoEquilibrium;
         return (at_rest && on_surface && size(&p) > 0.0).then(|| Rest {
@@ -279,7 +332,7 @@ fn pseudo(system: &System, plus: &Field, minus: &Field, from: &[f64]) -> Option<
     if !(weight > 0.0 && weight < 1.0) {
         return None;
     }
-    let h = linearised(n, &|x, out| out[0] = switching(system, x), 1, &state).rows;
+    let h = surface_at(system, &state).rows;
     let lie = |f: &[f64]| f.iter().zip(&h).map(|(f, h)| f * h).sum::<f64>();
     let (p, m) = (of(plus, &state), of(minus, &state));
     let towards = lie(&m) - lie(&p);
@@ -319,9 +372,9 @@ const AS_FAST: f64 = 0.75;
 const FURTHER: f64 = 0.01;
 const MOVES: f64 = 1e-3;
 
-/// Whether a run goes on moving from its end, in any state as that one's size has it: fields that
-/// almost cancel in one unit may not in another.
-fn moves_on(executor: &dyn Ask, run: &RunSpec, end: &[f64]) -> Result<bool, JobError> {
+/// Whether a run goes on moving from its end, in any state by more than this share of that one's
+/// size: fields that almost cancel in one unit may not in another.
+fn moves_on(executor: &dyn Ask, run: &RunSpec, end: &[f64], share: f64) -> Result<bool, JobError> {
     let further = RunSpec {
         start: end.to_vec(),
         t_end: FURTHER * run.t_end,
@@ -336,7 +389,7 @@ fn moves_on(executor: &dyn Ask, run: &RunSpec, end: &[f64]) -> Result<bool, JobE
     };
     let states = there.iter().zip(end).zip(&run.start);
     Ok(states.into_iter().any(|((there, end), start)| {
-        (there - end).abs() > MOVES * end.abs().max(start.abs()) + run.method.tolerance.atol
+        (there - end).abs() > share * end.abs().max(start.abs()) + run.method.tolerance.atol
     }))
 }
 
@@ -398,8 +451,11 @@ pub fn at_end(
         }
         _ => {}
     }
+    if let Some(rest) = at_intersection(executor, run, &end)? {
+        return Ok(Some(rest));
+    }
     let Some(rest) = near(&run.system, switch, &full(&end)) else { return Ok(None) };
-    if rest.eigenvalues.is_empty() && moves_on(executor, run, &end)? {
+    if rest.eigenvalues.is_empty() && moves_on(executor, run, &end, MOVES)? {
         return Ok(None);
     }
     let from = |x: &[f64]| distance(x, &rest.state[..n]);

@@ -439,5 +439,36 @@ mod tests {
                 assert_eq!(outcome(system, [x, 0.0], filippov, 600.0, section(1)), "rest", "{x}");
             }
         }
+        // Beside a second surface: off both, on one, and where both meet.
+        let two = |h: [&str; 2], [pp, mp, pm, mm]: [&str; 4]| {
+            cases::of(&format!(
+                "states = ['x', 'y']\nh = '{}'\nplus = [{pp}]\nminus = [{mp}]\n\
+                 [second]\nh = '{}'\nplus = [{pm}]\nminus = [{mm}]",
+                h[0], h[1]
+            ))
+        };
+        let focus = "'-0.1*(x - 5) - (y - 5)', 'x - 5 - 0.1*(y - 5)'";
+        let quadrant = || two(["x", "y"], [focus, "'1', '1'", "'0', '1'", "'1', '1'"]);
+        let [right, left] = ["'y', '-x - 0.5'", "'y', '-x + 0.5'"];
+        let stick = || two(["y", "x + 50"], [right, left, right, left]);
+        let twisting = || two(["x", "y"], ["'y', '-3'", "'y', '1'", "'y', '-1'", "'y', '3'"]);
+        let relays = || two(["x", "y"], ["'-1', '-1'", "'1', '-1'", "'-1', '1'", "'1', '1'"]);
+        for (system, start, axis) in [
+            (quadrant(), [3.0, 2.0], 0),
+            (stick(), [2.0, 0.0], 1),
+            (stick(), [10.3, 0.0], 1),
+            (twisting(), [1.0, 0.0], 0),
+            (twisting(), [1.5, -0.5], 1),
+            (relays(), [1.0, 2.0], 0),
+        ] {
+            let named = format!("{system:?} {start:?}");
+            assert_eq!(outcome(system, start, filippov, 300.0, section(axis)), "rest", "{named}");
+        }
+        // A limit cycle is none, wherever the second surface is.
+        let hopf = "'x - y - x*(x^2 + y^2)', 'x + y - y*(x^2 + y^2)'";
+        for far in ["y + 100", "y - 0.5"] {
+            let system = two(["x", far], [hopf; 4]);
+            assert_eq!(outcome(system, [0.3, 0.1], filippov, 900.0, section(1)), "period-1");
+        }
     }
 }
