@@ -808,7 +808,8 @@ const MOST_OF_SIZE: f64 = 1e6;
 fn scale_now(follower: &Follower, step: &Step, out: &mut Vec<f64>) {
     let options = follower.options;
     let span = options.t_end - options.t_start;
-    let is_lsoda = options.method == Method::Lsoda;
+    // (Implicit stages and series end there by themselves.)
+    let resolves = matches!(options.method, Method::Dopri5 | Method::Lsoda);
     let scale = |i: usize| {
         let size = step.x[i].abs().max(step.y[i].abs());
         match options.atol {
@@ -825,7 +826,7 @@ fn scale_now(follower: &Follower, step: &Step, out: &mut Vec<f64>) {
                 let known = follower.scale_of(i);
                 let before = follower.before[i];
                 let grows = before > 0.0 && step.x[i].abs() > before.max(0.5 * follower.size[i]);
-                let ends = grows && is_lsoda && step.h < AT_THE_END * step.t.abs();
+                let ends = grows && resolves && step.h < AT_THE_END * step.t.abs();
                 let most = if ends { MOST_OF_SIZE * before } else { f64::INFINITY };
                 let least = (0.1 * moved).max((1e-6 * span * speed).min(most));
                 // A rounding error without a bound leaves the old size.
@@ -1600,7 +1601,7 @@ impl<'a> Follower<'a> {
                     }
                 }
             } else if error.is_nan()
-                && tried == EXPLICIT
+                && (tried == EXPLICIT || self.t + 0.1 * length == self.t)
                 && step.explicit()
                 && self.begins_at_a_root(step)
             {

@@ -160,7 +160,8 @@ impl Step {
             return;
         }
         if let Some(jacobian) = self.jacobian.take() {
-            if !self.take_implicit(h, &jacobian, rhs) {
+            let settles = self.take_implicit(h, &jacobian, rhs, false);
+            if !settles && !self.take_implicit(h, &jacobian, rhs, true) {
                 self.y.fill(f64::NAN);
             }
             self.jacobian = Some(jacobian);
@@ -250,9 +251,15 @@ impl Step {
             .map_or(5.0, |c| (c.len() - 1) as f64)
     }
 
-    /// A step of Radau IIA: simplified Newton iterations for the three stages at once; false if
-    /// they do not settle.
-    fn take_implicit(&mut self, h: f64, jacobian: &[f64], rhs: &mut RightHandSide<'_>) -> bool {
+    /// A step of Radau IIA: simplified Newton iterations for the three stages at once, or with each
+    /// stage's own derivatives if they are `fresh`; false if they do not settle.
+    fn take_implicit(
+        &mut self,
+        h: f64,
+        jacobian: &[f64],
+        rhs: &mut RightHandSide<'_>,
+        fresh: bool,
+    ) -> bool {
         let n = self.x.len();
         let root = 6.0_f64.sqrt();
         let c = [0.1 * (4.0 - root), 0.1 * (4.0 + root), 1.0];
@@ -270,17 +277,22 @@ impl Step {
             [(16.0 - root) / 36.0, (16.0 + root) / 36.0, 1.0 / 9.0],
         ];
         let m = 3 * n;
-        let mut matrix = vec![0.0; m * m];
-        for (p, row) in a.iter().enumerate() {
-            for (q, a) in row.iter().enumerate() {
-                for i in 0..n {
-                    for j in 0..n {
-                        let one = if p == q && i == j { 1.0 } else { 0.0 };
-                        matrix[(p * n + i) * m + q * n + j] = one - h * a * jacobian[i * n + j];
+        let matrix_of = |jacobians: [&[f64]; 3]| {
+            let mut matrix = vec![0.0; m * m];
+            for (p, row) in a.iter().enumerate() {
+                for (q, a) in row.iter().enumerate() {
+                    for i in 0..n {
+                        for j in 0..n {
+                            let one = if p == q && i == j { 1.0 } else { 0.0 };
+                            let slope = jacobians[q][i * n + j];
+                            matrix[(p * n + i) * m + q * n + j] = one - h * a * slope;
+                        }
                     }
                 }
             }
-        }
+            matrix
+        };
+        let mut matrix = matrix_of([jacobian; 3]);
         let mut z = vec![0.0; m];
         let mut reach: Vec<f64> = (0..n)
             .map(|i| self.x[i].abs().max((h * self.k[0][i]).abs()).max(LEAST_STATE))
@@ -300,6 +312,15 @@ impl Step {
                     (0..n).for_each(|i| z[s * n + i] = c * h * self.k[0][i]);
                 }
                 continue;
+            }
+            if fresh && iteration > 0 {
+                let slopes: Vec<Vec<f64>> = (0..3)
+                    .map(|s| {
+                        let at: Vec<f64> = (0..n).map(|i| self.x[i] + z[s * n + i]).collect();
+                        slopes_beside(self.t + c[s] * h, &at, &f[s], jacobian, rhs)
+                    })
+                    .collect();
+                matrix = matrix_of([&slopes[0], &slopes[1], &slopes[2]]);
             }
             let mut right = vec![0.0; m];
             for p in 0..3 {
@@ -468,6 +489,31 @@ impl Step {
             out[i] = self.x[i] + theta * (a[i] + rest * (b[i] + theta * (c[i] + rest * d[i])));
         }
     }
+}
+
+/// The derivatives of a field with the value `f` by differences, or those given where a state is
+/// zero.
+fn slopes_beside(
+    t: f64,
+    at: &[f64],
+    f: &[f64],
+    given: &[f64],
+    rhs: &mut RightHandSide<'_>,
+) -> Vec<f64> {
+    /// Of a state.
+    const BESIDE: f64 = 1e-7;
+    let n = at.len();
+    let (mut beside, mut there) = (at.to_vec(), vec![0.0; n]);
+    let mut slopes = given.to_vec();
+    for j in (0..n).filter(|j| at[*j] != 0.0) {
+        beside[j] = at[j] + BESIDE * at[j];
+        rhs(t, &beside, &mut there);
+        for i in 0..n {
+            slopes[i * n + j] = (there[i] - f[i]) / (beside[j] - at[j]);
+        }
+        beside[j] = at[j];
+    }
+    slopes
 }
 
 #[cfg(test)]

@@ -4189,6 +4189,36 @@ fn no_method_crosses_a_pole() {
     }
 }
 
+/// Falls into a centre, which end in finite time at a speed that grows without bound: steps there
+/// are as short as the time's rounding, in which the speed's own growth is no size of it.
+#[test]
+fn falls_into_a_centre_end() {
+    let falls = [
+        "['v', '-1/x']",
+        "['v', '-1/x^3']",
+        "['v', '-3/x^2']",
+        "['v', '-1/x + 0.2*cos(t)']",
+        "['v', '-1/abs(x)^1.5']",
+    ];
+    for method in Method::ALL {
+        for f in falls {
+            for start in ["[1, 0]", "[0.5, 0]", "[0.73, -0.3]", "[2, 0]"] {
+                let text = format!("states = ['x', 'v']\nstart = {start}\nf = {f}");
+                let said = end_of(&text, 12.0, method).unwrap_err();
+                assert!(said.contains("leaves the domain"), "{method:?} {f} {start}: {said}");
+            }
+        }
+        for start in ["[1, 0, 0, 0]", "[0.7, 0, 0, 0]", "[2, 1, 0, 0]", "[3, -2, 0, 0]"] {
+            let text = format!(
+                "states = ['x', 'y', 'u', 'v']\nstart = {start}\n\
+                f = ['u', 'v', '-x/(x^2 + y^2)^1.5', '-y/(x^2 + y^2)^1.5']"
+            );
+            let said = end_of(&text, 15.0, method).unwrap_err();
+            assert!(said.contains("leaves the domain"), "{method:?} {start}: {said}");
+        }
+    }
+}
+
 /// Poles that the motion runs over at a finite speed, where steps end up as short as rounding: of
 /// each end of a run, since where steps fall depends on it.
 #[test]
@@ -5955,5 +5985,24 @@ fn powers_of_sizes_are_left_from_rest() {
         };
         let (powers, roots) = (swings("sign(v)*abs(v)^1.5"), swings("v*sqrt(abs(v))"));
         assert!(powers.iter().zip(roots).all(|(a, b)| (a - b).abs() < 1e-7), "{method:?}");
+    }
+}
+
+/// Tanks that stand empty and are filled again: at first by as much as their outlets take, so that
+/// the stages of implicit steps depend on their own roots.
+#[test]
+fn empty_tanks_are_filled_by_every_method() {
+    let weir = "states = ['h', 'g']\nstart = [0.2, 0]\nf = ['0.3 - if(h > 0.5, 0.5*(h - 0.5), 0)',\
+        'if(h > 0.5, 0.5*(h - 0.5), 0) - 0.3*sqrt(max(g, 0))']";
+    let tides = "states = ['h']\nstart = [0.2]\nf = ['max(sin(t), 0) - 2*sqrt(max(h, 0))']";
+    for method in Method::ALL {
+        let end = |text: &str, t_end: f64| {
+            end_of(text, t_end, method).unwrap_or_else(|e| panic!("{method:?}: {e}"))
+        };
+        // h - 0.5 = 0.6 (1 - exp(-(t - 1)/2)) from t = 1 on.
+        let x = end(weir, 3.0);
+        near(x[0], 0.5 + 0.6 * (1.0 - (-1.0_f64).exp()), 1e-9);
+        near(x[1], 0.112_506_888_4, 1e-8);
+        near(end(tides, 38.0)[0], 0.011_927_267_3, 1e-8);
     }
 }

@@ -97,13 +97,26 @@ impl Question for GeneralOrbit {
         };
         if let Return::Period(period) = self.after {
             self.has_period(&model, period)?;
+            if let Some(along) = &self.along {
+                self.keeps_period(along, period)?;
+            }
             options.t_end = options.t_start + period;
         }
         if settle > 0.0 {
             let begin = options.clone();
-            let (mut settled, rest) = self.rest_after(&model, &begin, (settle, STILL), monitor)?;
+            let (mut settled, rest, unknown) =
+                self.rest_after(&model, &begin, (settle, STILL), monitor)?;
             if let Some(rest) = rest {
                 return Ok(at_rest(&model.coordinates(), &rest));
+            }
+            if let Some(end) = settled.as_ref().filter(|_| unknown) {
+                return Err(HybridError::NoOrbit(format!(
+                    "the motion comes to rest at {:?} (it moves by less than {STILL:e} of its size \
+                        in {} of time) and closes no orbit; no rest with eigenvalues is known there",
+                    end.x,
+                    STAYS * settle
+                ))
+                .into());
             }
             for times in 0..=LONGER {
                 let longer = 1.0 + f64::from(times) * LONGER_BY;
@@ -249,17 +262,37 @@ impl GeneralOrbit {
         }
     }
 
+    /// Refuses a parameter that changes the period of what depends on the time.
+    fn keeps_period(&self, along: &Along, period: f64) -> Result<(), JobError> {
+        for part in [0.382, 1.0] {
+            let value = along.from + part * (along.to - along.from);
+            let model = at(&self.run.model, along, value)?;
+            if self.has_period(&model, period).is_err() {
+                let name = &along.parameter;
+                return Err(HybridError::Bad(format!(
+                    "--along {name}: at {name} = {value} the equations are not the same {period} \
+                        later, as they are at {}: measure time in periods of what depends on it \
+                        (with its frequency w divide f by w and write sin(t) for sin(w*t))",
+                    along.from
+                ))
+                .into());
+            }
+        }
+        Ok(())
+    }
+
     /// The motion's end after a time, and the attracting rest from which it moves no farther then
-    /// than a part of its states' size, if there is one; of what is driven neither.
+    /// than a part of its states' size, if there is one, or whether it stays where no rest is known,
+    /// as at a root's zero; nothing of what is driven.
     fn rest_after(
         &self,
         model: &Model,
         from: &Options,
         (time, within): (f64, f64),
         monitor: &dyn Monitor,
-    ) -> Result<(Option<Outcome>, Option<Rest>), JobError> {
+    ) -> Result<(Option<Outcome>, Option<Rest>, bool), JobError> {
         if model.is_driven() {
-            return Ok((None, None));
+            return Ok((None, None, false));
         }
         let options = Options {
             t_end: from.t_start + time,
@@ -279,9 +312,11 @@ impl GeneralOrbit {
         }
         let there = Options { start: Some(end.x.clone()), mode: end.mode, ..options };
         let rest = if rests { rest_near(model, &there)? } else { None };
+        let unknown = rests && rest.is_none();
         Ok((
             Some(end),
             rest.filter(|rest| matches!(rest.stability, Stability::Attracts | Stability::ToASet)),
+            unknown,
         ))
     }
 
@@ -742,6 +777,47 @@ mod tests {
         }
         assert_eq!(changes.words("change").collect::<Vec<_>>(), ["period-doubling"]);
         assert!((changes.numbers("c")[0] - 2.0).abs() < 1e-6, "{:?}", changes.numbers("c"));
+    }
+
+    /// Super-twisting comes to rest in finite time at a root's zero, which has no eigenvalues: an
+    /// orbit of rounding is none.
+    #[test]
+    fn rest_at_a_root_is_no_orbit() {
+        let text = "states = ['x', 'y']\nstart = [1, 0]\n\
+            f = ['y - 1.5*sign(x)*sqrt(abs(x))', '-1.1*sign(x)']";
+        for section in ["y", "x", "x - 0.5", "y - 0.1"] {
+            let mut run = run(text, 100.0);
+            run.options.record = Record::Section(expression(section, &run.model).unwrap());
+            let after = Return::Crossings(1);
+            let question = GeneralOrbit { run, settle: 100.0, after, along: None };
+            let said = Executor::quiet().ask(&question).unwrap_err().to_string();
+            assert!(said.contains("the motion comes to rest at ["), "{section}: {said}");
+        }
+    }
+
+    #[test]
+    fn a_branch_keeps_its_period() {
+        let two_pi = 2.0 * std::f64::consts::PI;
+        for (f, events, period) in [
+            ("-x + sin(w*t)", "", two_pi),
+            ("-x + if(mod(t, w) < 0.5, 1, 0)", "", 1.0),
+            ("-x", "[[event]]\nevery = 'w'\nset = { x = 'x + 1' }", 1.0),
+        ] {
+            let text =
+                format!("states = ['x']\nstart = [0]\nf = ['{f}']\n[parameters]\nw = 1\n{events}");
+            let after = Return::Period(period);
+            let along = along("w", 1.0, 1.5);
+            let question = GeneralOrbit { run: run(&text, 1e3), settle: 0.0, after, along };
+            let said = Executor::quiet().ask(&question).unwrap_err().to_string();
+            assert!(said.contains("measure time in periods"), "{f}: {said}");
+        }
+        // In the drive's own time: the amplitude of the linear answer, at phase zero.
+        let text = "states = ['x']\nstart = [0]\nf = ['(sin(t) - x)/w']\n[parameters]\nw = 1";
+        let found = branch(text, two_pi, 100.0, along("w", 1.0, 1.5));
+        let table = found.table("branch").unwrap();
+        for (w, x) in table.numbers("w").iter().zip(table.numbers("x")) {
+            assert!((x + w / (1.0 + w * w)).abs() < 1e-8, "{w}: {x}");
+        }
     }
 
     fn branch(text: &str, period: f64, settle: f64, along: Option<Along>) -> Arc<Answer> {

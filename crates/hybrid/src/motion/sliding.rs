@@ -1129,7 +1129,7 @@ impl Follower<'_> {
 
 impl Follower<'_> {
     /// Second derivatives that are no numbers, as that of x |x|^0.6 at zero, by how much the first
-    /// ones change a little later.
+    /// ones change a little later; but for those that grow without bound, as at a root's zero.
     fn bend_by_difference(
         &self,
         compiled: &Compiled,
@@ -1139,20 +1139,24 @@ impl Follower<'_> {
         second: &mut [f64],
     ) {
         /// Of the run, or of the time in which a state moves by its size.
-        const LATER: f64 = 1e-9;
+        const LATER: [f64; 2] = [1e-12, 1e-9];
         let n = self.n;
         let times = field.iter().zip(&self.size).map(|(f, size)| size / f.abs());
         let span = self.options.t_end - self.options.t_start;
-        let later = LATER * times.filter(|time| *time > 0.0).fold(span, f64::min);
-        let mut variables = self.load(config);
-        (0..n).for_each(|i| variables[i] += later * field[i]);
-        variables[n] += later;
-        let mut then = vec![0.0; n];
-        compiled.field.evaluate(&variables, &mut then);
-        let rates = Self::along(compiled, &variables, &then);
-        for ((second, first), rate) in second.iter_mut().zip(first).zip(rates) {
-            if second.is_nan() {
-                *second = (rate - first) / later;
+        let whole = times.filter(|time| *time > 0.0).fold(span, f64::min);
+        let [near, far] = LATER.map(|part| {
+            let later = part * whole;
+            let mut variables = self.load(config);
+            (0..n).for_each(|i| variables[i] += later * field[i]);
+            variables[n] += later;
+            let mut then = vec![0.0; n];
+            compiled.field.evaluate(&variables, &mut then);
+            let rates = Self::along(compiled, &variables, &then);
+            rates.iter().zip(first).map(|(rate, first)| (rate - first) / later).collect::<Vec<_>>()
+        });
+        for ((second, near), far) in second.iter_mut().zip(near).zip(far) {
+            if second.is_nan() && near.abs() <= 2.0 * far.abs() {
+                *second = far;
             }
         }
     }
