@@ -112,7 +112,8 @@ impl Question for GeneralOrbit {
             if let Some(end) = settled.as_ref().filter(|_| unknown) {
                 return Err(HybridError::NoOrbit(format!(
                     "the motion comes to rest at {:?} (it moves by less than {STILL:e} of its size \
-                        in {} of time) and closes no orbit; no rest with eigenvalues is known there",
+                        in {} of time) and closes no orbit; no rest with eigenvalues is known \
+                        there",
                     end.x,
                     STAYS * settle
                 ))
@@ -282,8 +283,8 @@ impl GeneralOrbit {
     }
 
     /// The motion's end after a time, and the attracting rest from which it moves no farther then
-    /// than a part of its states' size, if there is one, or whether it stays where no rest is known,
-    /// as at a root's zero; nothing of what is driven.
+    /// than a part of its states' size, if there is one, or whether it stays where no rest is
+    /// known, as at a root's zero; nothing of what is driven.
     fn rest_after(
         &self,
         model: &Model,
