@@ -142,6 +142,7 @@ where
         events: 0,
         statistics: Statistics { highest_order: 5, ..Statistics::default() },
         accumulation: Accumulation::default(),
+        tightened: false,
         size: x0.abs(),
         speed: SVector::zeros(),
         stop: None,
@@ -520,6 +521,8 @@ struct Limits {
     /// A field is zero at a point of the surface below this share of the speed of the motion
     /// before: a root of the rounding, for fields that are no smoother than sqrt(|h|) there.
     rest: f64,
+    /// Smallest relative tolerance of a flight.
+    finest: f64,
     /// The end of a run is reached within so many spacings of the numbers there.
     end: f64,
     /// A sliding step that advances time by no more than this share of it is idle.
@@ -583,6 +586,7 @@ const LIMITS: Limits = Limits {
     zeno_left: 1e-10,
     zeno_shrunk: 0.1,
     rest: 1e-7,
+    finest: 16.0 * f64::EPSILON,
     end: 4.0 * f64::EPSILON,
     idle: 4.0 * f64::EPSILON,
     idle_steps: 32,
@@ -663,6 +667,8 @@ struct Engine<'a, P, const N: usize> {
     speed: SVector<f64, N>,
     stop: Option<StopReason>,
     steps_until_watch: u32,
+    /// Whether the next flight is integrated with the squares of the tolerances.
+    tightened: bool,
     /// Set where a field has no value beyond the surface: how near to it fields are asked (see
     /// [`Sided`]).
     depth: Option<f64>,
@@ -944,9 +950,20 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         Ok(State::Rest)
     }
 
-    /// Whether the motion may stay at the present state.
+    /// Whether the motion may stay at the present state. The fields are known up to their change
+    /// over the rounding of h.
     fn rests_here(&self) -> bool {
-        self.rests_at(&self.x, &(self.speed * LIMITS.rest))
+        let (x, slope) = (self.x, gradient(self.system, &self.x));
+        let blurred = slope * (self.blur(&x) / slope.norm_squared());
+        let beside = [(Side::Plus, x + blurred), (Side::Minus, x - blurred)];
+        let below = beside.into_iter().fold(self.speed * LIMITS.rest, |below, (side, y)| {
+            let there = match side {
+                Side::Plus => self.system.plus(&y),
+                Side::Minus => self.system.minus(&y),
+            };
+            below.zip_map(&(there - self.velocity(side)), |b, change| b.max(change.abs()))
+        });
+        self.rests_at(&x, &below)
     }
 
     /// Both fields are one here, along the surface, and without a derivative across it: the sides
@@ -1252,7 +1269,12 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         let tape = &self.fields[place].0;
         let h = || Tape::record(N, |x| vec![self.system.switching(&SVector::from_column_slice(x))]);
         let gates = self.gates[place].take().unwrap_or_else(|| Gates::of_side(tape.clone(), &h()));
-        let tolerance = self.accumulation.tolerance(self.settings.tolerance);
+        let Tolerance { rtol, atol } = self.settings.tolerance;
+        let tolerance = if self.tightened {
+            Tolerance { rtol: (rtol * rtol).max(LIMITS.finest), atol: atol * atol }
+        } else {
+            self.accumulation.tolerance(self.settings.tolerance)
+        };
         let mut method = Automatic::new(tolerance, gates);
         let next = self.fly_by(&mut method, side, start);
         self.gates[place] = Some(method.into_gates());
@@ -1408,6 +1430,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
 
     /// The mode after an arrival on the surface from `side`.
     fn land(&mut self, side: Side, touch: bool) -> Result<State<N>, FilippovError> {
+        let tightened = std::mem::take(&mut self.tightened);
         let l = self.lie_on_surface();
         let from = Some(side.into());
         if let Some(local) = self.two_fold_here(&l) {
@@ -1440,6 +1463,13 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                 true => self.tangency(&l, side).left(),
                 false => (own_second > 0.0).then_some(FlightStart::Transversal(own)),
             };
+            // A root begins at the surface, and its motion is known no better than the root of the
+            // tolerance.
+            let is_root = !tangent && !own_second.is_finite();
+            if is_root && !tightened && !self.rests_here() {
+                self.tightened = true;
+                return Ok(State::Free { side, start: FlightStart::Transversal(own) });
+            }
             let Some(start) = start else {
                 return self
                     .degenerate(from, "a tangency from an invisible or degenerate side (a cusp)");

@@ -855,6 +855,29 @@ fn an_empty_tank_stays_empty_beside_what_moves() {
     assert!(at(["'-sqrt(abs(x))', '1'", "'sqrt(abs(x))', '2'"]).is_err());
 }
 
+/// Super-twisting, x' = y - a sqrt(|x - c|) sign(x - c), y' = -b sign(x - c): it comes to (c, 0) in
+/// finite time and stays there.
+#[test]
+fn super_twisting_comes_to_rest_at_any_target() {
+    for (a, b) in [(1.5, 1.1), (3.0, 1.1), (2.0, 1.5)] {
+        for c in [0.0, 0.1, 1.0, 2.0, 20.0, 1000.0] {
+            // The root of the rounding of x - c, and the share of the speed that is none.
+            let known = a * (64.0 * f64::EPSILON * c).sqrt() + 1e-7 * a;
+            for from in [1.0, 1e-2, 3e-3, 1e-3, -0.7] {
+                let root = format!("{a}*sqrt(abs(x - {c}))");
+                let [down, up] = [format!("'y - {root}', '-{b}'"), format!("'y + {root}', '{b}'")];
+                for tolerance in [1e-8, 1e-10] {
+                    let (h, start) = (format!("x - {c}"), [c + from, 0.0]);
+                    let end = plane_within(tolerance, [&h, &down, &up], start, 30.0)
+                        .unwrap_or_else(|e| panic!("{tolerance} {h} {down} {from}: {e}"));
+                    let off = (end.x[0] - c).abs().max(end.x[1].abs());
+                    assert!(off < known, "{tolerance} {h} {down} {from}: {}", end.x);
+                }
+            }
+        }
+    }
+}
+
 /// Where a piece of the motion becomes stiff another method goes on from there, and not from the
 /// piece's beginning: in flight and in sliding.
 #[test]
