@@ -1578,6 +1578,10 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                     self.count(&before);
                     return Ok(State::Sliding(sliding));
                 }
+                Err(_) if !sliding.repelling && self.rests_here() => {
+                    self.count(&before);
+                    return Ok(State::Rest);
+                }
                 Err(failure) => {
                     let seen = || in_time::<N>(failure, t_base);
                     return Err(self.cause_on_surface().unwrap_or_else(seen).into());
@@ -1599,6 +1603,10 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                     clock: (step.x0[N], z[N]),
                 };
                 self.take(mode, t, x, &interpolant);
+                if !sliding.repelling && self.rests_here() {
+                    self.count(&method.statistics());
+                    return Ok(State::Rest);
+                }
                 return Err(Failure::Undefined { t, state: Failure::state(&x), what }.into());
             }
             let theta = end.map_or(1.0, |(theta, _)| theta);

@@ -855,6 +855,24 @@ fn an_empty_tank_stays_empty_beside_what_moves() {
     assert!(at(["'-sqrt(abs(x))', '1'", "'sqrt(abs(x))', '2'"]).is_err());
 }
 
+/// Two tanks, the upper one into the lower one: x empties at t = 8, and y, from the level y(8) that
+/// a run until then has, 10 sqrt(y(8)) later. There the domain of sqrt(y) ends.
+#[test]
+fn sliding_rests_where_the_root_of_another_state_ends() {
+    let faces = ["x", "'-0.5*sqrt(x)', '0.5*sqrt(x) - 0.2*sqrt(y)'", "'0', '-0.2*sqrt(y)'"];
+    for tolerance in [1e-6, 1e-8, 1e-10] {
+        let level = plane_within(tolerance, faces, [4.0, 2.0], 10.0).unwrap().x[1];
+        let before = 10.0 + 10.0 * level.sqrt() - 1.0;
+        let end = plane_within(tolerance, faces, [4.0, 2.0], before).unwrap();
+        assert!((end.x[1] - 0.01).abs() < 1e3 * tolerance, "{}", end.x);
+        let end = plane_within(tolerance, faces, [4.0, 2.0], 60.0).unwrap();
+        assert!(end.t == 60.0 && end.x[0] == 0.0 && end.x[1].abs() < 1e-20, "{}", end.x);
+    }
+    // What still moves at the end of a domain does not rest.
+    let faces = ["x", "'-1', '-0.2*sqrt(y) - 0.01'", "'1', '-0.2*sqrt(y) - 0.01'"];
+    assert!(plane(faces, [1.0, 2.0], 60.0).is_err());
+}
+
 /// Super-twisting, x' = y - a sqrt(|x - c|) sign(x - c), y' = -b sign(x - c): it comes to (c, 0) in
 /// finite time and stays there.
 #[test]
