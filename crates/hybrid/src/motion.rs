@@ -404,7 +404,12 @@ impl Train {
         if n > 64 {
             self.times.remove(0);
         }
-        let n = self.times.len().min(n);
+        self.told(t, grain)
+    }
+
+    /// The same of those that are noted.
+    fn told(&self, t: f64, grain: f64) -> Option<(f64, f64)> {
+        let n = self.times.len();
         if n < 6 {
             return None;
         }

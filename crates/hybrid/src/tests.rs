@@ -6006,3 +6006,23 @@ fn empty_tanks_are_filled_by_every_method() {
         near(end(tides, 38.0)[0], 0.011_927_267_3, 1e-8);
     }
 }
+
+/// Twisting comes to rest in finite time, at a target other than zero, too, beside which turns that
+/// are shorter than rounding tells do not shrink any more.
+#[test]
+fn twisting_comes_to_rest_at_its_target() {
+    for method in Method::ALL {
+        for (a, b) in [(2.0, 1.0), (3.0, 2.0), (5.0, 1.0), (10.0, 7.0)] {
+            for target in [0.0, 0.3, 2.0, 50.0, -7.0] {
+                let text = format!(
+                    "states = ['x', 'v']\nstart = [{}, -0.5]\n\
+                    f = ['v', '-{a}*sign(x - ({target})) - {b}*sign(v)']",
+                    target + 1.0
+                );
+                let x = end_of(&text, 60.0, method).unwrap_or_else(|e| panic!("{method:?}: {e}"));
+                near(x[0], target, 1e-7);
+                near(x[1], 0.0, 1e-7);
+            }
+        }
+    }
+}

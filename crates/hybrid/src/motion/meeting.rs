@@ -144,7 +144,7 @@ impl Follower<'_> {
                 self.sliding.iter().copied().filter(|g| zero.contains(g)).collect();
             self.adopt(config, rest);
         }
-        let mut accumulates = None;
+        let (mut accumulates, mut unresolved) = (None, None);
         let stepped = std::mem::take(&mut self.tables_step);
         let switches = stepped || !(crossed.is_empty() && leave.is_empty());
         if !crossed.is_empty() {
@@ -172,6 +172,12 @@ impl Follower<'_> {
                     continue;
                 }
                 let found = self.switch_trains[guard].note(self.t, 0.0);
+                if found.is_none() && self.switch_trains[guard].shrinks(self.t) {
+                    // Turns that are not resolved any more end where the motion rests.
+                    let grain = self.grain_of_switch(guard);
+                    let limit = self.switch_trains[guard].told(self.t, grain);
+                    unresolved = unresolved.or(limit.map(|(t, _)| t));
+                }
                 if let Some((t, error)) = found
                     && accumulates.is_none()
                     && !self.is_kink(guard)
@@ -226,6 +232,12 @@ impl Follower<'_> {
         // Switches that come ever faster with events, such as speeds that turn between impacts, end
         // where these do.
         let by_events = self.trains.iter().any(|train| train.shrinks(self.t));
+        if let Some(t) = unresolved.filter(|_| fired.is_empty() && !by_events)
+            && accumulates.is_none()
+            && self.comes_to_rest(t, false)
+        {
+            return Ok(None);
+        }
         if let Some((guard, t, error)) = accumulates.filter(|_| fired.is_empty() && !by_events) {
             if self.comes_to_rest(t, false) {
                 return Ok(None);
@@ -947,24 +959,32 @@ impl Follower<'_> {
     /// that are zero here.
     fn grain(&mut self, event: usize) -> f64 {
         let (compiled, rates) = self.rates_of_second_order(&self.config.clone());
-        let flight = |follower: &Self, place: usize, e: &Expression| {
-            let bend = rates.second[place].abs();
-            let rounding = 0.25 * follower.grain_of_expression(e, rates.terms[place]);
-            // A parabola of height bend*g^2/8.
-            if bend > 0.0 { (8e3 * rounding / bend).sqrt() } else { 0.0 }
-        };
         if let Some(watched) = self.event_of.iter().position(|e| *e == Some(event)) {
             let e = &self.equation.watched[watched];
-            return flight(self, compiled.active.len() + watched, e);
+            return self.shortest_flight(&rates, compiled.active.len() + watched, e);
         }
         let asked = self.equation.of_events[event].iter();
         asked
             .filter(|guard| self.side_of(**guard).is_none())
             .filter_map(|guard| {
                 let place = compiled.place(*guard)?;
-                Some(flight(self, place, &self.equation.guards[*guard].expression))
+                Some(self.shortest_flight(&rates, place, &self.equation.guards[*guard].expression))
             })
             .fold(0.0, f64::max)
+    }
+
+    /// The same of a switching function that is zero here.
+    fn grain_of_switch(&mut self, guard: usize) -> f64 {
+        let (compiled, rates) = self.rates_of_second_order(&self.config.clone());
+        let Some(place) = compiled.place(guard) else { return 0.0 };
+        self.shortest_flight(&rates, place, &self.equation.guards[guard].expression)
+    }
+
+    fn shortest_flight(&self, rates: &Rates, place: usize, e: &Expression) -> f64 {
+        let bend = rates.second[place].abs();
+        let rounding = 0.25 * self.grain_of_expression(e, rates.terms[place]);
+        // A parabola of height bend*g^2/8.
+        if bend > 0.0 { (8e3 * rounding / bend).sqrt() } else { 0.0 }
     }
 
     /// Bodies that lie without a speed at surfaces on which motion may stick, and are pressed
