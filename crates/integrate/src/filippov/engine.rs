@@ -1016,7 +1016,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             |f: &dyn Fn(&SVector<f64, N>) -> SVector<f64, N>| (f(&self.x) - f(&point)).abs();
         let (plus, minus) = (change(&|x| self.system.plus(x)), change(&|x| self.system.minus(x)));
         let below = plus.zip_map(&minus, |a, b| 10.0 * a.max(b));
-        if !self.rests_at(&point, &below) {
+        let rests = self.rests_at(&point, &below);
+        if !rests && !self.attracts_beside(&point) {
             return Err(FilippovError::Zeno {
                 t: self.t,
                 state: Failure::state(&self.x),
@@ -1027,9 +1028,18 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         }
         let straight = Straight { system: self.system, from: self.x, to: point };
         self.take(side.into(), up_to(self.t_end, self.t + left).min(self.t_end), point, &straight);
-        let rest = Mode::SlidingAttracting;
-        self.event(EventKind::Accumulation { leg: left }, Some(side.into()), Some(rest));
-        Ok(State::Rest)
+        self.accumulation = Accumulation::default();
+        let mode = Mode::SlidingAttracting;
+        self.event(EventKind::Accumulation { leg: left }, Some(side.into()), Some(mode));
+        Ok(if rests { State::Rest } else { State::Sliding(Sliding::ATTRACTING) })
+    }
+
+    /// Whether both fields lead to the surface beside `x`, a state on it: they are seen there, each
+    /// on its own side, from here on.
+    fn attracts_beside(&mut self, x: &SVector<f64, N>) -> bool {
+        self.stay_inside();
+        let l = self.lie(x);
+        l.p < -l.zero_p && l.q > l.zero_q
     }
 
     /// Begins on the surface in a mode that is known.

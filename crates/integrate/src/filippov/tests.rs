@@ -896,6 +896,37 @@ fn super_twisting_comes_to_rest_at_any_target() {
     }
 }
 
+/// Super-twisting beside a state that moves: from the accumulation of the crossings on, x and y
+/// stay at zero, and z goes on with the common velocity, or with the mean of both.
+#[test]
+fn what_stands_beside_super_twisting_goes_on() {
+    for (plus, minus, want) in [
+        ("1", "1", 0.5 + 4.0),
+        ("1 - z", "1 - z", 1.0 - 0.5 * (-4.0_f64).exp()),
+        ("2*z", "2*z", 0.5 * 8.0_f64.exp()),
+        ("-z", "-z", 0.5 * (-4.0_f64).exp()),
+        // z' = 2 + y'/1.1.
+        ("1", "3", 0.5 + 8.0),
+    ] {
+        let [down, up] = [("-", plus), ("+", minus)].map(|(sign, moves)| {
+            let y = if sign == "-" { "-1.1" } else { "1.1" };
+            format!("['y {sign} 1.5*sqrt(abs(x))', '{y}', '{moves}']")
+        });
+        let text = format!(
+            "states = ['x', 'y', 'z']\nstart = [1, 0, 0]\nh = 'x'\nplus = {down}\nminus = {up}"
+        );
+        let text = twofold_system::Definition::from_toml(&text, "").unwrap();
+        let bound: Bound<3> = System::new(text).bind().unwrap();
+        let settings = FilippovOptions::default();
+        let mut seen = Trajectory::new(1);
+        let start = Vector3::new(1.0, 0.0, 0.5);
+        let end = run(&bound, start, 4.0, &settings, ExitRule::Undecided, &mut seen);
+        let end = end.unwrap_or_else(|e| panic!("{plus}: {e}"));
+        let off = (end.x[2] - want).abs() / want;
+        assert!(end.x[0] == 0.0 && end.x[1].abs() < 1e-7 && off < 1e-6, "{plus}: {}", end.x);
+    }
+}
+
 /// Where a piece of the motion becomes stiff another method goes on from there, and not from the
 /// piece's beginning: in flight and in sliding.
 #[test]
