@@ -868,7 +868,7 @@ fn sliding_rests_where_the_root_of_another_state_ends() {
         let end = plane_within(tolerance, faces, [4.0, 2.0], 60.0).unwrap();
         assert!(end.t == 60.0 && end.x[0] == 0.0 && end.x[1].abs() < 1e-20, "{}", end.x);
     }
-    // What still moves at the end of a domain does not rest.
+    // A state that still moves at the end of a domain does not rest.
     let faces = ["x", "'-1', '-0.2*sqrt(y) - 0.01'", "'1', '-0.2*sqrt(y) - 0.01'"];
     assert!(plane(faces, [1.0, 2.0], 60.0).is_err());
 }
