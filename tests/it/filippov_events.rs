@@ -161,8 +161,7 @@ fn crossings_accumulate_at_a_rest_and_the_motion_stays() {
     }
 }
 
-/// Crossings that accumulate where the motion does not stay are still refused: a drift along the
-/// surface.
+/// Crossings that accumulate beside a state that drifts along the surface: it goes on.
 #[test]
 fn accumulation_where_the_motion_goes_on_is_no_rest() {
     let text = "states = [\"x\", \"y\", \"z\"]\nstart = [1, 0, 0]\nh = \"x\"\n\
@@ -170,17 +169,11 @@ fn accumulation_where_the_motion_goes_on_is_no_rest() {
                 1.5*sqrt(abs(x))\", \"1.1\", \"1\"]\n";
     let system: Bound<3> =
         System::new(Definition::from_toml(text, "drift.toml").unwrap()).bind().unwrap();
-    match go(&system, Vector3::new(1.0, 0.0, 0.0), 20.0, &settings(1e-10)).0 {
-        Err(FilippovError::Zeno { accumulates, .. }) => {
-            assert!((accumulates - 1.7414).abs() < 1e-3, "{accumulates}")
-        }
-        // Or the right motion: on x = y = 0 with z = t.
-        Ok(end) => assert!(
-            end.x[0].abs() < 1e-8 && end.x[1].abs() < 1e-8 && (end.x[2] - 20.0).abs() < 1e-6,
-            "{end:?}"
-        ),
-        Err(other) => panic!("{other}"),
-    }
+    let end = go(&system, Vector3::new(1.0, 0.0, 0.0), 20.0, &settings(1e-10)).0.unwrap();
+    assert!(
+        end.x[0].abs() < 1e-8 && end.x[1].abs() < 1e-8 && (end.x[2] - 20.0).abs() < 1e-6,
+        "{end:?}"
+    );
 }
 
 /// A body that falls on a surface exactly at the end of the run, or a rounding before or after it.
