@@ -452,10 +452,22 @@ impl Failure {
         let rate = growth(&state, &derivative);
         let size = state.iter().fold(0.0_f64, |a, x| a.max(x.abs()));
         let scale = 1.0 + t.abs();
-        let soon = ahead(0.5 / rate);
-        let faster = growth(&soon, &field(&soon));
-        let accelerates = faster.is_nan() || faster > 1.2 * rate;
-        let unbounded = size > 1e100 || size > 1e3 && rate * scale > 1e3 && accelerates;
+        // Faster in each of so many growths by a half, or until it is nearly beyond the numbers.
+        let accelerates = |growths: usize| {
+            let (mut x, mut f, mut rate) = (state.clone(), derivative.clone(), rate);
+            (0..growths).all(|_| {
+                if rate > HUGE {
+                    return true;
+                }
+                x.iter_mut().zip(&f).for_each(|(x, f)| *x += 0.5 / rate * f);
+                f = field(&x);
+                let before = std::mem::replace(&mut rate, growth(&x, &f));
+                rate > 1.2 * before
+            })
+        };
+        let unbounded = size > HUGE
+            || size > 1e3 && rate * scale > 1e3 && accelerates(1)
+            || rate * scale > AT_ONCE && accelerates(LONG);
         // Powers of 2 times the spacing of numbers. What grows without bound comes to the end of
         // some domain, too, but later.
         let last = if unbounded { (GROWTHS / rate).min(far * scale) } else { far * scale };
@@ -505,6 +517,12 @@ impl Failure {
     }
 }
 
+/// A number of this size is on its way out of the numbers.
+const HUGE: f64 = 1e100;
+/// Growths of a state by itself in a time of 1 + t that leave no steps to be made, whatever its
+/// size is; and in how many of them by a half a solution that ends there accelerates.
+const AT_ONCE: f64 = 1e10;
+const LONG: usize = 20;
 /// In so many times of its growth a solution that grows without bound beside the end of a domain
 /// comes there.
 const GROWTHS: f64 = 20.0;
@@ -528,6 +546,8 @@ mod tests {
     use nalgebra::Vector2;
 
     use super::*;
+    use twofold_num::tape::Recorded;
+    use twofold_num::{Arithmetic, Elementary};
 
     #[test]
     fn work_adds_up() {
@@ -559,6 +579,30 @@ mod tests {
                 highest_order: 6,
             };
             assert_eq!(sum, all);
+        }
+    }
+
+    /// exp(x), 1 + exp(x/3) and x^2 leave the numbers; the others have a bound, however fast they
+    /// come to it.
+    #[test]
+    fn what_grows_without_bound_is_told_from_what_is_fast() {
+        type Right = fn(Recorded, fn(f64) -> Recorded) -> Recorded;
+        let cases: [(Right, f64, bool); 8] = [
+            (|x, _| x.exp(), 36.0, true),
+            (|x, c| c(1.0) + (x / c(3.0)).exp(), 105.0, true),
+            // Mixed as a smooth switch mixes fields: beyond the numbers infinities cancel.
+            (|x, c| x.exp() + (x.exp() - x.exp()) * c(0.5), 36.0, true),
+            (|x, _| x * x, 1e14, true),
+            (|x, c| c(1e16) * x * x, 1e-3, true),
+            (|x, c| c(1e16) * x * x * (c(1.0) - x), 1e-3, false),
+            (|x, c| c(1e16) * (c(1.0) - x), 0.5, false),
+            (|x, c| c(1e16) * x.sin(), 36.0, false),
+        ];
+        for (k, (f, x, wanted)) in cases.into_iter().enumerate() {
+            let tape = Tape::record(1, |x| vec![f(x[0], Recorded::from_f64)]);
+            let failure = Failure::StepUnderflow { t: 0.6, h: 1e-16, state: vec![x] };
+            let found = failure.diagnosed(&tape);
+            assert_eq!(matches!(found, Failure::Unbounded { .. }), wanted, "{k}: {found:?}");
         }
     }
 
