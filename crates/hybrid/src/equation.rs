@@ -250,7 +250,7 @@ impl Equation {
             let known = e.names().into_iter().all(|name| values.contains_key(name)) && !asks(e);
             known.then(|| evaluate(e, &|name| values.get(name).copied()))
         };
-        // What parameters decide: powers with a whole exponent, and kinks of constants.
+        // Parameters decide powers with a whole exponent, and kinks of constants.
         let decided = |e: Expression| match &e {
             Expression::RealPower(base, exponent) => match value(exponent) {
                 Some(n) if n.fract() == 0.0 && n.abs() <= f64::from(MAX_EXPONENT) => {
@@ -1270,7 +1270,7 @@ impl Equation {
     }
 }
 
-/// What is told of an expression that overflows.
+/// Words for an expression that overflows.
 pub(crate) const OVERFLOW: &str = "a number beyond the range of double precision";
 
 /// Whether a logarithm stands in a power, exp(b ln a).

@@ -804,9 +804,9 @@ const NO_LONGER: f64 = 1.5;
 
 /// A speed counts up to so many times the mean one of a step, which that of t^12 is well within.
 const MOST_OF_MEAN: f64 = 1e3;
-/// What a state moves in a part of the run counts for its size up to so many times the one before,
-/// in steps below this part of the time.
+/// Steps below this part of the time are those at the end of a solution that grows without bound.
 const AT_THE_END: f64 = 1e-12;
+/// There a state's way in a part of the run counts for its size up to so many times the one before.
 const MOST_OF_SIZE: f64 = 1e6;
 
 /// Scale of each state's error in a step.

@@ -5920,7 +5920,7 @@ fn no_method_goes_on_behind_a_logarithmic_blow_up() {
     }
 }
 
-/// What rests at a root's zero is moved by the clock again, and events and sections of the time
+/// Motion that rests at a root's zero is moved by the clock again; events and sections of the time
 /// are met meanwhile.
 #[test]
 fn the_clock_is_asked_while_everything_rests() {
