@@ -459,14 +459,18 @@ impl Equation {
     /// The states that decide, in a mode, how these guards move: those that they see, and that the
     /// equations of such states see. None if the time or a table is among it.
     pub(crate) fn core(&self, guards: &[usize], mode: usize) -> Option<Vec<bool>> {
+        let (core, sees_time) = self.core_and_time(guards, mode);
+        (!sees_time).then_some(core)
+    }
+
+    /// The same, and whether the time or a table is among it.
+    pub(crate) fn core_and_time(&self, guards: &[usize], mode: usize) -> (Vec<bool>, bool) {
         let states = self.definition.states();
-        let mut core = vec![false; states.len()];
+        let (mut core, mut sees_time) = (vec![false; states.len()], false);
         let mut open: Vec<&Expression> =
             guards.iter().map(|guard| &self.guards[*guard].expression).collect();
         while let Some(e) = open.pop() {
-            if self.sees_time(e) {
-                return None;
-            }
+            sees_time |= self.sees_time(e);
             for name in self.seen(e) {
                 if let Some(i) = states.iter().position(|s| s.name == name)
                     && !std::mem::replace(&mut core[i], true)
@@ -475,7 +479,7 @@ impl Equation {
                 }
             }
         }
-        Some(core)
+        (core, sees_time)
     }
 
     /// Whether anything depends on the time, events of the clock included.

@@ -119,6 +119,14 @@ impl Follower<'_> {
                 continue;
             }
             let (value, side) = (watched[place], self.config.sides[guard]);
+            if side == 0.0 && !self.equation.guards[guard].whole {
+                // Motion that rests on a kink: neighbours that leave it have other slopes.
+                if self.slopes_differ(guard) {
+                    let (core, _) = self.equation.core_and_time(&[guard], self.config.mode);
+                    between.iter_mut().zip(core).for_each(|(between, of)| *between |= of);
+                }
+                continue;
+            }
             let across = match self.equation.guards[guard].whole {
                 true if value.fract() == 0.0 && side == value => value - 1.0,
                 true if value.fract() == 0.0 => value,
@@ -150,6 +158,31 @@ impl Follower<'_> {
             }
         }
         between
+    }
+
+    /// Whether the field has other derivatives by the states on the two sides of a function that is
+    /// zero.
+    fn slopes_differ(&mut self, guard: usize) -> bool {
+        const SAME: f64 = 1e-6;
+        let n = self.n;
+        let [low, high] = [-1.0, 1.0].map(|side| {
+            let mut config = self.config.clone();
+            config.sides[guard] = side;
+            let (compiled, variables) = (self.equation.compiled(&config), self.load(&config));
+            let slopes = |j: usize| {
+                let dual = |(i, v): (usize, &f64)| Dual {
+                    value: *v,
+                    partials: [if i == j { 1.0 } else { 0.0 }],
+                };
+                let duals: Vec<Dual<f64, 1>> = variables.iter().enumerate().map(dual).collect();
+                let mut out = vec![Dual::constant(0.0); n];
+                compiled.field.evaluate(&duals, &mut out);
+                out.iter().map(|d| d.partials[0]).collect::<Vec<f64>>()
+            };
+            (0..n).flat_map(slopes).collect::<Vec<f64>>()
+        });
+        let differ = |(a, b): (&f64, &f64)| (a - b).abs() > SAME * a.abs().max(b.abs());
+        low.iter().zip(&high).any(differ)
     }
 }
 
@@ -414,6 +447,26 @@ mod tests {
                 assert!((found - right).abs() < 1e-6, "{name} of {names:?}: {found}, {right}");
             }
         }
+    }
+
+    /// Motion that rests where a function is zero until t = 1: neighbours drift meanwhile, and have
+    /// a derivative where the field has one there.
+    #[test]
+    fn neighbours_of_what_rests_on_a_kink_move() {
+        let at_rest = |f: &str, start: &str| {
+            let text = format!("states = ['x', 'v', 'z']\nstart = {start}\nf = {f}");
+            sensitivities(&model(&text), &at(3.0), &[]).unwrap().by_start
+        };
+        // x = v0 t + (t - 1)^2/2.
+        for (power, by_v) in [("^1.5", 7.0 / 2.0_f64.sqrt()), ("^2", 20.0 / 3.0)] {
+            let found =
+                at_rest(&format!("['v', 'heaviside(t - 1)', 'max(x, 0){power}']"), "[0, 0, 0]");
+            assert!((found[0][1] - 3.0).abs() < 1e-9 && (found[1][1] - 1.0).abs() < 1e-9);
+            assert!((found[2][1] - by_v).abs() < 1e-7, "{power}: {found:?}");
+        }
+        // With a slope on one side the derivatives from the two sides differ.
+        let found = at_rest("['v', 'heaviside(t - 1)', 'max(x - 1, 0)']", "[1, 0, 0]");
+        assert!(found[2][0].is_nan() && found[2][1].is_nan() && found[2][2] == 1.0, "{found:?}");
     }
 
     /// Two blocks that hold independently, each at its own belt: what is normal to both surfaces

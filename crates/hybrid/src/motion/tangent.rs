@@ -244,6 +244,9 @@ impl Follower<'_> {
         self.rhs(t, x, &mut field);
         let times = field.iter().zip(&self.size).map(|(f, size)| size / f.abs());
         let whole = times.filter(|time| *time > 0.0).fold(f64::INFINITY, f64::min);
+        if whole == f64::INFINITY {
+            return self.slope_at_rest(t, x, v, BESIDE).unwrap_or(at);
+        }
         for way in [1.0, -1.0] {
             let [near, far] = BESIDE.map(|part| {
                 let by = way * part * whole;
@@ -256,6 +259,40 @@ impl Follower<'_> {
             }
         }
         at
+    }
+
+    /// The derivative of the field in the direction `v` where nothing moves, by those at two points
+    /// beside it, at distances relative to the largest state; zero where it falls with the distance,
+    /// as that of a power. None if it has no bound, or another one on the other side.
+    fn slope_at_rest(&mut self, t: f64, x: &[f64], v: &[f64], parts: [f64; 2]) -> Option<Vec<f64>> {
+        const SAME: f64 = 1e-6;
+        let largest = |values: &[f64]| values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+        let reach = match largest(x).max(largest(&self.size)) {
+            0.0 => 1.0,
+            reach => reach,
+        };
+        let [above, below] = [1.0, -1.0].map(|way| {
+            let [near, far] = parts.map(|part| {
+                // Off differences of states, too.
+                let off = |i: usize| way * part * reach * (1.0 + i as f64);
+                let beside: Vec<f64> = x.iter().enumerate().map(|(i, x)| x + off(i)).collect();
+                self.slope_along(t, &beside, v)
+            });
+            let limit = |(near, far): (&f64, &f64)| match near.abs() / far.abs() {
+                _ if *near == 0.0 => Some(0.0),
+                ratio if ratio <= 0.5 => Some(0.0),
+                ratio if ratio <= 2.0 => Some(*near),
+                _ => None,
+            };
+            near.iter().zip(&far).map(limit).collect::<Option<Vec<f64>>>()
+        });
+        match (above, below) {
+            (Some(above), Some(below)) => {
+                let differ = |(a, b): (&f64, &f64)| (a - b).abs() > SAME * a.abs().max(b.abs());
+                (!above.iter().zip(&below).any(differ)).then_some(above)
+            }
+            (above, below) => above.or(below),
+        }
     }
 
     /// The derivative of the field in the direction `v`, sliding included.
