@@ -1170,10 +1170,14 @@ impl<'a> Follower<'a> {
                 let (t_end, most) = (self.options.t_end, self.options.max_steps);
                 let hopeless = pace.is_hopeless(steps, self.t, t_end, most);
                 if hopeless && switches + events <= steps / 100 {
+                    let tolerance = match self.options.atol {
+                        None => "give states near zero an absolute tolerance (--atol), ",
+                        Some(_) => "",
+                    };
                     let why = format!(
                         "steps stay too short ({steps} so far; if it goes on so, the end takes \
-                            more than --max-steps allows): give another --method, end the run \
-                            before (--t-end), or smooth what turns so fast there, as \
+                            more than --max-steps allows): {tolerance}give another --method, end \
+                            the run before (--t-end), or smooth what turns so fast there, as \
                             sqrt(x^2 + y^2 + 1e-12) for a length"
                     );
                     return Err(HybridError::Stuck { t: self.t, x: self.x.clone(), why });
