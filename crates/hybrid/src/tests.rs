@@ -6026,3 +6026,34 @@ fn twisting_comes_to_rest_at_its_target() {
         }
     }
 }
+
+/// Targets that move: twisting reaches a ramp and stays on it; a root whose argument rounding has
+/// beyond zero is crossed as one of a state.
+#[test]
+fn moving_targets_are_reached() {
+    for method in [Method::Dopri5, Method::Radau5, Method::Lsoda] {
+        for (f, start) in [
+            ("['v', '-3*sign(x - 2 - 0.5*t) - 2*sign(v - 0.5)']", "[3, 0]"),
+            ("['v', '-5*sign(x - 2 - 0.5*t) - sign(v - 0.5)']", "[1, -0.5]"),
+        ] {
+            let text = format!("states = ['x', 'v']\nstart = {start}\nf = {f}");
+            let x = end_of(&text, 20.0, method).unwrap_or_else(|e| panic!("{method:?}: {e}"));
+            near(x[0], 12.0, 1e-8);
+            near(x[1], 0.5, 1e-8);
+        }
+        let of = |e: &str, w: &str, start: [f64; 2]| {
+            let text = format!(
+                "states = ['x', 'y']\nstart = {start:?}\n\
+                f = ['{w} - 2*sign({e})*sqrt(abs({e}))', '-1.5*sign({e})']"
+            );
+            end_of(&text, 0.8, method).unwrap_or_else(|e| panic!("{method:?}: {e}"))
+        };
+        if method == Method::Dopri5 {
+            continue;
+        }
+        // The same beside the ramp.
+        let (ramp, still) = (of("x - 2 - 0.5*t", "y", [3.0, 0.0]), of("x", "y", [1.0, -0.5]));
+        near(ramp[0] - 2.0 - 0.4, still[0], 1e-7);
+        near(ramp[1] - 0.5, still[1], 1e-7);
+    }
+}

@@ -234,7 +234,7 @@ impl Follower<'_> {
         let by_events = self.trains.iter().any(|train| train.shrinks(self.t));
         if let Some(t) = unresolved.filter(|_| fired.is_empty() && !by_events)
             && accumulates.is_none()
-            && self.comes_to_rest(t, false)
+            && (self.comes_to_rest(t, false) || self.stays_at_meeting())
         {
             return Ok(None);
         }
@@ -1678,7 +1678,7 @@ impl Follower<'_> {
     }
 
     /// The functions that are zero but for a millionth of the states, by place and guard.
-    fn nearly_zero(&self, values: &[f64]) -> Vec<(usize, usize)> {
+    pub(super) fn nearly_zero(&self, values: &[f64]) -> Vec<(usize, usize)> {
         let largest = self.size.iter().fold(0.0_f64, |most, s| most.max(*s));
         let active = self.compiled.active.iter().copied().enumerate();
         // On the wrong side of another a function may have no value.
@@ -1709,6 +1709,27 @@ impl Follower<'_> {
             self.settle(&zero)?;
         }
         Ok(true)
+    }
+
+    /// Whether motion slides on from where all the functions are zero about which its turns are not
+    /// resolved any more, as about a target that moves.
+    fn stays_at_meeting(&mut self) -> bool {
+        let values = self.watched_values();
+        let near = self.nearly_zero(&values);
+        if near.len() < 2 {
+            return false;
+        }
+        let x = self.nearest_meeting(&near, &values);
+        let before = (self.config.clone(), self.sliding.clone(), std::mem::replace(&mut self.x, x));
+        let marks = (self.along.clone(), self.fresh_guard.clone(), self.tangent_guard.clone());
+        let zero: Vec<usize> = near.iter().map(|(_, guard)| *guard).collect();
+        if self.settle(&zero).is_ok() && zero.iter().all(|guard| self.sliding.contains(guard)) {
+            return true;
+        }
+        self.x = before.2;
+        self.adopt(before.0, before.1);
+        (self.along, self.fresh_guard, self.tangent_guard) = marks;
+        false
     }
 
     /// The gradients of functions, by place and guard, in the states at the present point.
@@ -1760,7 +1781,7 @@ impl Follower<'_> {
 
     /// The point where the functions in `near`, by place and guard, are zero, that is nearest to
     /// the state; the state itself where that is not to be had.
-    fn nearest_meeting(&mut self, near: &[(usize, usize)], values: &[f64]) -> Vec<f64> {
+    pub(super) fn nearest_meeting(&mut self, near: &[(usize, usize)], values: &[f64]) -> Vec<f64> {
         let rows = self.gradients_of(near);
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let gram: Vec<f64> =

@@ -716,6 +716,14 @@ impl Follower<'_> {
             for (i, guard) in zero.iter().enumerate() {
                 config.sides[*guard] = if plus(i) { highs[i] } else { lows[i] };
             }
+            if follower.equation.has_domain_ends {
+                // Roots of what is zero here have values on both sides, whatever rounding makes.
+                let new = others(
+                    &zero,
+                    &zero.iter().map(|g| config.slid.contains(g)).collect::<Vec<_>>(),
+                );
+                config.slid.extend(new);
+            }
             follower.ask_new(&mut config);
             follower.follow_sides(&mut config, &zero);
             let rates_of = |follower: &mut Self, config: Configuration| {
@@ -1182,6 +1190,7 @@ impl Follower<'_> {
                 {
                     return Ok(());
                 }
+                [] if self.meets_more(&zero)? => return Ok(()),
                 [] => {
                     let idle = self.idle_kinks(&zero);
                     let rest: Vec<usize> =
@@ -1414,6 +1423,28 @@ impl Follower<'_> {
         self.adopt(before.0, before.1);
         (self.along, self.fresh_guard, self.tangent_guard) = marks;
         false
+    }
+
+    /// Whether more functions are zero here, to the error of the integration, than those to which no
+    /// way is known, as a position's speed where turns about it have come to their end, and the
+    /// motion goes on from where all of them are.
+    fn meets_more(&mut self, zero: &[usize]) -> Result<bool, HybridError> {
+        let values = self.watched_values();
+        let largest = self.size.iter().fold(0.0_f64, |most, s| most.max(*s));
+        let error = 10.0 * self.options.rtol * largest;
+        let mut near = self.nearly_zero(&values);
+        near.retain(|(place, _)| values[*place].abs() <= error);
+        let guards: Vec<usize> = near.iter().map(|(_, guard)| *guard).collect();
+        if guards.len() <= zero.len() || !zero.iter().all(|guard| guards.contains(guard)) {
+            return Ok(false);
+        }
+        let x = self.nearest_meeting(&near, &values);
+        if x.iter().zip(&self.x).any(|(a, b)| !((a - b).abs() <= error)) {
+            return Ok(false);
+        }
+        self.x = x;
+        self.settle(&guards)?;
+        Ok(true)
     }
 
     /// The kinks among functions that are zero whose sides change nothing until the run ends: both
