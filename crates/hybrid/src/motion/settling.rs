@@ -1425,8 +1425,8 @@ impl Follower<'_> {
         false
     }
 
-    /// Whether more functions are zero here, to the error of the integration, than those to which no
-    /// way is known, as a position's speed where turns about it have come to their end, and the
+    /// Whether more functions are zero here, to the error of the integration, than those from which
+    /// no way is known, as a position's speed where turns about it have come to their end, and the
     /// motion goes on from where all of them are.
     fn meets_more(&mut self, zero: &[usize]) -> Result<bool, HybridError> {
         let values = self.watched_values();

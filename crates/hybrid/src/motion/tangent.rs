@@ -262,8 +262,8 @@ impl Follower<'_> {
     }
 
     /// The derivative of the field in the direction `v` where nothing moves, by those at two points
-    /// beside it, at distances relative to the largest state; zero where it falls with the distance,
-    /// as that of a power. None if it has no bound, or another one on the other side.
+    /// beside it, at distances relative to the largest state; zero where it falls with the
+    /// distance, as that of a power. None if it has no bound, or another one on the other side.
     fn slope_at_rest(&mut self, t: f64, x: &[f64], v: &[f64], parts: [f64; 2]) -> Option<Vec<f64>> {
         const SAME: f64 = 1e-6;
         let largest = |values: &[f64]| values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
