@@ -253,7 +253,8 @@ fn at_intersection(
         kind: RestKind::PseudoEquilibrium,
         state: end.to_vec(),
         eigenvalues: Vec::new(),
-        stability: Stability::Attracts,
+        // One motion has come to it; linear terms do not decide about others.
+        stability: Stability::Neutral,
     }))
 }
 
