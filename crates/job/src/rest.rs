@@ -253,8 +253,7 @@ fn at_intersection(
         kind: RestKind::PseudoEquilibrium,
         state: end.to_vec(),
         eigenvalues: Vec::new(),
-        // One motion has come to it; linear terms do not decide about others.
-        stability: Stability::Neutral,
+        stability: Stability::Attracts,
     }))
 }
 
