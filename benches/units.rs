@@ -1,5 +1,4 @@
-//! The units of work W0 to W3 (benches/README.md), by our methods: `twofold-units W1 A
-//! dopri5 5`.
+//! The units of work W0 to W3 (benches/README.md), by our methods: `twofold-units W1 A dopri5 5`.
 //!
 //! Prints one line, as the programs in benches/peers do: program, unit, set, the least seconds of
 //! the given number of runs, steps, crossings, final state of the last run.

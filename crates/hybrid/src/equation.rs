@@ -262,8 +262,13 @@ impl Equation {
             | Expression::Apply(General::Min | General::Max | General::Clip, _)
                 if e.parts().into_iter().all(|part| value(part).is_some()) =>
             {
+                // Bounds in the wrong order are refused below.
+                let ordered = match &e {
+                    Expression::Apply(General::Clip, list) => value(&list[1]) <= value(&list[2]),
+                    _ => true,
+                };
                 let v = evaluate(&e, &|name| values.get(name).copied());
-                if v.is_finite() { Expression::Number(v.into()) } else { e }
+                if ordered && v.is_finite() { Expression::Number(v.into()) } else { e }
             }
             _ => e,
         };

@@ -566,9 +566,13 @@ fn ends_of_a_clip_are_not_exchanged() {
     let set = "states = ['x']\nstart = [3]\nf = ['1']\n[[event]]\nat = 0.5\n\
         set = { x = 'mod(x, p)' }\n[parameters]\np = 2";
     near(of(set, 2.0).unwrap().x[0], 2.0, 1e-12);
-    for (text, p, words) in
-        [(clipped, -1.0, "clip(x, 0, p) is 0 here, above its upper end -1"), (set, 0.0, "is by 0")]
-    {
+    let constant = "states = ['x']\nstart = [3]\nf = ['clip(0.5, 0, p)']\n[parameters]\np = 1";
+    near(of(constant, 1.0).unwrap().x[0], 3.5, 1e-12);
+    for (text, p, words) in [
+        (clipped, -1.0, "clip(x, 0, p) is 0 here, above its upper end -1"),
+        (constant, -1.0, "clip(0.5, 0, p) is 0 here, above its upper end -1"),
+        (set, 0.0, "is by 0"),
+    ] {
         let error = of(text, p).unwrap_err().to_string();
         assert!(error.contains(words), "{error}");
     }
@@ -6048,6 +6052,7 @@ fn moving_targets_are_reached() {
             );
             end_of(&text, 0.8, method).unwrap_or_else(|e| panic!("{method:?}: {e}"))
         };
+        // (dopri5 creeps up to this root, and taylor refuses the mixture: notes/defects.md.)
         if method == Method::Dopri5 {
             continue;
         }

@@ -234,7 +234,7 @@ impl Follower<'_> {
         let by_events = self.trains.iter().any(|train| train.shrinks(self.t));
         if let Some(t) = unresolved.filter(|_| fired.is_empty() && !by_events)
             && accumulates.is_none()
-            && (self.comes_to_rest(t, false) || self.stays_at_meeting())
+            && (self.comes_to_rest(t, false) || self.stays_at_meeting(t))
         {
             return Ok(None);
         }
@@ -1711,15 +1711,25 @@ impl Follower<'_> {
         Ok(true)
     }
 
-    /// Whether motion slides on from where all the functions are zero about which its turns are not
-    /// resolved any more, as about a target that moves.
-    fn stays_at_meeting(&mut self) -> bool {
+    /// Whether motion slides on from where all the functions are zero about which its turns, over
+    /// at the time `limit`, are not resolved any more, as about a target that moves. It is not
+    /// farther away than the motion goes until then.
+    fn stays_at_meeting(&mut self, limit: f64) -> bool {
+        /// Fields on other sides may be so many times as fast.
+        const FASTER: f64 = 10.0;
         let values = self.watched_values();
         let near = self.nearly_zero(&values);
         if near.len() < 2 {
             return false;
         }
         let x = self.nearest_meeting(&near, &values);
+        let (here, mut field) = (self.x.clone(), vec![0.0; self.n]);
+        self.rhs(self.t, &here, &mut field);
+        let fastest = field.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
+        let reach = FASTER * fastest * (limit - self.t);
+        if x.iter().zip(&here).any(|(a, b)| !((a - b).abs() <= reach)) {
+            return false;
+        }
         let before = (self.config.clone(), self.sliding.clone(), std::mem::replace(&mut self.x, x));
         let marks = (self.along.clone(), self.fresh_guard.clone(), self.tangent_guard.clone());
         let zero: Vec<usize> = near.iter().map(|(_, guard)| *guard).collect();
