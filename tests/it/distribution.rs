@@ -298,3 +298,27 @@ fn locks_of_their_own_follow_the_manifests() {
         assert!(seen > 10, "{lock}: only {seen} crates of ours");
     }
 }
+
+/// Libraries with one set of features in programs and another one in tests are compiled twice, and
+/// with them every crate of ours that needs them.
+#[test]
+fn tests_share_the_libraries_of_the_programs() {
+    let libraries = |kinds: &str| -> BTreeMap<String, String> {
+        let args = ["tree", "--locked", "--offline", "--prefix", "none", "--format", "{p}|{f}"];
+        let tree = Command::new(env!("CARGO"))
+            .args(args)
+            .args(["--package", "twofold-dynamics", "--edges", kinds])
+            .current_dir(root())
+            .output()
+            .unwrap();
+        assert!(tree.status.success(), "{}", String::from_utf8_lossy(&tree.stderr));
+        let lines = String::from_utf8(tree.stdout).unwrap();
+        let named = lines.lines().filter_map(|line| line.split_once('|'));
+        named.map(|(name, of)| (name.to_owned(), of.trim_end_matches(" (*)").to_owned())).collect()
+    };
+    let (programs, tests) = (libraries("normal,build"), libraries("normal,build,dev"));
+    assert!(programs.len() > 50 && tests.len() > programs.len());
+    for (name, features) in &programs {
+        assert_eq!(tests.get(name), Some(features), "{name}: see rand in Cargo.toml");
+    }
+}
