@@ -283,6 +283,8 @@ enum Stroke {
     Smooth,
     Flight,
     Sliding,
+    /// On a switching surface of a general system: it slides, or rests there.
+    Surface,
     ToPlus,
     ToMinus,
     Approach,
@@ -314,17 +316,7 @@ fn lines(answer: &Answer, run: &Frame) -> Result<Vec<Line>, PlotError> {
     let sound =
         |table: &&Table| names.iter().all(|n| table.numbers(n).len() == table.numbers("t").len());
     if let Some(path) = answer.table("path").filter(sound) {
-        let t = path.numbers("t");
-        // A reset is no line: two rows of one time.
-        let jumps = (1..path.len()).filter(|row| t[*row] == t[row - 1]);
-        let mut ends: Vec<usize> = jumps.collect();
-        ends.push(path.len());
-        let mut from = 0;
-        let piece = |to: usize| {
-            let rows = std::mem::replace(&mut from, to)..to;
-            Line { look: Stroke::Smooth, t: t[rows.clone()].to_vec(), x: columns(path, rows) }
-        };
-        return Ok(ends.into_iter().map(piece).collect());
+        return Ok(pieces(path, |rows| columns(path, rows)));
     }
     let motion = answer.table("motion").filter(sound).ok_or(PlotError::NoPoints)?;
     let funnel = motion.integers("future").iter().any(|f| *f > 0);
@@ -358,6 +350,36 @@ fn lines(answer: &Answer, run: &Frame) -> Result<Vec<Line>, PlotError> {
     Ok(found)
 }
 
+/// Number of points of all lines.
+fn length(lines: &[Line]) -> usize {
+    lines.iter().map(|line| line.t.len()).sum()
+}
+
+/// The pieces of a path: it is cut at resets, and where it comes onto a switching surface or leaves
+/// it. The signs of a row are those of the motion that leads to it.
+fn pieces(path: &Table, columns: impl Fn(std::ops::Range<usize>) -> Vec<Vec<f64>>) -> Vec<Line> {
+    let t = path.numbers("t");
+    let mut looks: Vec<Stroke> = path
+        .words("signs")
+        .map(|signs| if signs.contains('0') { Stroke::Surface } else { Stroke::Smooth })
+        .collect();
+    looks.resize(t.len(), Stroke::Smooth);
+    let mut found = Vec::new();
+    let mut from = 0;
+    for row in 1..=t.len() {
+        // A reset is no line: two rows of one time.
+        let reset = row == t.len() || t[row] == t[row - 1];
+        if !reset && (row == from + 1 || looks[row] == looks[row - 1]) {
+            continue;
+        }
+        let look = looks[row - 1];
+        found.push(Line { look, t: t[from..row].to_vec(), x: columns(from..row) });
+        from = if reset { row } else { row - 1 };
+    }
+    found.sort_by_key(|line| line.look);
+    found
+}
+
 fn line_style(look: Stroke, points: usize) -> LineStyle {
     match look {
         // A long path is drawn thinner than a curve, so that windings stay apart.
@@ -365,7 +387,7 @@ fn line_style(look: Stroke, points: usize) -> LineStyle {
             LineStyle::new(style::INK, if points > 4000 { 0.5 } else { style::CURVE_PT })
         }
         Stroke::Flight => LineStyle::new(style::INK, 0.7),
-        Stroke::Sliding => LineStyle::new(style::GREEN, 1.6),
+        Stroke::Sliding | Stroke::Surface => LineStyle::new(style::GREEN, 1.6),
         Stroke::ToPlus => LineStyle::new(style::BLUE, 0.5),
         Stroke::ToMinus => LineStyle::new(style::VERMILLION, 0.5),
         Stroke::Approach => LineStyle::new(style::INK, 1.4),
@@ -382,6 +404,7 @@ fn line_legend(mut sheet: Sheet, lines: &[Line]) -> Sheet {
             Stroke::Smooth => continue,
             Stroke::Flight => "flight",
             Stroke::Sliding => "sliding",
+            Stroke::Surface => "on a switching surface",
             Stroke::ToPlus => "ways out to *h* > 0",
             Stroke::ToMinus => "ways out to *h* < 0",
             Stroke::Approach => "the way in",
@@ -430,7 +453,7 @@ fn series(mut sheet: Sheet, run: &Frame, lines: &[Line], shown: &[usize]) -> She
         }
         for line in lines {
             let points = line.t.iter().zip(&line.x[*state]).map(|(t, x)| [*t, *x]).collect();
-            panel = panel.line(points, line_style(line.look, line.t.len()));
+            panel = panel.line(points, line_style(line.look, length(lines)));
         }
         sheet = sheet.panel("", "", panel);
     }
@@ -486,7 +509,7 @@ fn plane(sheet: Sheet, run: &Frame, lines: &[Line], shown: &[usize]) -> Sheet {
         panel = surface_curve(panel, &level, ranges, &mut looks);
     }
     for line in lines {
-        panel = panel.line(line.points([u, v]), line_style(line.look, line.t.len()));
+        panel = panel.line(line.points([u, v]), line_style(line.look, length(lines)));
     }
     let start = lines
         .iter()
@@ -526,7 +549,7 @@ fn space(
         panel = panel.surface(patches);
     }
     for line in lines {
-        panel = panel.line(line.points(order), line_style(line.look, line.t.len()));
+        panel = panel.line(line.points(order), line_style(line.look, length(lines)));
     }
     let exits: Vec<[f64; 3]> =
         exits(answer, run).into_iter().map(|x| order.map(|i| x[i])).collect();
@@ -643,3 +666,35 @@ const START: MarkerStyle =
 /// The end of repelling sliding.
 const EXIT: MarkerStyle =
     MarkerStyle { shape: MarkerShape::OpenDot, colour: style::GREEN, size: 3.6 };
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use twofold_job::{Column, Entry};
+
+    /// Flight to a surface, sliding on it, flight, a reset, flight: pieces meet but at the reset,
+    /// and sliding is drawn last.
+    #[test]
+    fn paths_are_cut_where_they_slide_and_at_resets() {
+        let mut path = Table::new(
+            "path",
+            [Column::numbers("t"), Column::numbers("x"), Column::words("signs")],
+        );
+        let rows = [(0.0, "+-"), (1.0, "+-"), (2.0, "0-"), (3.0, "0-"), (4.0, "+-"), (4.0, "+-")];
+        for (t, signs) in rows.into_iter().chain([(5.0, "+-")]) {
+            path.push([Entry::Number(t), Entry::Number(10.0 * t), Entry::Word(signs.into())]);
+        }
+        let found = pieces(&path, |rows| vec![path.numbers("x")[rows].to_vec()]);
+        let times: Vec<_> = found.iter().map(|line| (line.look, &line.t[..])).collect();
+        assert_eq!(
+            times,
+            [
+                (Stroke::Smooth, &[0.0, 1.0][..]),
+                (Stroke::Smooth, &[3.0, 4.0]),
+                (Stroke::Smooth, &[4.0, 5.0]),
+                (Stroke::Surface, &[1.0, 2.0, 3.0]),
+            ]
+        );
+        assert_eq!(found[3].x, [[10.0, 20.0, 30.0]]);
+    }
+}
