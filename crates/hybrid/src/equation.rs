@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::rc::Rc;
 
 use twofold_num::random::RandomStream;
-use twofold_num::tape::{Program, Recorded};
+use twofold_num::tape::{Program, Recorded, Replay};
 use twofold_num::{Arithmetic, Decimal, Dual, Elementary, Scalar, Tape};
 use twofold_system::Expression;
 use twofold_system::expression::{Function, General, MAX_EXPONENT};
@@ -58,6 +58,9 @@ pub struct Configuration {
     pub(crate) slid: Vec<usize>,
     /// The states that rest, whatever else moves.
     pub(crate) still: Vec<usize>,
+    /// The guards that are slid upon in higher order: on their zero and that of their derivatives
+    /// along the motion which the sides of the guard do not change (Levant 1993).
+    pub(crate) higher: Vec<usize>,
 }
 
 /// The equations for one structure of answers, ready for evaluation. Variables: states, time,
@@ -95,6 +98,10 @@ pub struct Compiled {
     /// The same of the watched values.
     pub(crate) watched_gates: Vec<Gate>,
     pub(crate) watched_gate_arguments: Program,
+    /// Of each guard in [`Configuration::higher`] its value and its derivatives along the motion
+    /// up to the one that stands among the active ones for it, and their number; none where the
+    /// first derivative depends on its side.
+    pub(crate) derivatives: Vec<Option<(Program, usize)>>,
     pub(crate) tape: Tape,
 }
 
@@ -193,12 +200,15 @@ fn has_domain_ends(e: &Expression) -> bool {
     itself || e.parts().into_iter().any(has_domain_ends)
 }
 
+fn is_zero(e: &Expression) -> bool {
+    matches!(e, Expression::Number(n) if n.value() == 0.0)
+}
+
 /// a - b without needless parts.
 fn difference(a: &Expression, b: &Expression) -> Expression {
-    let zero = |e: &Expression| matches!(e, Expression::Number(n) if n.value() == 0.0);
     match (a, b) {
-        (a, b) if zero(b) => a.clone(),
-        (a, b) if zero(a) => mirrored(b),
+        (a, b) if is_zero(b) => a.clone(),
+        (a, b) if is_zero(a) => mirrored(b),
         (a, Expression::Neg(b)) => Expression::Add(Box::new(a.clone()), b.clone()),
         (a, b) => Expression::Sub(Box::new(a.clone()), Box::new(b.clone())),
     }
@@ -224,10 +234,9 @@ fn of_each(a: &Expression, b: &Expression) -> Option<Expression> {
             if all { Expression::And(one, other) } else { Expression::Or(one, other) }
         })
     };
-    let zero = |e: &Expression| matches!(e, Expression::Number(n) if n.value() == 0.0);
     match (a, b) {
-        (Expression::Sub(a, b), c) if zero(c) => of_each(a, b),
-        (c, Expression::Sub(a, b)) if zero(c) => of_each(b, a),
+        (Expression::Sub(a, b), c) if is_zero(c) => of_each(a, b),
+        (c, Expression::Sub(a, b)) if is_zero(c) => of_each(b, a),
         (a, b) if count(a).saturating_mul(count(b)) > MOST => None,
         (Expression::Apply(f @ (General::Min | General::Max), list), b) => {
             all(*f == General::Min, list.iter().map(|one| greater(one, b)).collect())
@@ -379,6 +388,7 @@ impl Equation {
             pieces: Vec::new(),
             slid: Vec::new(),
             still: Vec::new(),
+            higher: Vec::new(),
         };
         Tape::record(self.variables(), |v| {
             let mut writer = Writer {
@@ -1126,9 +1136,10 @@ impl Equation {
         let numbers = |guards: &[usize]| -> Vec<i8> {
             guards.iter().flat_map(|g| (*g as u32).to_le_bytes()).map(|b| b as i8).collect()
         };
-        let mut key = numbers(&[at.mode, at.slid.len(), at.still.len()]);
-        key.extend(numbers(&at.slid));
-        key.extend(numbers(&at.still));
+        let mut key = numbers(&[at.mode, at.slid.len(), at.still.len(), at.higher.len()]);
+        for list in [&at.slid, &at.still, &at.higher] {
+            key.extend(numbers(list));
+        }
         key.extend(
             self.guards.iter().zip(&at.sides).filter(|(g, _)| g.chooses).map(|(_, s)| *s as i8),
         );
@@ -1197,7 +1208,29 @@ impl Equation {
             outputs.extend(watched);
             outputs
         });
+        let tape = if at.higher.is_empty() { tape } else { without_zeros(&tape) };
         let outputs = n + active.len() + self.watched.len();
+        let raise = |guard: &usize| {
+            let place = active.iter().position(|a| a == guard)?;
+            Some((n + place, raised(&tape, n, n + place, n + 1 + guard)?))
+        };
+        let higher: Vec<_> = at.higher.iter().map(raise).collect();
+        let tape = if higher.iter().any(Option::is_some) {
+            Tape::record(tape.variables(), |v| {
+                let mut replay = Replay::new(&tape, v);
+                let mut values: Vec<_> = (0..outputs).map(|i| replay.output(i)).collect();
+                for (place, of) in higher.iter().flatten() {
+                    values[*place] = Replay::new(of, v).output(of.outputs().len() - 1);
+                }
+                values
+            })
+        } else {
+            tape
+        };
+        let derivatives = higher.iter().map(|of| {
+            let (_, tape) = of.as_ref()?;
+            Some((Program::new(tape), tape.outputs().len()))
+        });
         let depends = dependencies(&tape);
         let on = |value: usize, variable: usize| {
             depends[value][variable / 64] & (1 << (variable % 64)) != 0
@@ -1228,6 +1261,7 @@ impl Equation {
             )),
             watched_gates: watched_gates.into_iter().map(|(gate, _)| gate).collect(),
             gates: gates.into_iter().map(|(gate, _)| gate).collect(),
+            derivatives: derivatives.collect(),
             active,
             deciding,
             tape,
@@ -1411,6 +1445,64 @@ impl Affine {
         }
         self
     }
+}
+
+/// The same function without terms that are zero everywhere, so that values depend on no variable
+/// by them.
+fn without_zeros(tape: &Tape) -> Tape {
+    use twofold_num::tape::Operation::{Add, Div, Mul, Neg, Sqrt, Sub};
+    // A value that depends on no variable is a number even if all variables are not-a-number.
+    let fixed = tape.values(&vec![f64::NAN; tape.variables()]);
+    Tape::record(tape.variables(), |v| {
+        let mut replay = Replay::new(tape, v);
+        let mut zero: Vec<bool> = fixed.iter().map(|value| *value == 0.0).collect();
+        for (node, operation) in tape.operations().iter().enumerate() {
+            let same = match *operation {
+                Add(a, b) if zero[a] => Some(b),
+                Add(a, b) | Sub(a, b) if zero[b] => Some(a),
+                _ => None,
+            };
+            zero[node] |= match *operation {
+                Sub(a, b) => replay.operation(a) == replay.operation(b),
+                Mul(a, b) => zero[a] || zero[b],
+                Div(a, _) | Neg(a) | Sqrt(a) => zero[a],
+                _ => same.is_some_and(|a| zero[a]),
+            };
+            if zero[node] {
+                replay.set(node, Recorded::zero());
+            } else if let Some(same) = same {
+                let value = replay.operation(same);
+                replay.set(node, value);
+            }
+        }
+        tape.outputs().iter().map(|node| replay.operation(*node)).collect()
+    })
+}
+
+/// Value `of` of a tape whose first `n` ones are the speeds of its first `n` variables (variable
+/// `n` is the time), and its derivatives along that motion, up to the last one that does not depend
+/// on the variable `side`; none if the first one does, or none of a few.
+fn raised(tape: &Tape, n: usize, of: usize, side: usize) -> Option<Tape> {
+    /// No higher order.
+    const MOST: usize = 6;
+    let mut known = Tape::record(tape.variables(), |v| vec![Replay::new(tape, v).output(of)]);
+    for order in 0..MOST {
+        let next = Tape::record(tape.variables(), |v| {
+            let mut fields = Replay::new(tape, v);
+            let mut direction: Vec<_> = (0..n).map(|i| Some(fields.output(i))).collect();
+            direction.resize(tape.variables(), None);
+            direction[n] = Some(Recorded::one());
+            let mut values = Replay::new(&known, v);
+            let mut all: Vec<_> = (0..=order).map(|i| values.output(i)).collect();
+            all.push(values.derivatives(&direction)[order].unwrap_or(Recorded::zero()));
+            all
+        });
+        if dependencies(&next)[order + 1][side / 64] & (1 << (side % 64)) != 0 {
+            return (order > 0).then_some(known);
+        }
+        known = next;
+    }
+    None
 }
 
 /// The values of a tape that are sums of variables with constant factors.
@@ -1615,6 +1707,33 @@ impl Writer<'_> {
         a + s * (b + s * (c + s * d))
     }
 
+    /// Whether the zero of an expression is slid upon in higher order: then it is a number in the
+    /// fields, and not only in what decides them.
+    fn is_zero_of_higher(&self, e: &Expression) -> bool {
+        !self.at.higher.is_empty()
+            && self.equation.switching(e).is_some_and(|guard| self.at.higher.contains(&guard))
+    }
+
+    /// Whether an expression is zero by that, as its size is.
+    fn vanishes(&self, e: &Expression) -> bool {
+        match e {
+            _ if self.at.higher.is_empty() => false,
+            Expression::Call(Function::Abs, a) => self.is_zero_of_higher(a) || self.vanishes(a),
+            Expression::Mul(a, b) => self.vanishes(a) || self.vanishes(b),
+            Expression::Neg(a)
+            | Expression::Div(a, _)
+            | Expression::Power(a, 1..)
+            | Expression::RealPower(a, _)
+            | Expression::Call(Function::Sqrt, a) => self.vanishes(a),
+            Expression::Name(name) => self.equation.term(name).is_some_and(|e| self.vanishes(e)),
+            Expression::Apply(General::Min | General::Max, list) => {
+                matches!(&list[..], [a, b] if self.is_zero_of_higher(&difference(b, a))
+                    && (is_zero(a) || is_zero(b)))
+            }
+            other => self.is_zero_of_higher(other),
+        }
+    }
+
     /// The argument of a root. While the motion slides on x = 0 rounding beyond zero is zero: of
     /// what is never negative, as |x|, and of x where a condition says that it is positive.
     fn of_root(&mut self, e: &Expression) -> Recorded {
@@ -1653,6 +1772,11 @@ impl Writer<'_> {
             Expression::Number(n) => Recorded::constant(n),
             Expression::Pi => Recorded::pi(),
             Expression::Name(name) => self.name(name),
+            Expression::RealPower(a, _) | Expression::Call(Function::Sqrt, a)
+                if self.vanishes(a) =>
+            {
+                Recorded::zero()
+            }
             Expression::Neg(a) => -self.number(a),
             Expression::Add(a, b) => self.number(a) + self.number(b),
             Expression::Sub(a, b) => self.number(a) - self.number(b),
@@ -1667,8 +1791,8 @@ impl Writer<'_> {
             Expression::Call(Function::Sqrt, a) => self.of_root(a).sqrt(),
             Expression::Call(Function::Sign, a) => self.side(a).unwrap_or(Recorded::zero()),
             Expression::Call(Function::Abs, a) => match self.side(a) {
-                Some(side) => side * self.number(a),
-                None => Recorded::zero(),
+                Some(side) if !self.is_zero_of_higher(a) => side * self.number(a),
+                _ => Recorded::zero(),
             },
             Expression::Call(f, a) => {
                 let value = self.number(a);
@@ -1682,29 +1806,44 @@ impl Writer<'_> {
         }
     }
 
+    /// One of the two values of `if`.
+    fn branch(&mut self, list: &[Expression], holds: bool) -> Recorded {
+        let positive = match (&list[0], holds) {
+            (Expression::Greater(a, b), true) => Some(difference(a, b)),
+            (Expression::Greater(a, b), false) => Some(difference(b, a)),
+            _ => None,
+        };
+        let kept = self.positive.len();
+        self.positive.extend(positive);
+        let value = self.number(&list[if holds { 1 } else { 2 }]);
+        self.positive.truncate(kept);
+        value
+    }
+
     fn apply(&mut self, f: General, list: &[Expression]) -> Recorded {
         match f {
-            General::If => {
-                let holds = self.condition(&list[0]);
-                let positive = match (&list[0], holds) {
-                    (Expression::Greater(a, b), true) => Some(difference(a, b)),
-                    (Expression::Greater(a, b), false) => Some(difference(b, a)),
-                    _ => None,
-                };
-                let kept = self.positive.len();
-                self.positive.extend(positive);
-                let value = self.number(&list[if holds { 1 } else { 2 }]);
-                self.positive.truncate(kept);
-                value
-            }
+            General::If => match &list[0] {
+                Expression::Greater(a, b) if self.is_zero_of_higher(&difference(a, b)) => {
+                    let [yes, no] = [true, false].map(|holds| self.branch(list, holds));
+                    match self.side(&difference(a, b)) {
+                        Some(side) => (yes + no).scale(0.5) + side * (yes - no).scale(0.5),
+                        None => no,
+                    }
+                }
+                condition => {
+                    let holds = self.condition(condition);
+                    self.branch(list, holds)
+                }
+            },
             General::Min | General::Max => {
                 let last = list.len() - 1;
                 if last == 0 {
                     return self.number(&list[0]);
                 }
                 let before = self.equation.folded(f, &list[..last]);
-                let greater = self.is_positive(&difference(&list[last], &before));
-                if greater == (f == General::Max) {
+                let between = difference(&list[last], &before);
+                let greater = self.is_positive(&between);
+                if greater == (f == General::Max) && !self.is_zero_of_higher(&between) {
                     self.number(&list[last])
                 } else {
                     self.number(&before)

@@ -377,6 +377,14 @@ impl Train {
         }
     }
 
+    /// The time after which infinitely many turns to and fro are over, where two take ever shorter
+    /// times, by one factor.
+    fn turns(&self) -> Option<f64> {
+        let [d, c, b, a] = *self.times.last_chunk()?;
+        let q = (a - b) / (c - d);
+        (q > 0.0 && q < 0.95).then(|| (a - c) * q / (1.0 - q))
+    }
+
     /// The time at which infinitely many are over, by Aitken's extrapolation, and the last time
     /// between two, where these shrink.
     fn limit(&self, t: f64) -> Option<(f64, f64)> {
@@ -558,6 +566,9 @@ struct Follower<'a> {
     tables_step: bool,
     /// The largest size of each state so far.
     size: Vec<f64>,
+    /// Guards that are, or were, slid upon in higher order, and for each the states that their sides
+    /// move.
+    turned: Vec<(usize, Vec<bool>)>,
     /// The same of late: forgotten as a state falls far below it, and where an event sets it.
     lately: Vec<f64>,
     /// Each state's size before the steps below [`AT_THE_END`] of the time, and its time.
@@ -829,14 +840,15 @@ fn scale_now(follower: &Follower, step: &Step, out: &mut Vec<f64>) {
                     if moved > 0.0 { speed.min(MOST_OF_MEAN * moved / step.h) } else { speed };
                 // A solution that grows without bound is fast, too, but has a size.
                 let known = follower.scale_of(i);
+                let put = follower.is_put(i);
                 let before = follower.before[i];
                 let grows = before > 0.0 && step.x[i].abs() > before.max(0.5 * follower.size[i]);
                 let ends = grows && resolves && step.h < AT_THE_END * step.t.abs();
                 let most = if ends { MOST_OF_SIZE * before } else { f64::INFINITY };
                 let least = (0.1 * moved).max((1e-6 * span * speed).min(most));
                 // A rounding error without a bound leaves the old size.
-                let size = size.max(0.01 * known).max(least);
-                options.rtol * size
+                let size = size.max(if put { follower.width(i) } else { 0.01 * known });
+                options.rtol * size.max(least)
                     + follower.noise_in(step.h, i).unwrap_or(0.0)
                     + follower.least_of(i)
             }
@@ -987,6 +999,7 @@ impl<'a> Follower<'a> {
             pieces: equation.tables.iter().map(|t| t.piece(t0)).collect(),
             slid: Vec::new(),
             still: Vec::new(),
+            higher: Vec::new(),
         };
         let order = order(&equation, &options.intersection)?;
         let guards = equation.guards.len();
@@ -1035,6 +1048,7 @@ impl<'a> Follower<'a> {
             watched_before: Vec::new(),
             tables_step: false,
             size: x.iter().map(|v| v.abs()).collect(),
+            turned: Vec::new(),
             lately: x.iter().map(|v| v.abs()).collect(),
             before: x.iter().map(|v| v.abs()).collect(),
             before_at: options.t_start,
@@ -1258,9 +1272,7 @@ impl<'a> Follower<'a> {
             if self.options.method == Method::Taylor {
                 no_series = match self.expand(&mut step) {
                     Ok(state) => state,
-                    Err(_) if self.land_at_an_edge()? || self.comes_to_rest(self.t, true) => {
-                        continue;
-                    }
+                    Err(_) if self.goes_on_at_an_edge()? => continue,
                     Err(error) => return Err(error),
                 };
                 // If switches or events are frequent, a step is no longer than the time between
@@ -1277,9 +1289,7 @@ impl<'a> Follower<'a> {
                             continue;
                         }
                     }
-                    Some(_) if self.land_at_an_edge()? || self.comes_to_rest(self.t, true) => {
-                        continue;
-                    }
+                    Some(_) if self.goes_on_at_an_edge()? => continue,
                     Some(state) if leaving == MOST_LEAVING && !self.overflows() => {
                         return Err(self.has_no_series(&step, state));
                     }
@@ -1308,7 +1318,7 @@ impl<'a> Follower<'a> {
             }
             let accepted = self.step_within(&mut step, wanted, &mut list);
             let Some(Accepted { length: wanted, error, parts, rejected }) = accepted else {
-                if self.land_at_an_edge()? || self.comes_to_rest(self.t, true) {
+                if self.goes_on_at_an_edge()? {
                     h = 0.0;
                     continue;
                 }

@@ -624,6 +624,7 @@ impl Search<'_> {
             pieces: Vec::new(),
             slid: Vec::new(),
             still: Vec::new(),
+            higher: Vec::new(),
         }
     }
 

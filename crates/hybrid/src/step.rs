@@ -260,6 +260,11 @@ impl Step {
         rhs: &mut RightHandSide<'_>,
         fresh: bool,
     ) -> bool {
+        /// Most iterations.
+        const MOST_SIMPLE: usize = 12;
+        const MOST_FRESH: usize = 40;
+        /// Part of a change that is tried instead of it.
+        const LESS: f64 = 0.25;
         let n = self.x.len();
         let root = 6.0_f64.sqrt();
         let c = [0.1 * (4.0 - root), 0.1 * (4.0 + root), 1.0];
@@ -298,12 +303,22 @@ impl Step {
             .map(|i| self.x[i].abs().max((h * self.k[0][i]).abs()).max(LEAST_STATE))
             .collect();
         let (mut f, mut last, mut settled) = (vec![vec![0.0; n]; 3], f64::INFINITY, false);
-        for iteration in 0..12 {
+        let mut change = vec![0.0; m];
+        let mut at_end: Option<Vec<f64>> = None;
+        for iteration in 0..if fresh { MOST_FRESH } else { MOST_SIMPLE } {
             for s in 0..3 {
                 for i in 0..n {
                     self.stage[i] = self.x[i] + z[s * n + i];
                 }
                 rhs(self.t + c[s] * h, &self.stage, &mut f[s]);
+            }
+            if fresh && iteration > 0 && !f.iter().flatten().all(|f| f.is_finite()) {
+                // Newton's method leaves the domain of a root from its far side: less far.
+                z.iter_mut().zip(&mut change).for_each(|(z, d)| {
+                    *z -= (1.0 - LESS) * *d;
+                    *d *= LESS;
+                });
+                continue;
             }
             if iteration == 0 && !f.iter().flatten().all(|f| f.is_finite()) {
                 // A state that waits while the time goes on may leave a root's domain: begin with
@@ -321,6 +336,7 @@ impl Step {
                     })
                     .collect();
                 matrix = matrix_of([&slopes[0], &slopes[1], &slopes[2]]);
+                at_end = slopes.into_iter().next_back();
             }
             let mut right = vec![0.0; m];
             for p in 0..3 {
@@ -329,7 +345,8 @@ impl Step {
                     right[p * n + i] = h * sum - z[p * n + i];
                 }
             }
-            let Some(change) = solve_any(&matrix, &right, 0.0) else { return false };
+            let Some(found) = solve_any(&matrix, &right, 0.0) else { return false };
+            change = found;
             let moved: Vec<bool> = z.iter().map(|z| *z != 0.0).collect();
             z.iter_mut().zip(&change).for_each(|(z, d)| *z += d);
             // A state that comes back to zero is as large as on its way, in the iterations, too.
@@ -378,6 +395,8 @@ impl Step {
         let gamma = 1.0 / REAL_EIGENVALUE;
         let e =
             [gamma / 3.0 * (-13.0 - 7.0 * root), gamma / 3.0 * (-13.0 + 7.0 * root), -gamma / 3.0];
+        // The slope at a root of zero is none.
+        let jacobian = at_end.as_deref().unwrap_or(jacobian);
         let (mut system, mut right) = (vec![0.0; n * n], vec![0.0; n]);
         for i in 0..n {
             right[i] = gamma * h * self.k[0][i] + (0..3).map(|s| e[s] * z[s * n + i]).sum::<f64>();

@@ -6062,3 +6062,94 @@ fn moving_targets_are_reached() {
         near(ramp[1] - 0.5, still[1], 1e-7);
     }
 }
+
+/// Super-twisting and differentiators (Levant 1993, 2003) slide in second and third order: on a
+/// target that moves, under a disturbance, beside states that their sides do not move, and from
+/// where they are there already.
+#[test]
+fn sliding_of_higher_order_is_followed_by_every_method() {
+    let (s, c) = 10.0_f64.sin_cos();
+    // The equations, the start, the states at t = 10.
+    let known = [
+        (
+            "['x', 'w']",
+            "['-1.5*sign(x - 1)*sqrt(abs(x - 1)) + w', '-1.1*sign(x - 1)']",
+            "[0.4, 0]",
+            vec![1.0, 0.0],
+        ),
+        (
+            "['x', 'w']",
+            "['if(x > sin(t), -1.5*sqrt(x - sin(t)), 1.5*sqrt(sin(t) - x)) + w', \
+                'if(x > sin(t), -1.1, 1.1)']",
+            "[0.4, 0]",
+            vec![s, c],
+        ),
+        (
+            "['x', 'w']",
+            "['-4*(sqrt(max(x, 0)) - sqrt(max(-x, 0))) + w + 0.3*cos(t)', '-1.1*sign(x)']",
+            "[0.4, 0]",
+            vec![0.0, -0.3 * c],
+        ),
+        (
+            "['x', 'w']",
+            "['-1.5*sign(x)*abs(x)^0.5 + w + 0.3*sin(t)', '-1.1*sign(x)']",
+            "[0, 0]",
+            vec![0.0, -0.3 * s],
+        ),
+        (
+            "['x', 'y', 'w', 'q']",
+            "['-1.5*sqrt(abs(x))*sign(x) + w + 0.3*sin(t) + 0.2*y', \
+                '-1.5*sqrt(abs(y))*sign(y) + q + 0.3*cos(t) - 0.2*x', '-1.5*sign(x)', \
+                '-1.5*sign(y)']",
+            "[1, -1, 0, 0]",
+            vec![0.0, 0.0, -0.3 * s, -0.3 * c],
+        ),
+        (
+            "['z', 'u', 'v']",
+            "['-2*3^(1/3)*abs(z - sin(t))^(2/3)*sign(z - sin(t)) + u', \
+                '-1.5*3^(2/3)*abs(z - sin(t))^(1/3)*sign(z - sin(t)) + v', '-3.3*sign(z - sin(t))']",
+            "[0, 0, 0]",
+            vec![s, c, -s],
+        ),
+    ];
+    for (states, f, start, want) in known {
+        for method in Method::ALL {
+            let text = format!("states = {states}\nstart = {start}\nf = {f}");
+            let x = end_of(&text, 10.0, method).unwrap_or_else(|e| panic!("{method:?} {f}: {e}"));
+            for (found, want) in x.iter().zip(&want) {
+                near(*found, *want, 1e-12);
+            }
+        }
+    }
+    // An observer moves nothing of what it observes.
+    let pendulum = "'x2', '-sin(x1) - 0.1*x2'";
+    let alone = format!("states = ['x1', 'x2']\nstart = [1, 0]\nf = [{pendulum}]");
+    let observed = format!(
+        "states = ['x1', 'x2', 'h1', 'h2']\nstart = [1, 0, 0, 0]\nf = [{pendulum}, \
+            'h2 + 1.8*abs(x1 - h1)^0.5*sign(x1 - h1)', \
+            '-sin(x1) - 0.1*h2 + 1.65*sign(x1 - h1)']"
+    );
+    for method in Method::ALL {
+        let (x, y) = (end(&alone, 10.0), end_of(&observed, 10.0, method).unwrap());
+        for i in 0..2 {
+            near(y[i], x[i], 3e-9);
+            near(y[i + 2], y[i], 1e-13);
+        }
+    }
+    // In units of a millionth.
+    for method in Method::ALL {
+        let f = "['-1.5e-3*sign(x)*sqrt(abs(x)) + w + 3e-7*cos(t)', '-1.1e-6*sign(x)']";
+        let text = format!("states = ['x', 'w']\nstart = [4e-7, 0]\nf = {f}");
+        near(end_of(&text, 10.0, method).unwrap()[1], -3e-7 * c, 1e-18);
+    }
+}
+
+/// Where the sides do not brake, or push away, turns about a zero are no sliding.
+#[test]
+fn turns_that_are_not_braked_go_on() {
+    let of = |f: &str, t: f64| end(&format!("states = ['x', 'w']\nstart = [1, 0]\nf = {f}"), t);
+    // A period of 4 sqrt(2/1.1).
+    let x = of("['w', '-1.1*sign(x)']", 40.0 * (2.0 / 1.1_f64).sqrt());
+    near(x[0], 1.0, 1e-8);
+    assert!(of("['0.2*sign(x)*sqrt(abs(x)) + w', '-1.1*sign(x)']", 20.0)[0].abs() > 1.0);
+}

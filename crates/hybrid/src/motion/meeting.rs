@@ -13,6 +13,10 @@ const SAME_MOMENT: f64 = 16.0 * f64::EPSILON;
 /// Changes of states by an event are rounding up to so small a part of their largest sizes.
 const BLOW: f64 = 1e-13;
 
+/// So far beside the zero of a switching function, in units of the states, fields of its two sides
+/// are compared.
+const BESIDE: f64 = 1e-6;
+
 impl Follower<'_> {
     pub(super) fn meet(
         &mut self,
@@ -144,7 +148,7 @@ impl Follower<'_> {
                 self.sliding.iter().copied().filter(|g| zero.contains(g)).collect();
             self.adopt(config, rest);
         }
-        let (mut accumulates, mut unresolved) = (None, None);
+        let (mut accumulates, mut unresolved, mut turns) = (None, None, None::<usize>);
         let stepped = std::mem::take(&mut self.tables_step);
         let switches = stepped || !(crossed.is_empty() && leave.is_empty());
         if !crossed.is_empty() {
@@ -172,6 +176,7 @@ impl Follower<'_> {
                     continue;
                 }
                 let found = self.switch_trains[guard].note(self.t, 0.0);
+                turns.get_or_insert(guard);
                 if found.is_none() && self.switch_trains[guard].shrinks(self.t) {
                     // Turns that are not resolved any more end where the motion rests.
                     let grain = self.grain_of_switch(guard);
@@ -232,6 +237,11 @@ impl Follower<'_> {
         // Switches that come ever faster with events, such as speeds that turn between impacts, end
         // where these do.
         let by_events = self.trains.iter().any(|train| train.shrinks(self.t));
+        if let Some(guard) = turns.filter(|_| fired.is_empty() && !by_events)
+            && self.slides_in_higher_order(guard)?
+        {
+            return Ok(None);
+        }
         if let Some(t) = unresolved.filter(|_| fired.is_empty() && !by_events)
             && accumulates.is_none()
             && (self.comes_to_rest(t, false) || self.stays_at_meeting(t))
@@ -1345,6 +1355,9 @@ impl Follower<'_> {
         if self.sliding.is_empty() {
             return;
         }
+        for at in 0..self.config.higher.len() {
+            self.x = self.where_all_vanish(at).unwrap_or_else(|| self.x.clone());
+        }
         let k = self.sliding.len();
         self.variables[..self.n].copy_from_slice(&self.x);
         self.variables[self.n] = self.t;
@@ -1740,6 +1753,194 @@ impl Follower<'_> {
         self.adopt(before.0, before.1);
         (self.along, self.fresh_guard, self.tangent_guard) = marks;
         false
+    }
+
+    /// Whether motion that comes to the zero of a switching function again and again slides on that
+    /// zero and on those of its derivatives that the sides do not change: sliding of higher order
+    /// (Levant 1993). It begins once rounding is seen in its turns about the zero.
+    pub(super) fn slides_in_higher_order(&mut self, guard: usize) -> Result<bool, HybridError> {
+        /// Turns of more times the rounding of the switching function are resolved.
+        const SEEN: f64 = 1e5;
+        /// A derivative of so many times its own rounding may be zero.
+        const NOISE: f64 = 16.0;
+        let mut config = self.config.clone();
+        let own = &self.equation.guards[guard];
+        if config.higher.contains(&guard) || own.whole || own.kink {
+            return Ok(false);
+        }
+        config.higher.push(guard);
+        let at = config.higher.len() - 1;
+        let compiled = self.equation.compiled(&config);
+        let Some((program, outputs)) = &compiled.derivatives[at] else { return Ok(false) };
+        let plain = self.config.clone();
+        let turns = self.switch_trains[guard].turns();
+        let left = turns.or_else(|| self.brakes(guard, &config, &plain));
+        let (Some(left), Some(turned)) = (left, self.turned(guard, &plain)) else {
+            return Ok(false);
+        };
+        let rows = self.slopes_by_size(program, *outputs, &self.load(&config));
+        let rounding =
+            |row: &[f64]| row.iter().map(|slope| 4.0 * f64::EPSILON * slope.abs()).sum::<f64>();
+        // Steps beside a cube root end earlier.
+        let seen = if *outputs > 2 { 10.0 * SEEN } else { SEEN };
+        let mut scale = 1.0;
+        let resolved = rows.iter().any(|(value, row)| {
+            let turn = (value * scale).abs();
+            scale *= left;
+            !(turn <= seen * rounding(&rows[0].1) || value.abs() <= NOISE * rounding(row))
+        });
+        if resolved {
+            return Ok(false);
+        }
+        let before = (self.config.clone(), self.sliding.clone(), self.x.clone());
+        let marks = (self.along.clone(), self.fresh_guard.clone(), self.tangent_guard.clone());
+        let mut sliding = self.sliding.clone();
+        sliding.push(guard);
+        sliding.sort_unstable();
+        self.adopt(config, sliding);
+        self.turned.retain(|(other, _)| *other != guard);
+        self.turned.push((guard, turned));
+        if let Some(x) = self.where_all_vanish(at) {
+            self.x = x;
+            let none = vec![false; self.slides.len()];
+            let decided = self.decide(&self.sliding.clone(), &none).is_ok();
+            if decided && self.config.higher.contains(&guard) {
+                if self.tangents.is_some() {
+                    return Err(self.no_tangents(
+                        "sliding of higher order begins, where neighbours have no common linear \
+                            motion",
+                    ));
+                }
+                return Ok(true);
+            }
+        }
+        self.x = before.2;
+        self.adopt(before.0, before.1);
+        (self.along, self.fresh_guard, self.tangent_guard) = marks;
+        Ok(false)
+    }
+
+    /// The time after which sliding of second order has begun, by the speed with which the sides
+    /// turn the motion back; none if they do not, or if they do not brake it, either, as the root
+    /// of super-twisting does. `config` is the one that slides, `plain` the one before.
+    fn brakes(
+        &mut self,
+        guard: usize,
+        config: &Configuration,
+        plain: &Configuration,
+    ) -> Option<f64> {
+        let (speed, up, _) = self.beside(guard, config, -1.0, 0.0)?;
+        let (_, down, _) = self.beside(guard, config, 1.0, 0.0)?;
+        let above = self.beside(guard, plain, 1.0, BESIDE)?.1;
+        let below = self.beside(guard, plain, -1.0, -BESIDE)?.1;
+        (up > 0.0 && down < 0.0 && above < below).then(|| speed.abs() / up.min(-down))
+    }
+
+    /// A switching function, its rate and the field on one side of its zero, as far away as
+    /// `beside` says in units of the states.
+    fn beside(
+        &mut self,
+        guard: usize,
+        config: &Configuration,
+        side: f64,
+        beside: f64,
+    ) -> Option<(f64, f64, Vec<f64>)> {
+        let mut config = config.clone();
+        config.sides[guard] = side;
+        self.follow_sides(&mut config, &[guard]);
+        let compiled = self.equation.compiled(&config);
+        let place = compiled.place(guard)?;
+        let mut variables = self.load(&config);
+        let gradients = compiled.gradients(&variables);
+        for (i, slope) in compiled.touches[place].iter().zip(&gradients[place]) {
+            if *i < self.n {
+                variables[*i] += beside * slope.signum() * self.width(*i);
+            }
+        }
+        let mut field = vec![0.0; self.n];
+        compiled.field.evaluate(&variables, &mut field);
+        let mut out = vec![0.0; compiled.outputs];
+        compiled.watched.evaluate(&variables, &mut out);
+        let rate = Self::along(&compiled, &variables, &field)[place];
+        Some((out[place], rate, field))
+    }
+
+    /// The states whose speeds differ by the side of a switching function.
+    fn turned(&mut self, guard: usize, plain: &Configuration) -> Option<Vec<bool>> {
+        let [up, down] = [1.0, -1.0].map(|side| self.beside(guard, plain, side, BESIDE));
+        let (up, down) = (up?.2, down?.2);
+        // The root of |h| has no value on the wrong side.
+        let differ = |(a, b): (&f64, &f64)| !((a - b).abs() <= BESIDE * (a.abs() + b.abs()));
+        Some(up.iter().zip(&down).map(differ).collect())
+    }
+
+    /// Whether a state is moved by the sides of what is slid upon in higher order, and put where
+    /// that vanishes after each step.
+    pub(super) fn is_put(&self, state: usize) -> bool {
+        let slid =
+            |(guard, by): &(usize, Vec<bool>)| by[state] && self.config.higher.contains(guard);
+        self.turned.iter().any(slid)
+    }
+
+    /// A state's size, or a part of the largest one's; one where all have been zero.
+    pub(super) fn width(&self, i: usize) -> f64 {
+        let largest = self.size.iter().fold(0.0_f64, |most, size| most.max(*size));
+        if largest > 0.0 { self.size[i].max(1e-3 * largest) } else { 1.0 }
+    }
+
+    /// Values of a program and their slopes by the states, each times the state's size.
+    fn slopes_by_size(
+        &self,
+        program: &twofold_num::tape::Program,
+        outputs: usize,
+        variables: &[f64],
+    ) -> Vec<(f64, Vec<f64>)> {
+        let mut rows = vec![(0.0, vec![0.0; self.n]); outputs];
+        let mut out = vec![Dual::<f64, 1>::constant(0.0); outputs];
+        for i in 0..self.n {
+            let mut duals: Vec<_> = variables.iter().map(|v| Dual::constant(*v)).collect();
+            duals[i].partials[0] = self.width(i);
+            program.evaluate(&duals, &mut out);
+            for ((value, row), found) in rows.iter_mut().zip(&out) {
+                (*value, row[i]) = (found.value, found.partials[0]);
+            }
+        }
+        rows
+    }
+
+    /// The nearest point at which a function that is slid upon in higher order, and its
+    /// derivatives, are zero, by Newton's method; none if it ends nowhere. Only states that its
+    /// sides move are changed.
+    fn where_all_vanish(&self, at: usize) -> Option<Vec<f64>> {
+        const MOST: usize = 8;
+        let (program, outputs) = self.compiled.derivatives.get(at)?.as_ref()?;
+        let (_, by) = self.turned.iter().find(|(guard, _)| *guard == self.config.higher[at])?;
+        let mut variables = self.load(&self.config);
+        for _ in 0..MOST {
+            let mut rows = self.slopes_by_size(program, *outputs, &variables);
+            for (_, row) in &mut rows {
+                row.iter_mut().zip(by).filter(|(_, by)| !**by).for_each(|(v, _)| *v = 0.0);
+            }
+            let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+            let gram: Vec<f64> =
+                rows.iter().flat_map(|a| rows.iter().map(|b| dot(&a.1, &b.1))).collect();
+            let off: Vec<f64> = rows.iter().map(|(value, _)| *value).collect();
+            let found = solve_any(&gram, &off, 0.0)?;
+            let mut moved = 0.0_f64;
+            for i in 0..self.n {
+                let change: f64 = rows.iter().zip(&found).map(|((_, row), v)| row[i] * v).sum();
+                variables[i] -= self.width(i) * change;
+                moved = moved.max(change.abs());
+            }
+            if !moved.is_finite() {
+                return None;
+            }
+            if moved <= 4.0 * f64::EPSILON {
+                break;
+            }
+        }
+        variables.truncate(self.n);
+        Some(variables)
     }
 
     /// The gradients of functions, by place and guard, in the states at the present point.

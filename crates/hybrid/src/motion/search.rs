@@ -1038,6 +1038,8 @@ impl Follower<'_> {
         let mut zero = slid.clone();
         zero.push(guard);
         self.settle(&zero)?;
+        self.switch_trains[guard].note(self.t, 0.0);
+        self.slides_in_higher_order(guard)?;
         let x = self.x.clone();
         self.rhs(self.t, &x, &mut field);
         if !self.sliding.is_empty() && field.iter().any(|v| !v.is_finite()) {
@@ -1046,6 +1048,26 @@ impl Follower<'_> {
         }
         self.after(tangents)?;
         Ok(self.t > t || self.config != before || self.sliding != slid)
+    }
+
+    /// Whether motion for which there is no step goes on otherwise: at a switch very near to it, at
+    /// rest, or sliding in higher order.
+    pub(super) fn goes_on_at_an_edge(&mut self) -> Result<bool, HybridError> {
+        if self.land_at_an_edge()? || self.comes_to_rest(self.t, true) {
+            return Ok(true);
+        }
+        let values = self.watched_values();
+        let active = self.compiled.active.clone().into_iter().enumerate();
+        let zero = |(place, guard): &(usize, usize)| {
+            let size = self.magnitude(&self.equation.guards[*guard].expression);
+            !self.slides[*guard] && values[*place].abs() <= 1e-12 * size
+        };
+        for (_, guard) in active.filter(zero).collect::<Vec<_>>() {
+            if self.slides_in_higher_order(guard)? {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 
     /// The switch that a straight motion comes to next, if that is very soon; `field` is that of

@@ -1191,6 +1191,11 @@ impl Follower<'_> {
                     return Ok(());
                 }
                 [] if self.meets_more(&zero)? => return Ok(()),
+                [] if set.len() == 1 && self.slides_in_higher_order(zero[set[0]])? => {
+                    let mut rest = self.sliding.clone();
+                    rest.extend(zero.iter().filter(|guard| !self.slides[**guard]));
+                    return self.decide(&rest, &self.slides.clone());
+                }
                 [] => {
                     let idle = self.idle_kinks(&zero);
                     let rest: Vec<usize> =

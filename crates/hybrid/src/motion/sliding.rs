@@ -60,6 +60,7 @@ impl Follower<'_> {
             config.sides[*guard] = self.low(*guard);
         }
         config.slid = if self.equation.has_domain_ends { sliding.clone() } else { Vec::new() };
+        config.higher.retain(|guard| sliding.contains(guard));
         self.follow_sides(&mut config, &sliding);
         let also = self.asked_beyond(&mut config, &sliding);
         self.slides.fill(false);
