@@ -404,6 +404,11 @@ impl Equation {
         })
     }
 
+    /// An expression as a tape, if no switching function decides it.
+    pub(crate) fn plain_tape(&self, e: &Expression) -> Option<Tape> {
+        self.is_plain(e).then(|| self.record(&[e]))
+    }
+
     fn reset(&self, set: &[(usize, Expression)]) -> Option<Program> {
         self.reset_tape(set).map(|tape| Program::new(&tape))
     }

@@ -34,6 +34,11 @@ impl Range {
         )
     }
 
+    /// The middle.
+    pub fn middle(self) -> f64 {
+        self.middle
+    }
+
     /// The distance from the middle up to which they are.
     pub fn radius(self) -> f64 {
         self.radius

@@ -8,9 +8,11 @@
 //! the least step where the equations leave a direction open; rests that fill a curve, such as a
 //! block that sticks within friction, are followed to both ends.
 
-use twofold_num::Dual;
+mod sides;
+
 use twofold_num::elementary::sqrt;
 use twofold_num::linear::{eigenvalues, solve_any};
+use twofold_num::{Arithmetic, Dual};
 use twofold_system::Expression;
 
 use crate::definition::{Direction, Event, When};
@@ -18,6 +20,8 @@ use crate::equation::{Configuration, Equation, EquationError};
 use crate::model::Model;
 use crate::motion::determinant_of_negative;
 use crate::motion::tangent::apart;
+use crate::range::Range;
+use sides::Linear;
 
 /// A switching surface on which a rest lies.
 #[derive(Clone, Debug, PartialEq)]
@@ -132,6 +136,68 @@ impl Rest {
     }
 }
 
+/// Rests, and what was not looked at.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Found {
+    /// The rests, by the smallest coordinates first.
+    pub rests: Vec<Rest>,
+    /// Limits that the search met: there may be more rests.
+    pub limits: Vec<Limit>,
+}
+
+/// A limit that a search for rests met.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Limit {
+    /// Starts led to new rests to the end.
+    Starts {
+        /// Number of starts.
+        count: usize,
+    },
+    /// Not all combinations of sides were tried.
+    Sides {
+        /// Number of switching functions.
+        functions: usize,
+        /// Number of combinations.
+        tried: usize,
+    },
+    /// Not all sets of so many surfaces, or of more, were looked at.
+    Surfaces {
+        /// Number of surfaces in a set.
+        together: usize,
+    },
+    /// Not all surfaces of a whole part were looked at.
+    Levels {
+        /// The expression whose whole part is asked for.
+        of: String,
+    },
+}
+
+impl std::fmt::Display for Limit {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Starts { count } => write!(
+                f,
+                "new rests were found up to the last of {count} starts: there may be more"
+            ),
+            Self::Sides { functions, tried } => write!(
+                f,
+                "{tried} combinations of the sides of {functions} switching functions were tried, \
+                    but the box has more: there may be more rests"
+            ),
+            Self::Surfaces { together } => write!(
+                f,
+                "not all points of {together} or more switching surfaces at once were looked at"
+            ),
+            Self::Levels { of } => write!(
+                f,
+                "of the whole part of {of} the {MOST_LEVELS} switching surfaces in the middle of \
+                    the box were looked at"
+            ),
+        }
+    }
+}
+
 /// Why no rests are looked for.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RestError {
@@ -150,14 +216,22 @@ pub enum RestError {
 const ON_A_FACE: f64 = 1e-12;
 /// Part of the box's width to which a state is taken to be known where its stability is judged.
 const KNOWN_TO: f64 = 1e-9;
+/// Zeros of a field nearer to each other, in widths of the box, may be one of higher order.
+const INDISTINCT: f64 = 1e-4;
 /// Starts of Newton's method in a field and on each surface.
 const STARTS: usize = 400;
+/// There are more until this many times as many as led to the last new rest.
+const WITHOUT_NEWS: usize = 4;
+/// At most.
+const MOST_STARTS: usize = 40_000;
 /// Sets of several surfaces share as many; each has so many at least.
 const LEAST_STARTS: usize = 20;
 /// Starts with each set of answers that no other start has.
 const FEW_STARTS: usize = 4;
-/// Functions of which all sets of answers are tried.
-const MOST_UNMET: usize = 6;
+/// Sets of answers that are tried in a field, and together on all sets of surfaces of one size.
+const MOST_ANSWERS: usize = 4096;
+/// On each set of surfaces so many at least: all of six functions.
+const LEAST_ANSWERS: usize = 64;
 const MOST_ITERATIONS: usize = 60;
 /// Where steps still become shorter, as they do at a zero of higher order.
 const MANY_ITERATIONS: usize = 400;
@@ -165,6 +239,8 @@ const MANY_ITERATIONS: usize = 400;
 const MOST_TOGETHER: usize = 4;
 /// Larger sets of surfaces are not looked at if there are more of one size than this.
 const MOST_SETS: usize = 256;
+/// Sets of surfaces that are listed before those without a common point are left out.
+const MOST_LISTED: usize = 4096;
 /// Surfaces of one whole part, those nearest to the middle of its values in the box.
 const MOST_LEVELS: usize = 128;
 /// Places between two rests from which a third is looked for, in shares of the way.
@@ -195,6 +271,22 @@ const MOST_PAIRED: usize = 24;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn rests(model: &Model, within: &[(f64, f64)]) -> Result<Vec<Rest>, RestError> {
+    Ok(find(model, within)?.rests)
+}
+
+/// The rests of a system in a box, and what was not looked at.
+///
+/// # Errors
+/// As [`rests`].
+///
+/// ```
+/// use twofold_hybrid::{Definition, Model, rests::find};
+/// let model = Model::new(Definition::from_toml("states = ['x']\nf = ['x - x^3']", "f")?);
+/// let found = find(&model, &[(-3.0, 3.0)])?;
+/// assert!(found.rests.len() == 3 && found.limits.is_empty());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn find(model: &Model, within: &[(f64, f64)]) -> Result<Found, RestError> {
     let equation = Equation::new(model, None)?;
     let n = equation.dimension();
     if within.len() != n || !within.iter().all(|(a, b)| a.is_finite() && b.is_finite() && a < b) {
@@ -206,23 +298,40 @@ pub fn rests(model: &Model, within: &[(f64, f64)]) -> Result<Vec<Rest>, RestErro
         return Err(RestError::Driven);
     }
     let widths = within.iter().map(|(a, b)| b - a).collect();
-    let mut search = Search { equation, n, widths, within, constant: Vec::new() };
+    let mut search =
+        Search { equation, n, widths, within, constant: Vec::new(), linear: Vec::new() };
     let places: Vec<Vec<f64>> = (0..STARTS).map(|start| search.place(start)).collect();
     let value = |e: &Expression, x: &Vec<f64>| search.equation.value(e, 0.0, x);
     let guards = search.equation.guards.iter().map(|guard| &guard.expression);
     search.constant =
         guards.map(|e| places.iter().all(|x| value(e, x) == value(e, &places[0]))).collect();
+    let bound = |guard: &crate::equation::Guard| {
+        if guard.whole { None } else { Linear::of(&search.equation, &guard.expression, within) }
+    };
+    search.linear = search.equation.guards.iter().map(bound).collect();
     let mut found: Vec<Rest> = Vec::new();
+    let mut limits: Vec<Limit> = Vec::new();
+    // One of each kind is said, the first.
+    let mut meet = |limit: Limit| {
+        let kind = std::mem::discriminant(&limit);
+        if limits.iter().all(|known| std::mem::discriminant(known) != kind) {
+            limits.push(limit);
+        }
+    };
     for mode in 0..model.definition().modes().len() {
         let configs: Vec<Configuration> =
             places.iter().map(|x| search.configuration(mode, x)).collect();
-        let surfaces = search.surfaces(&configs);
+        let surfaces = search.surfaces(&configs, &mut meet);
+        // The equations are continuous on a kink: no mixture of the fields beside it is another.
+        let jumps: Vec<Surface> =
+            surfaces.iter().filter(|s| !search.equation.guards[s.guard].kink).copied().collect();
         for together in 0..=MOST_TOGETHER.min(search.n) {
-            let mut sets = subsets(&surfaces, together);
+            let mut sets = search.sets(&jumps, together);
             if sets.len() > MOST_SETS && together > 1 {
+                meet(Limit::Surfaces { together });
                 let single: Vec<Surface> =
-                    surfaces.iter().filter(|s| s.level.is_none()).copied().collect();
-                sets = subsets(&single, together);
+                    jumps.iter().filter(|s| s.level.is_none()).copied().collect();
+                sets = search.sets(&single, together);
                 if sets.len() > MOST_SETS {
                     break;
                 }
@@ -234,13 +343,32 @@ pub fn rests(model: &Model, within: &[(f64, f64)]) -> Result<Vec<Rest>, RestErro
                 }
                 _ => (STARTS / sets.len().max(1)).max(LEAST_STARTS),
             };
+            let most_answers = (MOST_ANSWERS / sets.len().max(1)).max(LEAST_ANSWERS);
             for on in &sets {
-                for (number, config) in configs.iter().enumerate().take(starts) {
-                    search.add(config, on, &places[number], number, &mut found);
+                let (mut number, mut last_new) = (0, 0);
+                while number < starts.max(WITHOUT_NEWS * last_new) {
+                    if number == MOST_STARTS {
+                        meet(Limit::Starts { count: MOST_STARTS });
+                        break;
+                    }
+                    let known = found.len();
+                    match (places.get(number), configs.get(number)) {
+                        (Some(x), Some(config)) => search.add(config, on, x, number, &mut found),
+                        _ => {
+                            let x = search.place(number);
+                            let config = search.configuration(mode, &x);
+                            search.add(&config, on, &x, number, &mut found);
+                        }
+                    }
+                    number += 1;
+                    if found.len() > known {
+                        last_new = number;
+                    }
                 }
                 let met = &configs[..starts.min(configs.len())];
-                for (number, config) in search.unmet(met, &surfaces, on) {
-                    search.add(&config, on, &places[number], number, &mut found);
+                let answers = search.unmet(met, &places, &surfaces, (on, most_answers), &mut meet);
+                for (number, (x, config)) in answers.into_iter().enumerate() {
+                    search.add(&config, on, &x, number % (FEW_STARTS + 1), &mut found);
                 }
                 search.add_between(mode, on, &mut found);
             }
@@ -270,7 +398,7 @@ pub fn rests(model: &Model, within: &[(f64, f64)]) -> Result<Vec<Rest>, RestErro
         let by_state = a.x.iter().zip(&b.x).map(|(p, q)| p.total_cmp(q)).find(|o| o.is_ne());
         a.mode.cmp(&b.mode).then(by_state.unwrap_or(std::cmp::Ordering::Equal))
     });
-    Ok(found)
+    Ok(Found { rests: found, limits })
 }
 
 /// Where a switching function switches: at zero, or where its whole part becomes a number.
@@ -291,6 +419,19 @@ impl Surface {
     }
 }
 
+/// Sets of `size` surfaces, each of another function.
+fn distinct(of: &[Surface], size: usize) -> Vec<Vec<Surface>> {
+    let Some((first, rest)) = of.split_first().filter(|_| size > 0) else {
+        return if size == 0 { vec![Vec::new()] } else { Vec::new() };
+    };
+    let others: Vec<Surface> = rest.iter().filter(|s| s.guard != first.guard).copied().collect();
+    let with = distinct(&others, size - 1).into_iter().map(|mut s| {
+        s.insert(0, *first);
+        s
+    });
+    with.chain(distinct(rest, size)).take(MOST_LISTED).collect()
+}
+
 /// Subsets of `size`.
 fn subsets<T: Clone>(of: &[T], size: usize) -> Vec<Vec<T>> {
     match (size, of.split_first()) {
@@ -301,7 +442,7 @@ fn subsets<T: Clone>(of: &[T], size: usize) -> Vec<Vec<T>> {
                 s.insert(0, first.clone());
                 s
             });
-            with.chain(subsets(rest, size)).take(MOST_SETS + 1).collect()
+            with.chain(subsets(rest, size)).collect()
         }
     }
 }
@@ -327,6 +468,8 @@ struct Search<'a> {
     /// Guards that have one value in the whole box, as those that a parameter makes zero: they are
     /// no surfaces.
     constant: Vec<bool>,
+    /// A bound of each guard in the box.
+    linear: Vec<Option<Linear>>,
 }
 
 /// A field with its Jacobian, row by row.
@@ -391,7 +534,7 @@ impl Search<'_> {
     }
 
     /// The surfaces that equations with these answers ask.
-    fn surfaces(&self, configs: &[Configuration]) -> Vec<Surface> {
+    fn surfaces(&self, configs: &[Configuration], meet: &mut dyn FnMut(Limit)) -> Vec<Surface> {
         let guards = &self.equation.guards;
         let mut ends = vec![None; guards.len()];
         for config in configs {
@@ -402,13 +545,16 @@ impl Search<'_> {
                 ends[*guard] = Some((side.min(low), side.max(high)));
             }
         }
-        let of = |(guard, ends): (usize, Option<(f64, f64)>)| -> Vec<Surface> {
+        let mut of = |(guard, ends): (usize, Option<(f64, f64)>)| -> Vec<Surface> {
             match ends {
                 None => Vec::new(),
                 Some(_) if !guards[guard].whole => vec![Surface { guard, level: None }],
                 Some((low, high)) => {
                     // Surfaces at the box's edges may have no place behind them.
                     let spare = (0.5 * (high + 2.0 - low - MOST_LEVELS as f64)).max(0.0).floor();
+                    if spare > 0.0 {
+                        meet(Limit::Levels { of: guards[guard].expression.to_string() });
+                    }
                     let first = low + spare;
                     let count = (high + 2.0 - low - 2.0 * spare).min(MOST_LEVELS as f64) as usize;
                     let levels = (0..count).map(|k| Some(first + k as f64));
@@ -416,40 +562,62 @@ impl Search<'_> {
                 }
             }
         };
-        ends.into_iter().enumerate().flat_map(of).collect()
+        ends.into_iter().enumerate().flat_map(&mut of).collect()
     }
 
-    /// Answers of the functions that switch at zero, but for those in `on`, that no place has met:
-    /// the part of the box that they hold in may be small. Each with the places to start from.
+    /// The bounds of surfaces in the box.
+    fn linear(&self, on: &[Surface]) -> Vec<Option<Linear>> {
+        let bound = |s: &Surface| self.linear[s.guard].clone().filter(|_| s.level.is_none());
+        on.iter().map(bound).collect()
+    }
+
+    /// Sets of so many surfaces that may have a common point in the box.
+    fn sets(&self, of: &[Surface], together: usize) -> Vec<Vec<Surface>> {
+        let mut sets = distinct(of, together);
+        sets.retain(|on| sides::meet(&self.linear(on), self.within));
+        sets
+    }
+
+    /// Answers of the functions that switch at zero, but for those in `on`, that few places have
+    /// met: the part of the box that they hold in may be small. Each with places to start from.
     fn unmet(
         &self,
         met: &[Configuration],
+        places: &[Vec<f64>],
         surfaces: &[Surface],
-        on: &[Surface],
-    ) -> Vec<(usize, Configuration)> {
+        (on, most): (&[Surface], usize),
+        meet: &mut dyn FnMut(Limit),
+    ) -> Vec<(Vec<f64>, Configuration)> {
         let guards: Vec<usize> = surfaces
             .iter()
             .filter(|s| s.level.is_none() && !on.contains(s))
             .map(|s| s.guard)
             .collect();
-        if guards.len() > MOST_UNMET {
+        let Some(mode) = met.first().map(|config| config.mode) else { return Vec::new() };
+        if guards.is_empty() {
             return Vec::new();
         }
-        let answers = |bits: usize| {
-            let side = move |i: usize| if bits >> i & 1 == 1 { 1.0 } else { -1.0 };
-            guards.iter().enumerate().map(move |(i, guard)| (*guard, side(i)))
-        };
-        let is_met = |bits: &usize| {
-            met.iter().any(|config| answers(*bits).all(|(g, side)| config.sides[g] == side))
-        };
-        let unmet = (0..1_usize << guards.len()).filter(|bits| !is_met(bits));
-        let starts = unmet.flat_map(|bits| met.iter().take(FEW_STARTS).map(move |c| (bits, c)));
-        let of = |(number, (bits, place)): (usize, (usize, &Configuration))| {
-            let mut config = place.clone();
-            answers(bits).for_each(|(guard, side)| config.sides[guard] = side);
-            (number % FEW_STARTS, config)
-        };
-        starts.enumerate().map(of).collect()
+        let functions: Vec<Option<Linear>> =
+            guards.iter().map(|guard| self.linear[*guard].clone()).collect();
+        let patterns = sides::patterns(&functions, &self.linear(on), self.within, most);
+        if patterns.more {
+            meet(Limit::Sides { functions: guards.len(), tried: most });
+        }
+        let mut starts = Vec::new();
+        for (sides, place) in patterns.found {
+            let answered = |config: &Configuration| {
+                let mut config = config.clone();
+                guards.iter().zip(&sides).for_each(|(guard, side)| config.sides[*guard] = *side);
+                config
+            };
+            if met.iter().filter(|config| answered(config) == **config).count() < FEW_STARTS {
+                let config = answered(&self.configuration(mode, &place));
+                starts.push((place, config));
+                let others = places.iter().zip(met).take(FEW_STARTS);
+                starts.extend(others.map(|(x, config)| (x.clone(), answered(config))));
+            }
+        }
+        starts
     }
 
     /// The number of surfaces of the switching function that has most.
@@ -565,8 +733,39 @@ impl Search<'_> {
             same && match &r.family {
                 Some(family) if family.dimension > 1 => dimension > 1,
                 Some(_) => self.passes(r, x),
-                None => self.near(&r.x, x),
+                None => {
+                    if on.is_empty() && dimension == 0 {
+                        self.distance(&r.x, x) <= INDISTINCT && !self.are_parted(config, &r.x, x)
+                    } else {
+                        self.near(&r.x, x)
+                    }
+                }
             }
+        })
+    }
+
+    /// Whether a field is larger between two zeros that are near to each other than at both, beyond
+    /// rounding: at one zero of higher order, to which Newton's method came twice, it is not.
+    fn are_parted(&self, config: &Configuration, a: &[f64], b: &[f64]) -> bool {
+        const SAME: f64 = 1e-12;
+        if self.distance(a, b) <= SAME {
+            return false;
+        }
+        let size = |x: &[f64]| self.local(config, x).field;
+        let (at_a, at_b) = (size(a), size(b));
+        let compiled = self.equation.compiled(config);
+        BETWEEN.iter().any(|share| {
+            let x: Vec<f64> = a.iter().zip(b).map(|(a, b)| a + share * (b - a)).collect();
+            let mut variables: Vec<Range> = x.iter().map(|x| Range::new(*x, 0.0)).collect();
+            variables.push(Range::from_f64(0.0));
+            variables.extend(config.sides.iter().map(|side| Range::from_f64(*side)));
+            let mut field = vec![Range::default(); self.n];
+            compiled.field.evaluate(&variables, &mut field);
+            (0..self.n).any(|i| {
+                let value = field[i].middle();
+                let ends = at_a[i].abs().max(at_b[i].abs());
+                value.abs() > 100.0 * ends && field[i].is_beyond(0.0, value.signum())
+            })
         })
     }
 

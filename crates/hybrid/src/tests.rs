@@ -2883,6 +2883,102 @@ fn rests_in_narrow_strips_are_found() {
     }
 }
 
+/// Linear pieces have one zero each, which is a rest if it lies in its piece: of four saturations in
+/// three states (eight switching functions) the same rests are found.
+#[test]
+fn rests_of_many_linear_pieces_are_found() {
+    const N: usize = 3;
+    const CLIPS: usize = 4;
+    let mut draws = twofold_num::random::RandomStream::new(17, 0);
+    for system in 0..12 {
+        let mut draw = |count: usize| -> Vec<f64> { (0..count).map(|_| draws.normal()).collect() };
+        let (a, b, c, h, d) = (draw(N * N), draw(N), draw(N * CLIPS), draw(CLIPS * N), draw(CLIPS));
+        let c: Vec<f64> = c.iter().map(|c| 2.0 * c).collect();
+        let sum = |row: &[f64]| {
+            let terms: Vec<String> = (0..N).map(|j| format!("({})*x{j}", row[j])).collect();
+            terms.join(" + ")
+        };
+        let f = (0..N).map(|i| {
+            let clips = (0..CLIPS).map(|k| {
+                let inner = sum(&h[k * N..(k + 1) * N]);
+                format!("({})*clip({inner} + ({}), -1, 1)", c[i * CLIPS + k], d[k])
+            });
+            let linear = [sum(&a[i * N..(i + 1) * N]), format!("({})", b[i])];
+            format!("'{}'", linear.into_iter().chain(clips).collect::<Vec<_>>().join(" + "))
+        });
+        let f: Vec<String> = f.collect();
+        let text = format!("states = ['x0', 'x1', 'x2']\nf = [{}]", f.join(", "));
+        let found = crate::rests::find(&model(&text), &[(-10.0, 10.0); N]).unwrap();
+        assert!(found.limits.is_empty(), "{:?}", found.limits);
+        let mut right = Vec::new();
+        for piece in 0..3_usize.pow(CLIPS as u32) {
+            let state = |k: usize| piece / 3_usize.pow(k as u32) % 3;
+            let (mut matrix, mut constant) = (a.clone(), b.clone());
+            for i in 0..N {
+                for k in 0..CLIPS {
+                    let c = c[i * CLIPS + k];
+                    match state(k) {
+                        0 => constant[i] -= c,
+                        1 => constant[i] += c,
+                        _ => {
+                            constant[i] += c * d[k];
+                            (0..N).for_each(|j| matrix[i * N + j] += c * h[k * N + j]);
+                        }
+                    }
+                }
+            }
+            let minus: Vec<f64> = constant.iter().map(|v| -v).collect();
+            let x = twofold_num::linear::solve_any(&matrix, &minus, 0.0).unwrap();
+            let value = |k: usize| (0..N).map(|j| h[k * N + j] * x[j]).sum::<f64>() + d[k];
+            let own = (0..CLIPS).all(|k| match state(k) {
+                0 => value(k) < -1.0,
+                1 => value(k) > 1.0,
+                _ => value(k).abs() < 1.0,
+            });
+            if own && x.iter().all(|x| x.abs() < 10.0) {
+                right.push(x);
+            }
+        }
+        assert_eq!(found.rests.len(), right.len(), "{system}: {found:?} {right:?}");
+        for x in right {
+            let is_it = |r: &crate::rests::Rest| (0..N).all(|i| (r.x[i] - x[i]).abs() < 1e-9);
+            assert!(found.rests.iter().any(is_it), "{system}: {x:?}");
+        }
+    }
+}
+
+/// As many as there are, of which 400 starts do not find all.
+#[test]
+fn many_rests_are_found() {
+    let find = |f: &str| {
+        let text = format!("states = ['x', 'y']\nf = [{f}]");
+        crate::rests::find(&model(&text), &[(-10.0, 10.0); 2]).unwrap()
+    };
+    for (factor, along) in [(2.0, 13), (5.0, 31)] {
+        let found = find(&format!("'sin({factor}*x)', 'sin({factor}*y)'"));
+        assert_eq!((found.rests.len(), found.limits.len()), (along * along, 0), "{factor}");
+    }
+    // Nearer to each other than what a zero of higher order is known to.
+    let near_by: Vec<f64> = find("'x^3 - 1e-12*x', 'y'").rests.iter().map(|r| r.x[0]).collect();
+    assert_eq!(near_by.len(), 3, "{near_by:?}");
+    near_by.iter().zip([-1e-6, 0.0, 1e-6]).for_each(|(x, right)| near(*x, right, 1e-15));
+    for f in ["'x^2', 'y'", "'x^2 - 2*x + 1', 'y'", "'x^3 - 3*x^2 + 3*x - 1', 'y'"] {
+        assert_eq!(find(f).rests.len(), 1, "{f}");
+    }
+}
+
+/// Thirteen signs of thirteen states have 8192 combinations: it is said that not all were tried.
+#[test]
+fn what_was_not_looked_at_is_said() {
+    let names: Vec<String> = (0..13).map(|i| format!("'x{i}'")).collect();
+    let f: Vec<String> = (0..13).map(|i| format!("'2 + sign(x{i})'")).collect();
+    let text = format!("states = [{}]\nf = [{}]", names.join(", "), f.join(", "));
+    let found = crate::rests::find(&model(&text), &[(-1.0, 1.0); 13]).unwrap();
+    let has = |limit: &crate::rests::Limit| found.limits.contains(limit);
+    assert!(has(&crate::rests::Limit::Sides { functions: 13, tried: 4096 }), "{found:?}");
+    assert!(has(&crate::rests::Limit::Surfaces { together: 3 }), "{found:?}");
+}
+
 /// One focus with eigenvalues 0.2 +- i, whatever the units of its states.
 #[test]
 fn a_rest_has_no_units() {

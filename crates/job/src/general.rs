@@ -6,7 +6,7 @@ use twofold_analyse::path::MOST_POINTS;
 use twofold_hybrid::motion::sensitivity::sensitivities;
 use twofold_hybrid::motion::tangent::exponents;
 use twofold_hybrid::motion::{Exit, Method, Record};
-use twofold_hybrid::rests::rests;
+use twofold_hybrid::rests::find;
 use twofold_hybrid::selection::Intersection;
 use twofold_hybrid::{
     Definition, Ending, Equation, HybridError, Model, Options, Point, follow_watched,
@@ -562,11 +562,13 @@ impl Question for GeneralRests {
         json!({ "system": self.model.json(), "within": self.within })
     }
 
-    /// Facts: `states` (their names) and `rests`, a list of [`Resting`]s.
+    /// Facts: `states` (their names), `rests`, a list of [`Resting`]s, and, if the search met
+    /// limits, `limits`, sentences about what was not looked at.
     fn compute(&self, _: &dyn Ask, _: &dyn Monitor) -> Result<Answer, JobError> {
-        let found = rests(&self.model, &self.within)?;
+        let found = find(&self.model, &self.within)?;
         let modes = self.model.definition().modes();
         let list: Vec<Resting> = found
+            .rests
             .iter()
             .map(|rest| Resting {
                 state: rest.x.clone(),
@@ -594,9 +596,14 @@ impl Question for GeneralRests {
                 behind: rest.behind.clone(),
             })
             .collect();
-        Ok(Answer::of_tables(Vec::new())
+        let answer = Answer::of_tables(Vec::new())
             .with_fact("states", &self.model.coordinates())
-            .with_fact("rests", &list))
+            .with_fact("rests", &list);
+        if found.limits.is_empty() {
+            return Ok(answer);
+        }
+        let limits: Vec<String> = found.limits.iter().map(ToString::to_string).collect();
+        Ok(answer.with_fact("limits", &limits))
     }
 }
 

@@ -91,10 +91,16 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
             let found: Vec<Resting> = answer.fact("rests").map_err(JobError::from)?;
             let sizes: Vec<f64> =
                 question.within.iter().map(|(low, high)| low.abs().max(high.abs())).collect();
-            let lines: Vec<String> =
+            let mut lines: Vec<String> =
                 found.iter().map(|rest| line(rest, &names, &sizes, several)).collect();
-            let none = "no rest was found in the box (--within)".to_owned();
-            format!("{}\n", if lines.is_empty() { none } else { lines.join("\n") }).into_bytes()
+            if lines.is_empty() {
+                lines.push("no rest was found in the box (--within)".into());
+            }
+            if answer.facts.contains_key("limits") {
+                let limits: Vec<String> = answer.fact("limits").map_err(JobError::from)?;
+                lines.extend(limits.iter().map(|limit| format!("incomplete: {limit}")));
+            }
+            format!("{}\n", lines.join("\n")).into_bytes()
         }
         Format::Json => {
             encode::json(&answer, &json!({ "kind": question.kind(), "question": question.json() }))
