@@ -1665,24 +1665,34 @@ impl<'a> Follower<'a> {
         let due = clock.take(self.t);
         let (mut config, sliding) = (self.config.clone(), self.sliding.clone());
         config.pieces = self.equation.tables.iter().map(|table| table.piece(self.t)).collect();
-        let values = self.watched_values();
-        let slid: Vec<f64> = sliding
-            .iter()
-            .map(|g| self.compiled.place(*g).map_or(f64::NAN, |p| values[p]))
-            .collect();
+        let (asked, values) = (self.compiled.active.clone(), self.watched_values());
         self.tables_step = config.pieces != self.config.pieces;
         if self.tables_step {
-            self.watched_before = values[self.compiled.active.len()..].to_vec();
+            self.watched_before = values[asked.len()..].to_vec();
         }
         self.adopt(config, sliding.clone());
+        let mut met = met.to_vec();
         if !self.equation.tables.is_empty() {
-            // A table's jump may carry switching functions over zero, or away from it.
-            self.leave_by_jump(&sliding, &slid);
+            // A table's jump may carry switching functions over zero, or away from it, those that
+            // are met at this moment, too.
+            let left = self.leave_by_jump(&asked, &values);
+            met.retain(|sought| match *sought {
+                Sought::Guard { guard, .. } => !left.contains(&guard),
+                Sought::Leave { place, .. } => !left.contains(&sliding[place]),
+                Sought::Repelling => !sliding.iter().any(|guard| left.contains(guard)),
+                _ => true,
+            });
+            for sought in &mut met {
+                if let Sought::Leave { place, .. } = sought {
+                    let at = self.sliding.iter().position(|guard| *guard == sliding[*place]);
+                    *place = at.unwrap_or(*place);
+                }
+            }
             let zero = self.sliding.clone();
             self.follow_jumps(&zero)?;
         }
-        let before = self.before(met)?;
-        let ending = self.meet(definition, met, &due, observe)?;
+        let before = self.before(&met)?;
+        let ending = self.meet(definition, &met, &due, observe)?;
         if ending.is_none() {
             self.after(before)?;
         }

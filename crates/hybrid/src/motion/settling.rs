@@ -1962,8 +1962,7 @@ impl Follower<'_> {
         let mut found = Vec::new();
         for i in 0..self.watch_side.len() {
             let (value, side) = (values[active + i], self.watch_side[i]);
-            let rests =
-                self.contacts.iter().any(|c| c.watched == i) || passed.contains(&i) || side == 0.0;
+            let rests = self.contacts.iter().any(|c| c.watched == i) || passed.contains(&i);
             if rests || held[i] && self.held[i] {
                 continue;
             }
@@ -1971,6 +1970,13 @@ impl Follower<'_> {
             let size = self.magnitude(&self.equation.watched[i]).max(before[i].abs());
             let small = 1e-12 * size;
             let away = value.abs() > small;
+            if side == 0.0 {
+                // What rested at zero is on the side where it arrives.
+                if away && before[i].abs() <= small {
+                    (self.watch_side[i], self.fresh_watch[i]) = (value.signum(), false);
+                }
+                continue;
+            }
             let leaves = held[i] && !away && {
                 self.begin_watching(i, true, false);
                 let ahead = std::mem::replace(&mut self.watch_side[i], side);
