@@ -1256,7 +1256,7 @@ impl<'a> Follower<'a> {
             step.k[0].copy_from_slice(&room);
             self.noise.fill(0.0);
             if !room.iter().all(|v| v.is_finite()) {
-                if self.put_beyond() || self.comes_to_rest(self.t, true) {
+                if self.put_beyond() || self.goes_on_at_an_edge()? {
                     continue;
                 }
                 return Err(self.left_domain(step.t, &step.x));

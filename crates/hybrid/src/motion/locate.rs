@@ -233,6 +233,23 @@ impl Follower<'_> {
         tangent && self.is_fresh(sought)
     }
 
+    /// Whether these values of a function that left zero without a speed are no more than what the
+    /// errors of the states make of it: its side is the one to which it leaves.
+    pub(super) fn is_within_error(&mut self, sought: Sought, values: &[f64]) -> bool {
+        /// Errors of a step, in units of the tolerance.
+        const MOST: f64 = 10.0;
+        if !self.is_tangent(sought) {
+            return false;
+        }
+        let Some(place) = self.place_of(sought) else { return false };
+        let gradient = self.gradient(self.t, place);
+        let of = |(i, slope): (usize, &f64)| {
+            slope.abs() * (self.options.rtol * self.width(i) + self.options.atol.unwrap_or(0.0))
+        };
+        let error: f64 = gradient.iter().enumerate().map(of).sum();
+        values.iter().all(|v| v.abs() <= MOST * error)
+    }
+
     /// Adds the first zero of each function's Taylor series; returns the values at the step's end
     /// where there is a series.
     fn find_in_series(
@@ -316,7 +333,7 @@ impl Follower<'_> {
                     values[4][j] = f64::NAN;
                     continue;
                 }
-                if stays(&v, *side) {
+                if stays(&v, *side) || begins && self.is_within_error(*sought, &v) {
                     continue;
                 }
                 let leaving =

@@ -1774,7 +1774,10 @@ impl Follower<'_> {
         let Some((program, outputs)) = &compiled.derivatives[at] else { return Ok(false) };
         let plain = self.config.clone();
         let turns = self.switch_trains[guard].turns();
-        let left = turns.or_else(|| self.brakes(guard, &config, &plain));
+        let left = match outputs {
+            2 => turns.or_else(|| self.brakes(guard, &config, &plain)),
+            _ => turns,
+        };
         let (Some(left), Some(turned)) = (left, self.turned(guard, &plain)) else {
             return Ok(false);
         };

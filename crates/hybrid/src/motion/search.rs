@@ -1075,13 +1075,20 @@ impl Follower<'_> {
     fn edge_ahead(&mut self, field: &[f64]) -> Option<Edge> {
         let values = self.watched_values();
         let rates = Self::along(&self.compiled, &self.variables, field);
+        let in_time = Self::along(&self.compiled, &self.variables, &vec![0.0; self.n]);
         let soon = 1e-9 * (self.options.t_end - self.options.t_start);
         let mut nearest: Option<Edge> = None;
         for (place, guard) in self.compiled.active.iter().enumerate() {
             let left = -values[place] / rates[place];
-            let open = !self.sliding.contains(guard) && !self.equation.guards[*guard].whole;
+            let g = &self.equation.guards[*guard];
+            let open = !self.sliding.contains(guard) && !g.whole;
+            // Rounding of the state and of the time hides how far it is.
+            let hidden = || {
+                values[place].abs() <= self.grain_of_expression(&g.expression, in_time[place].abs())
+            };
             if open
-                && (0.0..=soon).contains(&left)
+                && (0.0..f64::INFINITY).contains(&left)
+                && (left <= soon || hidden())
                 && rates[place] * self.config.sides[*guard] < 0.0
                 && nearest.as_ref().is_none_or(|best| left < best.left)
             {
@@ -1439,7 +1446,10 @@ impl Follower<'_> {
             self.fresh_watch.fill(false);
             return;
         }
-        for ((sought, _), value) in list.iter().zip(end) {
+        for ((sought, side), value) in list.iter().zip(end) {
+            if value * side < 0.0 && self.is_within_error(*sought, &[*value]) {
+                continue;
+            }
             match *sought {
                 Sought::Guard { guard, .. } if *value != 0.0 => self.fresh_guard[guard] = false,
                 Sought::Watched(i) if *value != 0.0 => self.fresh_watch[i] = false,

@@ -77,7 +77,8 @@ pub fn sensitivities(
     if outcome.ending != Ending::Finished {
         let why =
             format!("the run ends at t = {}, before --t-end: give a time before it", outcome.t);
-        return Err(HybridError::Stuck { t: outcome.t, x: outcome.x, why });
+        let x = outcome.x[..n].to_vec();
+        return Err(HybridError::Stuck { t: outcome.t, x, why });
     }
     let mut vectors = follower.tangents.map_or_else(Vec::new, |t| t.vectors);
     vectors.iter_mut().zip(one_sided).filter(|(_, one)| *one).for_each(|(v, _)| v.fill(f64::NAN));
