@@ -5,7 +5,8 @@ use twofold_job::sweep::{Axis as Over, Values};
 use twofold_num::elementary::{pow, sqrt};
 use twofold_render::markup;
 use twofold_render::sheet::{
-    Axis, Colour, ColumnWidth, DotStyle, LegendEntry, LegendKey, PlanePanel, Sheet, range_of,
+    Anchor, Axis, Colour, ColumnWidth, DotStyle, LegendEntry, LegendKey, PlanePanel, Sheet,
+    range_of,
 };
 use twofold_render::style;
 
@@ -25,7 +26,8 @@ pub struct Scanned {
 }
 
 impl From<&Over> for Scanned {
-    /// Its name as mathematics sets it, of `params.alpha` only the parameter's.
+    /// Its name as mathematics sets it: of `params.alpha` only the parameter's, of `start.x` as
+    /// x(0).
     fn from(axis: &Over) -> Self {
         let column = axis.coordinate.to_string();
         let mut values: Vec<f64> = (0..axis.count()).map(|i| axis.value(i, 0.5).value()).collect();
@@ -33,7 +35,10 @@ impl From<&Over> for Scanned {
         values.dedup();
         let logarithmic =
             matches!(axis.values, Values::Log { .. }) && values.iter().all(|v| *v > 0.0);
-        let title = markup::name(column.rsplit('.').next().unwrap_or(&column));
+        let title = match column.strip_prefix("start.") {
+            Some(state) => format!("{}(0)", markup::name(state)),
+            None => markup::name(column.rsplit('.').next().unwrap_or(&column)),
+        };
         Self { column, title, values, logarithmic }
     }
 }
@@ -89,7 +94,11 @@ pub fn diagram(
 ) -> Sheet {
     let x = over.covered();
     let y = Axis::covering(ordinate, series.iter().flat_map(|(_, points)| points).map(|p| p[1]));
+    let middle = [&x, &y].map(|axis| 0.5 * (axis.lower + axis.upper));
     let mut panel = PlanePanel::new(x, y);
+    if series.iter().all(|(_, points)| points.is_empty()) {
+        panel = panel.note(middle, "no crossing", Anchor::Centre);
+    }
     let mut sheet = Sheet::new(ColumnWidth::Wide, 1, "orbit diagram")
         .title(markup::literal(title))
         .panel_aspect(0.55);
