@@ -334,6 +334,17 @@ enum Sought {
     Beyond(usize),
 }
 
+/// A thing that is met, by numbers that other equations keep.
+#[derive(Clone, Copy, Debug)]
+enum Found {
+    /// A guard that is slid upon.
+    Slid(usize),
+    /// A contact, by its watched expression.
+    Contact(usize),
+    /// A kink of the field on the positive side of a surface slid upon.
+    Kink { slid: usize, guard: usize },
+}
+
 /// A meeting of a watched expression with zero that a switch brings about.
 enum Jump {
     /// It is on the other side now.
@@ -1667,30 +1678,26 @@ impl<'a> Follower<'a> {
         config.pieces = self.equation.tables.iter().map(|table| table.piece(self.t)).collect();
         let (asked, values) = (self.compiled.active.clone(), self.watched_values());
         self.tables_step = config.pieces != self.config.pieces;
+        let mut met: Vec<(Sought, Option<Found>)> =
+            met.iter().map(|sought| (*sought, self.found_at(*sought))).collect();
         if self.tables_step {
             self.watched_before = values[asked.len()..].to_vec();
         }
         self.adopt(config, sliding.clone());
-        let mut met = met.to_vec();
         if !self.equation.tables.is_empty() {
             // A table's jump may carry switching functions over zero, or away from it, those that
             // are met at this moment, too.
             let left = self.leave_by_jump(&asked, &values);
-            met.retain(|sought| match *sought {
+            met.retain(|(sought, _)| match *sought {
                 Sought::Guard { guard, .. } => !left.contains(&guard),
-                Sought::Leave { place, .. } => !left.contains(&sliding[place]),
                 Sought::Repelling => !sliding.iter().any(|guard| left.contains(guard)),
                 _ => true,
             });
-            for sought in &mut met {
-                if let Sought::Leave { place, .. } = sought {
-                    let at = self.sliding.iter().position(|guard| *guard == sliding[*place]);
-                    *place = at.unwrap_or(*place);
-                }
-            }
             let zero = self.sliding.clone();
             self.follow_jumps(&zero)?;
         }
+        let met: Vec<Sought> =
+            met.into_iter().filter_map(|(sought, found)| self.found_again(sought, found)).collect();
         let before = self.before(&met)?;
         let ending = self.meet(definition, &met, &due, observe)?;
         if ending.is_none() {
@@ -1704,6 +1711,40 @@ impl<'a> Follower<'a> {
             self.rest_on_stops()?;
         }
         Ok(ending)
+    }
+
+    /// The thing that is met at a place of a list that the present equations make.
+    fn found_at(&self, sought: Sought) -> Option<Found> {
+        match sought {
+            Sought::Leave { place, .. } => Some(Found::Slid(self.sliding[place])),
+            Sought::Release(place) => Some(Found::Contact(self.contacts[place].watched)),
+            Sought::Beyond(at) => {
+                let Beyond { place, guard, .. } = self.beyond[at];
+                Some(Found::Kink { slid: self.sliding[place], guard })
+            }
+            _ => None,
+        }
+    }
+
+    /// The same condition among the equations of a later moment, if it is one of theirs. Whether
+    /// sliding goes on where a table has stepped, its new piece decides.
+    fn found_again(&self, sought: Sought, found: Option<Found>) -> Option<Sought> {
+        let slid_at = |slid: usize| self.sliding.iter().position(|guard| *guard == slid);
+        match (sought, found) {
+            (Sought::Leave { .. } | Sought::Repelling, _) if self.tables_step => None,
+            (Sought::Leave { plus, .. }, Some(Found::Slid(slid))) => {
+                slid_at(slid).map(|place| Sought::Leave { place, plus })
+            }
+            (_, Some(Found::Contact(watched))) => {
+                self.contacts.iter().position(|c| c.watched == watched).map(Sought::Release)
+            }
+            (_, Some(Found::Kink { slid, guard })) => {
+                let place = slid_at(slid)?;
+                let at = self.beyond.iter().position(|b| b.place == place && b.guard == guard);
+                at.map(Sought::Beyond)
+            }
+            _ => Some(sought),
+        }
     }
 
     /// Guards and watched expressions that are zero to rounding and about to pass it.

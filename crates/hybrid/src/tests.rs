@@ -6317,3 +6317,28 @@ fn what_leaves_zero_to_third_order_is_not_met_at_once() {
         near(end.x[4], (9.81 * c).sqrt() * c, 1e-8);
     }
 }
+
+/// A store that closes at its lowest level keeps it, also where the demand comes to zero at a row
+/// of its table: both fields are zero there.
+#[test]
+fn what_is_slid_upon_is_decided_anew_where_a_table_steps() {
+    let of = |f: &str, rows: &str, method: Method| {
+        let text = format!(
+            "states = ['g']\nstart = [0.5]\nf = [\"{f}\"]\n[tables.w]\nfile = 'w.csv'\ntime = \
+                't'\ncolumn = 'w'\ninterpolation = 'linear'"
+        );
+        let model = model(&text).with_table("w", rows).unwrap();
+        let options = Options { t_end: 3.0, method, ..Options::default() };
+        follow(&model, &options, &mut |_| true).unwrap_or_else(|e| panic!("{method:?} {f}: {e}")).x
+    };
+    for method in Method::ALL {
+        for f in ["-max(w, 0)*if(g > 0.2, 1, 0)", "-w*if(g > 0.2, 1, 0)"] {
+            for rows in ["t,w\n0,1\n1,0\n2,0\n3,1\n", "t,w\n0,1\n1,0\n3,1\n"] {
+                near(of(f, rows, method)[0], 0.2, 1e-14);
+            }
+        }
+        // It fills again.
+        let filled = of("-w*if(g > 0.2, 1, 0)", "t,w\n0,1\n1,0\n2,-1\n3,-1\n", method);
+        near(filled[0], 1.7, 1e-9);
+    }
+}
