@@ -6,6 +6,7 @@
 //! smooth, and that is what is written on a [`Tape`] and evaluated: only the branches that hold are
 //! computed.
 
+use std::borrow::Cow;
 use std::cell::RefCell;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::rc::Rc;
@@ -211,40 +212,6 @@ fn difference(a: &Expression, b: &Expression) -> Expression {
         (a, b) if is_zero(a) => mirrored(b),
         (a, Expression::Neg(b)) => Expression::Add(Box::new(a.clone()), b.clone()),
         (a, b) => Expression::Sub(Box::new(a.clone()), Box::new(b.clone())),
-    }
-}
-
-/// Comparison a > b of the least or the greatest of several as one for each of them; none if it is
-/// of no such. So equations have the surfaces on which they change, and no other ones.
-fn of_each(a: &Expression, b: &Expression) -> Option<Expression> {
-    /// No more comparisons for one.
-    const MOST: usize = 64;
-    fn count(e: &Expression) -> usize {
-        match e {
-            Expression::Apply(General::Min | General::Max, list) => list.iter().map(count).sum(),
-            _ => 1,
-        }
-    }
-    let greater = |a: &Expression, b: &Expression| {
-        Expression::Greater(Box::new(a.clone()), Box::new(b.clone()))
-    };
-    let all = |all: bool, parts: Vec<Expression>| {
-        parts.into_iter().reduce(|one, other| {
-            let (one, other) = (Box::new(one), Box::new(other));
-            if all { Expression::And(one, other) } else { Expression::Or(one, other) }
-        })
-    };
-    match (a, b) {
-        (Expression::Sub(a, b), c) if is_zero(c) => of_each(a, b),
-        (c, Expression::Sub(a, b)) if is_zero(c) => of_each(b, a),
-        (a, b) if count(a).saturating_mul(count(b)) > MOST => None,
-        (Expression::Apply(f @ (General::Min | General::Max), list), b) => {
-            all(*f == General::Min, list.iter().map(|one| greater(one, b)).collect())
-        }
-        (a, Expression::Apply(f @ (General::Min | General::Max), list)) => {
-            all(*f == General::Max, list.iter().map(|one| greater(a, one)).collect())
-        }
-        _ => None,
     }
 }
 
@@ -703,6 +670,75 @@ impl Equation {
         known.then(|| self.value(e, 0.0, &[])).filter(|v| v.is_finite())
     }
 
+    /// What an expression is the least or the greatest of, itself, as a term or as the limits of
+    /// `clip`: from above (`least`) clip(x, l, h) is min(max(x, l), h), else max(min(x, h), l).
+    fn least_or_greatest<'a>(
+        &'a self,
+        e: &'a Expression,
+        least: bool,
+    ) -> Option<(General, Cow<'a, [Expression]>)> {
+        match e {
+            Expression::Name(name) => self.least_or_greatest(self.term(name)?, least),
+            Expression::Apply(f @ (General::Min | General::Max), list) => {
+                Some((*f, Cow::Borrowed(list)))
+            }
+            // Bounds that change may exchange their order.
+            Expression::Apply(General::Clip, list)
+                if list[1..].iter().all(|bound| self.constant(bound).is_some()) =>
+            {
+                let (outer, inner) =
+                    if least { (General::Min, General::Max) } else { (General::Max, General::Min) };
+                let (near, far) = if least { (1, 2) } else { (2, 1) };
+                let inner = Expression::Apply(inner, vec![list[0].clone(), list[near].clone()]);
+                Some((outer, Cow::Owned(vec![inner, list[far].clone()])))
+            }
+            _ => None,
+        }
+    }
+
+    /// Comparison a > b of the least or the greatest of several as one for each of them; none if it
+    /// is of no such. So equations have the surfaces on which they change, and no other ones: what
+    /// is limited stays at its limit, where its comparison with that would see nothing.
+    fn of_each(&self, a: &Expression, b: &Expression) -> Option<Expression> {
+        /// No more comparisons for one.
+        const MOST: usize = 64;
+        fn count(own: &Equation, e: &Expression) -> usize {
+            own.least_or_greatest(e, true).map_or(1, |(_, list)| {
+                list.iter().map(|e| count(own, e)).fold(0, usize::saturating_add)
+            })
+        }
+        match (a, b) {
+            (Expression::Sub(a, b), c) if is_zero(c) => return self.of_each(a, b),
+            (c, Expression::Sub(a, b)) if is_zero(c) => return self.of_each(b, a),
+            _ => {}
+        }
+        let (all, parts): (bool, Vec<[&Expression; 2]>);
+        let (from_above, from_below);
+        if let Some((f, list)) = self.least_or_greatest(a, true) {
+            from_above = list;
+            (all, parts) = (f == General::Min, from_above.iter().map(|one| [one, b]).collect());
+        } else {
+            let (f, list) = self.least_or_greatest(b, false)?;
+            from_below = list;
+            (all, parts) = (f == General::Max, from_below.iter().map(|one| [a, one]).collect());
+        }
+        if count(self, a).saturating_mul(count(self, b)) > MOST {
+            return None;
+        }
+        let known = |[a, b]: &[&Expression; 2]| Some(self.constant(a)? > self.constant(b)?);
+        // Of constants one may decide all.
+        if parts.iter().any(|part| known(part) == Some(!all)) {
+            return None;
+        }
+        let open = parts.into_iter().filter(|part| known(part).is_none());
+        open.map(|[a, b]| Expression::Greater(Box::new(a.clone()), Box::new(b.clone()))).reduce(
+            |one, other| {
+                let (one, other) = (Box::new(one), Box::new(other));
+                if all { Expression::And(one, other) } else { Expression::Or(one, other) }
+            },
+        )
+    }
+
     /// Registers the switching functions of an expression; `smooth`: nothing around it has a pole
     /// or a root.
     fn find(
@@ -712,7 +748,7 @@ impl Equation {
         smooth: bool,
     ) -> Result<(), EquationError> {
         if let Expression::Greater(a, b) = e
-            && let Some(each) = of_each(a, b)
+            && let Some(each) = self.of_each(a, b)
         {
             return self.find(&each, true, smooth);
         }
@@ -991,7 +1027,7 @@ impl Equation {
         known: &mut HashMap<&'a str, bool>,
     ) -> bool {
         match e {
-            Expression::Greater(a, b) => match of_each(a, b) {
+            Expression::Greater(a, b) => match self.of_each(a, b) {
                 Some(each) => self.holds(&each, at),
                 None => self.positive(&difference(a, b), at),
             },
@@ -1020,7 +1056,7 @@ impl Equation {
         let (mut open, mut found, mut seen) = (vec![condition.clone()], Vec::new(), HashSet::new());
         while let Some(e) = open.pop() {
             match &e {
-                Expression::Greater(a, b) => match of_each(a, b) {
+                Expression::Greater(a, b) => match self.of_each(a, b) {
                     Some(each) => open.push(each),
                     None => found.push(self.guard(&difference(a, b), false).0),
                 },
@@ -1662,7 +1698,7 @@ impl Writer<'_> {
 
     fn condition(&mut self, e: &Expression) -> bool {
         match e {
-            Expression::Greater(a, b) => match of_each(a, b) {
+            Expression::Greater(a, b) => match self.equation.of_each(a, b) {
                 Some(each) => self.condition(&each),
                 None => self.is_positive(&difference(a, b)),
             },

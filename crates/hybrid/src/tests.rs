@@ -6342,3 +6342,24 @@ fn what_is_slid_upon_is_decided_anew_where_a_table_steps() {
         near(filled[0], 1.7, 1e-9);
     }
 }
+
+/// Anti-windup that compares the limited signal, which stays at its limit, is the one that compares
+/// the signal itself.
+#[test]
+fn a_limited_signal_is_compared_with_its_limits() {
+    let of = |condition: &str, method: Method| {
+        let text = format!(
+            "states = ['v', 'e']\nstart = [0.5, 0]\nf = ['1.25*u - 0.1*v', 'if({condition}, des - \
+                v, 0)']\n[let]\ndes = '20 + 14.4*sin(0.4*t)'\np = '1.5*(des - v) + 0.2*e'\n\
+             u = 'clip(p, -3, 6)'"
+        );
+        end_of(&text, 15.0, method).unwrap_or_else(|e| panic!("{method:?} {condition}: {e}"))
+    };
+    for method in Method::ALL {
+        let want = of("p < 6 and p > -3", method);
+        near(want[0], 12.8239777266, 1e-8);
+        for condition in ["u < 6 and u > -3", "not (u >= 6 or u <= -3)", "-3 < u and u - 6 < 0"] {
+            assert_eq!(of(condition, method), want, "{method:?} {condition}");
+        }
+    }
+}
