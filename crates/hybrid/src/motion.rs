@@ -1607,13 +1607,11 @@ impl<'a> Follower<'a> {
                 scale.iter_mut().zip(noise).for_each(|(s, noise)| *s += 4.0 * length * *noise);
             }
             let mut error = step.error(&|i| scale[i]);
-            if error > 1.0 && !noted {
-                // Whether rounding errors of speeds are a part of it.
+            // Whether rounding errors of speeds are a part of it.
+            if error > 1.0 && !noted && self.note_noise(step) {
                 noted = true;
-                if self.note_noise(step) {
-                    scale_now(self, step, scale);
-                    error = step.error(&|i| scale[i]);
-                }
+                scale_now(self, step, scale);
+                error = step.error(&|i| scale[i]);
             }
             let factor = if error <= 1.0 {
                 // The structure that the step missed begins at `unseen`: the step is made to end
