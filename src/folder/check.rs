@@ -882,7 +882,7 @@ impl Read {
                     Take::First => values[0],
                     Take::Max => high,
                     Take::Min => low,
-                    Take::Mean => mean_over_time(table, values)
+                    Take::Mean => mean_over_time(table, &values)
                         .unwrap_or_else(|| numbers.iter().sum::<f64>() / numbers.len() as f64),
                     Take::Span => high - low,
                     // They are measured with an interval.

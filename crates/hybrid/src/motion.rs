@@ -1267,7 +1267,7 @@ impl<'a> Follower<'a> {
             step.k[0].copy_from_slice(&room);
             self.noise.fill(0.0);
             if !room.iter().all(|v| v.is_finite()) {
-                if self.put_beyond() || self.goes_on_at_an_edge()? {
+                if self.put_beyond() || self.comes_to_rest(self.t, true) {
                     continue;
                 }
                 return Err(self.left_domain(step.t, &step.x));
@@ -1604,14 +1604,17 @@ impl<'a> Follower<'a> {
                 // Whether it is the rounding of the time that keeps the error large, as in the step
                 // before.
                 let noise = noise.get_or_insert_with(|| self.noise_of_time(step));
-                scale.iter_mut().zip(noise).for_each(|(s, noise)| *s += 4.0 * length * *noise);
+                let noise = self.noise_passed_on(step, noise);
+                scale.iter_mut().zip(noise).for_each(|(s, noise)| *s += 4.0 * length * noise);
             }
             let mut error = step.error(&|i| scale[i]);
-            // Whether rounding errors of speeds are a part of it.
-            if error > 1.0 && !noted && self.note_noise(step) {
+            if error > 1.0 && !noted {
+                // Whether rounding errors of speeds are a part of it.
                 noted = true;
-                scale_now(self, step, scale);
-                error = step.error(&|i| scale[i]);
+                if self.note_noise(step) {
+                    scale_now(self, step, scale);
+                    error = step.error(&|i| scale[i]);
+                }
             }
             let factor = if error <= 1.0 {
                 // The structure that the step missed begins at `unseen`: the step is made to end
@@ -1661,6 +1664,18 @@ impl<'a> Follower<'a> {
             if a.is_nan() { (b - now).abs() } else { (b - a).abs() }
         };
         before.iter().zip(&step.k[0]).zip(&after).map(change).collect()
+    }
+
+    /// The noise of speeds, and that which others have by it at the end of the step.
+    fn noise_passed_on(&mut self, step: &Step, noise: &[f64]) -> Vec<f64> {
+        let moved: Vec<f64> = step.x.iter().zip(noise).map(|(x, n)| x + step.h * n).collect();
+        let mut there = vec![0.0; self.n];
+        self.rhs(step.t, &moved, &mut there);
+        let passed = there.iter().zip(&step.k[0]).map(|(a, b)| (a - b).abs());
+        let sum = |(noise, passed): (&f64, f64)| {
+            if passed.is_finite() { noise + passed } else { *noise }
+        };
+        noise.iter().zip(passed).map(sum).collect()
     }
 
     /// Handles the events due at the present time together with the conditions met here.

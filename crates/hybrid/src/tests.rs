@@ -6361,5 +6361,29 @@ fn a_limited_signal_is_compared_with_its_limits() {
         for condition in ["u < 6 and u > -3", "not (u >= 6 or u <= -3)", "-3 < u and u - 6 < 0"] {
             assert_eq!(of(condition, method), want, "{method:?} {condition}");
         }
+
+/// The same motion at a late time, whose rounding is 1e-12 of the run and more: a diode that begins
+/// to conduct, and a slow reaction in seconds since 1970.
+#[test]
+fn late_times_are_as_good_as_early_ones() {
+    let rectifier = model(
+        "states = ['i', 'v']\nstart = [0, 0]\n\
+        f = ['if(i > 0, u, max(u, 0))/0.01', '(i - v/100)/1e-4']\n\
+        [let]\nu = 'abs(10*sin(100*pi*t)) - 1.4 - v - 0.5*i'",
+    );
+    let now = 1.7e9;
+    let slow =
+        model("states = ['x']\nstart = [0]\nf = ['(if(t < 1700003600, 0.2, 0.3) - x)/3600']");
+    for method in Method::ALL {
+        for t_start in [0.0, 10.0, 10000.0] {
+            let t_end = t_start + 0.06;
+            let options = Options { t_start, t_end, method, ..Options::default() };
+            let x = follow(&rectifier, &options, &mut |_| true).unwrap().x;
+            near(x[1], 7.509_155_407_4, 3e-8);
+        }
+        let options = Options { t_start: now, t_end: now + 7200.0, method, ..Options::default() };
+        let x = follow(&slow, &options, &mut |_| true).unwrap().x;
+        let first = 0.2 * (1.0 - (-1.0_f64).exp());
+        near(x[0], 0.3 + (first - 0.3) * (-1.0_f64).exp(), 1e-9);
     }
 }

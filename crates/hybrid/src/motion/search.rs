@@ -1075,6 +1075,8 @@ impl Follower<'_> {
     fn edge_ahead(&mut self, field: &[f64]) -> Option<Edge> {
         let values = self.watched_values();
         let rates = Self::along(&self.compiled, &self.variables, field);
+        /// So many times as late where rounding hides the switch.
+        const LESS_SOON: f64 = 16.0;
         let in_time = Self::along(&self.compiled, &self.variables, &vec![0.0; self.n]);
         let soon = 1e-9 * (self.options.t_end - self.options.t_start);
         let mut nearest: Option<Edge> = None;
@@ -1087,7 +1089,7 @@ impl Follower<'_> {
                 values[place].abs() <= self.grain_of_expression(&g.expression, in_time[place].abs())
             };
             if open
-                && (0.0..f64::INFINITY).contains(&left)
+                && (0.0..=LESS_SOON * soon).contains(&left)
                 && (left <= soon || hidden())
                 && rates[place] * self.config.sides[*guard] < 0.0
                 && nearest.as_ref().is_none_or(|best| left < best.left)

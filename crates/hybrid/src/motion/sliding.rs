@@ -410,7 +410,7 @@ impl Follower<'_> {
             let others = self.base.iter().map(|(compiled, variables)| (compiled, variables));
             let corners = self.corners.iter().map(|(compiled, variables)| (compiled, variables));
             for (compiled, variables) in std::iter::once(one).chain(others).chain(corners) {
-                let time = Range::new(step.t, 0.5 * f64::EPSILON * step.t.abs());
+                let time = Range::new(step.t, 0.0);
                 let rest = variables[n + 1..].iter().map(|v| Range::from_f64(*v));
                 let given: Vec<Range> = states.iter().copied().chain([time]).chain(rest).collect();
                 compiled.field.evaluate(&given, &mut out);

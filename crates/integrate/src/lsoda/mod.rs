@@ -347,7 +347,10 @@ where
         self.statistics.restarts += 1;
         self.forget(t, x, &derivative, t_end, f64::INFINITY);
         self.weights = scale.map(|scale| 1.0 / scale);
-        self.begin(derivative);
+        // The time moves.
+        let least = (16.0 * f64::EPSILON * t.abs()).min(t_end - t);
+        self.h = self.first_step(&derivative).max(least);
+        self.history.set_column(1, derivative * self.h);
     }
 
     /// Makes a step from `x` at the time `t`, where the last one ended but for the rounding of
