@@ -6387,3 +6387,15 @@ fn late_times_are_as_good_as_early_ones() {
         near(x[0], 0.3 + (first - 0.3) * (-1.0_f64).exp(), 1e-9);
     }
 }
+
+/// A block sticks and slips by modes: the speed at which "halt" looks leaves zero like t^2.
+#[test]
+fn a_mode_is_not_left_where_it_begins() {
+    let text = "states = ['x', 'v']\nstart = [0, 0]\n[modes.stick]\nf = ['0', '0']\n\
+        [modes.slip]\nf = ['v', 'pull - x - 0.8*sign(v)']\n[let]\npull = '2.302*sin(0.678*t)'\n\
+        [[event]]\nname = 'go'\nwhen = 'abs(pull - x) > 0.8'\nfrom = 'stick'\nmode = 'slip'\n\
+        [[event]]\nname = 'halt'\nwhen = 'v'\nfrom = 'slip'\nmode = 'stick'\nset = { v = '0' }\n";
+    for method in Method::ALL {
+        near(end_of(text, 15.0, method).unwrap()[0], 0.302_674_704_8, 1e-9);
+    }
+}

@@ -302,6 +302,8 @@ impl Follower<'_> {
         parts: &[(f64, f64)],
         found: &mut Vec<(f64, Sought)>,
     ) {
+        /// Part of a step in which nothing is told from its beginning.
+        const AT_ONCE: f64 = 1e-6;
         let known = found.iter().map(|(theta, _)| *theta).fold(f64::INFINITY, f64::min);
         let mut at = std::mem::take(&mut self.room);
         at.resize(self.n, 0.0);
@@ -361,7 +363,14 @@ impl Follower<'_> {
                         first_behind_tangent(*side, from, to, &mut |theta| f(theta) - begin)
                     }
                 };
-                found.extend(first.map(|theta| (theta, *sought)));
+                // What leaves zero to its side has not come back at once.
+                let leaves = |theta: &f64| {
+                    begins
+                        && *theta < AT_ONCE
+                        && v[1..].iter().all(|v| v * side > 0.0)
+                        && self.is_fresh(*sought)
+                };
+                found.extend(first.filter(|theta| !leaves(theta)).map(|theta| (theta, *sought)));
             }
             if found.iter().any(|(theta, _)| *theta <= to) || known <= to {
                 break;
