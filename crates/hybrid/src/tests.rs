@@ -6203,7 +6203,8 @@ fn sliding_of_higher_order_is_followed_by_every_method() {
         (
             "['z', 'u', 'v']",
             "['-2*3^(1/3)*abs(z - sin(t))^(2/3)*sign(z - sin(t)) + u', \
-                '-1.5*3^(2/3)*abs(z - sin(t))^(1/3)*sign(z - sin(t)) + v', '-3.3*sign(z - sin(t))']",
+                '-1.5*3^(2/3)*abs(z - sin(t))^(1/3)*sign(z - sin(t)) + v', \
+                '-3.3*sign(z - sin(t))']",
             "[0, 0, 0]",
             vec![s, c, -s],
         ),
