@@ -1314,7 +1314,8 @@ fn a_domain_may_end_at_a_switch() {
     // A tank runs empty at t = 2 and stays so.
     let x = end("states = ['h']\nstart = [1]\nf = ['-sqrt(max(h, 0))']", 5.0);
     near(x[0], 0.0, 1e-12);
-    // |x|^0.5 on both sides: x' = -1.5 sqrt(|x|) sign(x) - 1 from 1 crosses 0 at t = 4/3 (1 - 2/3 ln(5/2)).
+    // |x|^0.5 on both sides: x' = -1.5 sqrt(|x|) sign(x) - 1 from 1 crosses 0 at
+    // t = 4/3 (1 - 2/3 ln(5/2)).
     let x = end(
         "states = ['x', 't0']\nstart = [1, 0]\nf = ['-1.5*abs(x)^0.5*sign(x) - 1', 'x > 0']",
         3.0,
@@ -6362,6 +6363,8 @@ fn a_limited_signal_is_compared_with_its_limits() {
         for condition in ["u < 6 and u > -3", "not (u >= 6 or u <= -3)", "-3 < u and u - 6 < 0"] {
             assert_eq!(of(condition, method), want, "{method:?} {condition}");
         }
+    }
+}
 
 /// The same motion at a late time, whose rounding is 1e-12 of the run and more: a diode that begins
 /// to conduct, and a slow reaction in seconds since 1970.
