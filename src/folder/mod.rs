@@ -1110,7 +1110,7 @@ impl Folder {
     fn points(&self, origin: &Origin, points: &Spanned<PointsFile>) -> Result<Points, FolderError> {
         let PointsFile { name, file } = points.get_ref();
         let wrong = |why: String| FolderError::at(origin, points.span(), why, None);
-        if !Path::new(file).components().all(|c| matches!(c, Component::Normal(_))) {
+        if !lies_within(file) {
             return Err(wrong(format!("the file `{file}` does not lie in this folder")));
         }
         let text = self.files.text(file).map_err(|error| wrong(error.to_string()))?;
@@ -1346,4 +1346,11 @@ fn plain(origin: &Origin, name: &Spanned<String>, what: &str) -> Result<(), Fold
     let why = format!("the {what} `{}` is no plain name", name.get_ref().escape_debug());
     let help = "use letters, digits, - and _, such as fig3 or multipliers-24".to_owned();
     Err(FolderError::at(origin, name.span(), why, Some(help)))
+}
+
+/// Whether a path, by its words alone, leads to something in the folder that it begins from.
+fn lies_within(path: &str) -> bool {
+    let inner = |c: Component| matches!(c, Component::Normal(_) | Component::CurDir);
+    let mut components = Path::new(path).components();
+    components.all(inner) && Path::new(path).file_name().is_some()
 }

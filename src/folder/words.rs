@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::ops::Range;
-use std::path::{Component, Path};
+use std::path::Path;
 use std::sync::Arc;
 
 use serde::Deserialize;
@@ -330,7 +330,7 @@ impl Said {
                 ),
             )
         };
-        if !Path::new(name).components().all(|c| matches!(c, Component::Normal(_))) {
+        if !super::lies_within(name) {
             return Err(wrong(format!("the system `{name}` does not lie in this folder")));
         }
         let path = root.join(name);

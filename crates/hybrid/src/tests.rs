@@ -2884,8 +2884,8 @@ fn rests_in_narrow_strips_are_found() {
     }
 }
 
-/// Linear pieces have one zero each, which is a rest if it lies in its piece: of four saturations in
-/// three states (eight switching functions) the same rests are found.
+/// Linear pieces have one zero each, which is a rest if it lies in its piece: of four saturations
+/// in three states (eight switching functions) the same rests are found.
 #[test]
 fn rests_of_many_linear_pieces_are_found() {
     const N: usize = 3;
