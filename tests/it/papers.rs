@@ -853,7 +853,7 @@ fn a_system_behind_a_link_is_refused() {
 fn a_table_behind_a_link_is_refused() {
     let place = small();
     let root = place.path().join("p");
-    let measure = "\n[driven]\nrun = { system = \"systems/driven.toml\", t-end = 1 }\n";
+    let measure = "\n[driven]\nrun = { system = \"./systems/driven.toml\", t-end = 1 }\n";
     let measures = fs::read_to_string(root.join("measures.toml")).unwrap();
     fs::write(root.join("measures.toml"), measures + measure).unwrap();
     let driven = "states = [\"x\"]\nstart = [0]\nf = [\"u\"]\n[tables.u]\nfile = \
