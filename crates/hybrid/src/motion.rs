@@ -544,6 +544,8 @@ struct Follower<'a> {
     /// Whether each watched expression had no speed where it left zero, and each guard.
     tangent: Vec<bool>,
     tangent_guard: Vec<bool>,
+    /// The number of functions that are nearly zero and are being decided together; else zero.
+    meeting: usize,
     /// Kinks that follow from what is decided, and are not decided with it.
     left_out: Vec<usize>,
     /// Guards that are zero to rounding where motion begins: their speeds are known to rounding,
@@ -1043,6 +1045,7 @@ impl<'a> Follower<'a> {
             touches: vec![false; watched],
             tangent: vec![false; watched],
             tangent_guard: vec![false; guards],
+            meeting: 0,
             left_out: Vec::new(),
             touching: vec![false; guards],
             released: vec![0.0; watched],
@@ -1280,7 +1283,13 @@ impl<'a> Follower<'a> {
                 step.jacobian = Some(self.finite_jacobian(step.t, &step.x));
             }
             let mut no_series = None;
-            if self.options.method == Method::Taylor {
+            let leaves = leaving < MOST_LEAVING && self.is_stiff_behind_a_root(&step, implicit);
+            if leaves {
+                leaving += 1;
+                (step.series, step.multistep) = (None, None);
+                step.jacobian = Some(self.finite_jacobian(step.t, &step.x));
+                h = if h > 0.0 { implicit.min(h) } else { implicit };
+            } else if self.options.method == Method::Taylor {
                 no_series = match self.expand(&mut step) {
                     Ok(state) => state,
                     Err(_) if self.goes_on_at_an_edge()? => continue,
@@ -1321,6 +1330,9 @@ impl<'a> Follower<'a> {
             } else if h == 0.0 {
                 h = self.first_step(&room);
             }
+            if !leaves && self.options.method != Method::Taylor {
+                (implicit, leaving) = (0.0, 0);
+            }
             let stop = clock.next().unwrap_or(f64::INFINITY).min(self.options.t_end);
             let mut wanted = h.min(self.options.max_step);
             let to_stop = self.t + wanted * 1.000_001 >= stop;
@@ -1348,7 +1360,7 @@ impl<'a> Follower<'a> {
                 0.0 => most,
                 _ => (0.9 * rough_pow(error, -0.2)).clamp(0.2, most),
             };
-            if no_series.is_some() {
+            if self.options.method != Method::Radau5 && step.jacobian.is_some() {
                 implicit = factor * wanted;
             }
             let h_next = match self.options.method {
@@ -1485,6 +1497,18 @@ impl<'a> Follower<'a> {
             if let Some(ending) = ending {
                 return Ok(ending);
             }
+        }
+    }
+
+    /// Whether implicit steps that leave a root of zero go on with one of length `h`: behind the
+    /// root of what rises slowly explicit ones and series would be far shorter than the time since.
+    fn is_stiff_behind_a_root(&mut self, step: &Step, h: f64) -> bool {
+        /// The product of a step and a slope that explicit steps bear.
+        const STIFF: f64 = 1.0;
+        let n = self.n;
+        h > 0.0 && {
+            let jacobian = self.jacobian(step.t, &step.x);
+            (0..n).any(|i| h * -jacobian[i * n + i] > STIFF)
         }
     }
 

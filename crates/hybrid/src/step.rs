@@ -265,6 +265,8 @@ impl Step {
         const MOST_FRESH: usize = 40;
         /// Part of a change that is tried instead of it.
         const LESS: f64 = 0.25;
+        /// Part of a state that is tried instead of one beyond zero.
+        const NEARER: f64 = 0.1;
         let n = self.x.len();
         let root = 6.0_f64.sqrt();
         let c = [0.1 * (4.0 - root), 0.1 * (4.0 + root), 1.0];
@@ -299,9 +301,10 @@ impl Step {
         };
         let mut matrix = matrix_of([jacobian; 3]);
         let mut z = vec![0.0; m];
-        let mut reach: Vec<f64> = (0..n)
+        let known: Vec<f64> = (0..n)
             .map(|i| self.x[i].abs().max((h * self.k[0][i]).abs()).max(LEAST_STATE))
             .collect();
+        let mut reach = known.clone();
         let (mut f, mut last, mut settled) = (vec![vec![0.0; n]; 3], f64::INFINITY, false);
         let mut change = vec![0.0; m];
         let mut at_end: Option<Vec<f64>> = None;
@@ -313,11 +316,28 @@ impl Step {
                 rhs(self.t + c[s] * h, &self.stage, &mut f[s]);
             }
             if fresh && iteration > 0 && !f.iter().flatten().all(|f| f.is_finite()) {
-                // Newton's method leaves the domain of a root from its far side: less far.
-                z.iter_mut().zip(&mut change).for_each(|(z, d)| {
-                    *z -= (1.0 - LESS) * *d;
-                    *d *= LESS;
-                });
+                // Newton's method leaves the domain of a root from its far side: less far, and
+                // states that passed zero, of a root that is far smaller, nearer to it.
+                let passes = |(k, (z, d)): (usize, (&f64, &f64))| {
+                    let x = self.x[k % n];
+                    (x + z) * (x + z - d) < 0.0
+                };
+                let passed: Vec<bool> = z.iter().zip(&change).enumerate().map(passes).collect();
+                let some = passed.contains(&true);
+                z.iter_mut().zip(&mut change).zip(passed).enumerate().for_each(
+                    |(k, ((z, d), passed))| {
+                        let x = self.x[k % n];
+                        let kept = match (some, passed) {
+                            (true, true) => NEARER * (x + *z - *d) - x - (*z - *d),
+                            (true, false) => *d,
+                            (false, _) => LESS * *d,
+                        };
+                        *z += kept - *d;
+                        *d = kept;
+                    },
+                );
+                // Where they were is no size of theirs.
+                (reach, last) = (known.clone(), f64::INFINITY);
                 continue;
             }
             if iteration == 0 && !f.iter().flatten().all(|f| f.is_finite()) {

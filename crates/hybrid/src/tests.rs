@@ -6403,3 +6403,46 @@ fn a_mode_is_not_left_where_it_begins() {
         near(end_of(text, 15.0, method).unwrap()[0], 0.302_674_704_8, 1e-9);
     }
 }
+
+/// An empty tank whose inflow rises slowly: behind the root of zero the level is analytic in time,
+/// and explicit steps would be far shorter than the time since. Numbers by RK4 in sqrt(h) and
+/// ln(t - 1), from the series of what attracts.
+#[test]
+fn an_empty_tank_is_refilled_slowly() {
+    for method in Method::ALL {
+        let text = "states = ['h']\nstart = [0]\nf = ['max(t - 1, 0)^2 - 0.9*sqrt(max(h, 0))']";
+        let x = end_of(text, 3.0, method).unwrap_or_else(|e| panic!("{method:?}: {e}"));
+        near(x[0], 1.7557537225275, 2e-10);
+        let text = "states = ['h']\nstart = [0]\nf = ['u - 0.9*sqrt(max(h, 0))']\n[tables.u]\n\
+            file = 'u.csv'\ntime = 't'\ncolumn = 'u'\ninterpolation = 'pchip'";
+        let model = model(text).with_table("u", "t,u\n0,0\n1,0\n2,2\n").unwrap();
+        let options = Options { t_end: 2.0, method, ..Options::default() };
+        let end = follow(&model, &options, &mut |_| true);
+        near(end.unwrap_or_else(|e| panic!("{method:?}: {e}")).x[0], 0.4937019717704, 1e-10);
+    }
+}
+
+/// An empty tank that is filled again at a constant rate from a moment at which nothing else
+/// decides: its level is c s^2 with 2 c = rate - k sqrt(c).
+#[test]
+fn an_empty_tank_is_refilled_where_a_table_passes_zero() {
+    let table = |n: &str| format!("\n[tables.{n}]\nfile = '{n}.csv'\ntime = 't'\ncolumn = '{n}'\n");
+    let text = "states = ['h', 'g']\nstart = [0, 0.5]\n\
+        f = ['max(u, 0) - 0.777*sqrt(max(h, 0))', '-w']";
+    let model = model(&format!(
+        "{text}{}interpolation = 'linear'{}interpolation = 'linear'",
+        table("u"),
+        table("w")
+    ));
+    let model = model
+        .with_table("u", "t,u\n0,-0.5\n0.25,1\n2.25,0\n4.25,-0.5\n6.25,-0.5\n12,0.5\n")
+        .unwrap();
+    let model = model.with_table("w", "t,w\n0,0\n6.5,0\n8.5,0.5\n12,0\n").unwrap();
+    let root = 0.25 * ((0.777_f64 * 0.777 + 8.0 / 5.75).sqrt() - 0.777);
+    for method in [Method::Dopri5, Method::Radau5, Method::Lsoda] {
+        let options = Options { t_end: 12.0, method, ..Options::default() };
+        let end = follow(&model, &options, &mut |_| true);
+        let x = end.unwrap_or_else(|e| panic!("{method:?}: {e}")).x;
+        near(x[0], (2.875 * root).powi(2), 1e-10);
+    }
+}

@@ -584,11 +584,21 @@ impl Follower<'_> {
             step.slope_at(middle, &mut slope);
             self.rhs(step.t + middle * step.h, &at, &mut field);
             looked += 1;
-            let defect = (0..n)
+            let defects: Vec<f64> = (0..n)
                 .map(|i| ((field[i] - slope[i]) * step.h * (b - a) / scale[i]).abs())
-                .fold(0.0, f64::max);
-            if !(defect <= LARGEST_DEFECT) {
-                return Some(a);
+                .collect();
+            let small = |defect: f64| defect <= LARGEST_DEFECT;
+            if !defects.iter().all(|defect| small(*defect)) {
+                // What a stiff equation makes of an error of the polynomial it forgets; and from a
+                // root of zero, where no polynomial is near, the step's end alone is known.
+                let forgets = step.jacobian.is_some() && {
+                    let jacobian = self.jacobian(step.t + middle * step.h, &at);
+                    let stiff = |i: usize| 1.0 + step.h * jacobian[i * n + i].abs();
+                    (0..n).all(|i| small(defects[i] / stiff(i))) || self.begins_at_a_root(step)
+                };
+                if !forgets {
+                    return Some(a);
+                }
             }
             if looked >= MOST_PARTS {
                 // Too much to be searched at once.

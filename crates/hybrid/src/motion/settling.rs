@@ -11,7 +11,7 @@ use super::locate::TANGENT;
 use super::meeting::DRIFT;
 use super::*;
 use crate::cells;
-use crate::equation::same_sign;
+use crate::equation::{Gate, same_sign};
 
 /// Fields that move a state in a run by more than this part of its size apart are no rounding of
 /// one.
@@ -643,9 +643,20 @@ impl Follower<'_> {
                 let size = here.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
                 here.iter().zip(there).any(|(a, b)| (a - b).abs() > ROUGH * size)
             };
+            // Beside it the root has a slope that says nothing of where motion goes from zero.
+            let is_root = |x: &[f64]| {
+                sides.iter().any(|(compiled, variables)| {
+                    let mut variables = variables.clone();
+                    variables[..n].copy_from_slice(x);
+                    let mut arguments = vec![0.0; compiled.gates.len()];
+                    compiled.gate_arguments.evaluate(&variables, &mut arguments);
+                    let mut roots = compiled.gates.iter().zip(&arguments);
+                    roots.any(|(gate, argument)| *gate == Gate::Scale && *argument == 0.0)
+                })
+            };
             let here = fields(&self.x);
             let exact = match (&here, fields(&up)) {
-                (Some(here), Some(there)) if !rough(here, &there) => continue,
+                (Some(here), Some(there)) if !rough(here, &there) && !is_root(&up) => continue,
                 (Some(_), None) => continue,
                 (here, _) => here.is_some(),
             };
@@ -1440,7 +1451,8 @@ impl Follower<'_> {
         let mut near = self.nearly_zero(&values);
         near.retain(|(place, _)| values[*place].abs() <= error);
         let guards: Vec<usize> = near.iter().map(|(_, guard)| *guard).collect();
-        if guards.len() <= zero.len() || !zero.iter().all(|guard| guards.contains(guard)) {
+        let known = zero.len().max(self.meeting);
+        if guards.len() <= known || !zero.iter().all(|guard| guards.contains(guard)) {
             return Ok(false);
         }
         let x = self.nearest_meeting(&near, &values);
@@ -1448,8 +1460,10 @@ impl Follower<'_> {
             return Ok(false);
         }
         self.x = x;
-        self.settle(&guards)?;
-        Ok(true)
+        let before = std::mem::replace(&mut self.meeting, guards.len());
+        let settled = self.settle(&guards);
+        self.meeting = before;
+        settled.map(|()| true)
     }
 
     /// The kinks among functions that are zero whose sides change nothing until the run ends: both
