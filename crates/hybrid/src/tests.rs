@@ -6446,3 +6446,39 @@ fn an_empty_tank_is_refilled_where_a_table_passes_zero() {
         near(x[0], (2.875 * root).powi(2), 1e-10);
     }
 }
+
+/// A body that rests on its stop lifts off where a growing force comes to zero, like a cube of the
+/// time, and strikes nothing.
+#[test]
+fn a_body_lifts_off_from_rest_without_a_hit() {
+    let event = "\n[[event]]\nname = 'hit'\nwhen = 'x'\ndirection = 'down'\n\
+        set = { v = '-0.3*v' }\nafter_zeno = 'stick'";
+    let head = "states = ['x', 'v']\nstart = [0, 0]\nf = ['v', ";
+    for method in Method::ALL {
+        let of = |model: &Model, t_end: f64| {
+            let (mut hits, options) = (0, Options { t_end, method, ..Options::default() });
+            let end = follow(model, &options, &mut |point| {
+                hits += usize::from(point.event.is_some());
+                true
+            });
+            assert_eq!(hits, 0, "{method:?}");
+            end.unwrap_or_else(|e| panic!("{method:?}: {e}")).x[0]
+        };
+        for (a, b, c) in [(0.94, 0.764, 0.481), (1.3, 0.7, 0.2), (2.71, 0.93, 0.05)] {
+            // With a force a s, s the time since it is zero.
+            let fall = |a: f64, s: f64| {
+                let drag: f64 = c * s;
+                a / (c * c * c) * (0.5 * drag * drag - drag - (-drag).exp_m1())
+            };
+            let ramp = model(&format!("{head}'{a}*t - {b} - {c}*v']{event}"));
+            near(of(&ramp, 2.0), fall(a, 2.0 - b / a), 1e-9);
+            let table = "\n[tables.u]\nfile = 'u.csv'\ntime = 't'\ncolumn = 'u'\n\
+                interpolation = 'linear'";
+            let rows = format!("t,u\n0,-1\n1,-1\n3,{a}\n");
+            let table = model(&format!("{head}'u - {b} - {c}*v']{event}{table}"));
+            let rate = 0.5 * (a + 1.0);
+            let since = 2.0 - (b + 1.0) / rate;
+            near(of(&table.with_table("u", &rows).unwrap(), 3.0), fall(rate, since), 1e-9);
+        }
+    }
+}

@@ -115,7 +115,7 @@ impl Follower<'_> {
         let end = |((sought, side), (b, size)): (&(Sought, f64), ([f64; 5], f64))| {
             let mut v = PLACES.map(|theta| at_fraction(&b, theta));
             let end = v[4];
-            let allowance = self.allowance(*sought, *side);
+            let allowance = self.allowance(step, *sought, *side);
             if allowance != 0.0 {
                 v.iter_mut().for_each(|v| *v += allowance);
                 found.extend(first_of_polynomial(v, *side).map(|theta| (theta, *sought)));
@@ -266,7 +266,7 @@ impl Follower<'_> {
             let series = self.series_of(step, *sought, is_whole);
             ends.push(series.as_ref().map(|c| c.iter().rev().sum()));
             let Some(mut c) = series else { continue };
-            let allowance = self.allowance(*sought, *side);
+            let allowance = self.allowance(step, *sought, *side);
             c[0] += allowance;
             // Of the two ends of a whole part one is left.
             let far = matches!(sought, Sought::Guard { guard,
@@ -320,7 +320,7 @@ impl Follower<'_> {
             }
             for (j, (sought, side)) in list.iter().enumerate().filter(|(j, _)| open[*j]) {
                 let mut v: [f64; 5] = std::array::from_fn(|i| values[i][j]);
-                let allowance = self.allowance(*sought, *side);
+                let allowance = self.allowance(step, *sought, *side);
                 v.iter_mut().for_each(|v| *v += allowance);
                 let begins = from == 0.0 && allowance == 0.0;
                 let change = begins

@@ -1432,10 +1432,23 @@ impl Follower<'_> {
         }
     }
 
-    /// By how much a watched expression may be beyond zero without being met: where a contact has
-    /// opened, it leaves zero as a cube does, and what its rounding does there is nothing.
-    pub(super) fn allowance(&self, sought: Sought, side: f64) -> f64 {
-        if let Sought::Watched(i) = sought { side * self.released[i] } else { 0.0 }
+    /// By how much a watched expression may be beyond zero in a step without being met: where a
+    /// contact has opened, it leaves zero as a cube does, and what its rounding and the step's
+    /// error do there is nothing.
+    pub(super) fn allowance(&self, step: &Step, sought: Sought, side: f64) -> f64 {
+        /// Errors of a step, in units of the tolerance.
+        const MOST: f64 = 10.0;
+        let Sought::Watched(i) = sought else { return 0.0 };
+        if self.released[i] == 0.0 {
+            return 0.0;
+        }
+        let gradient = self.gradient(step.t, self.compiled.active.len() + i);
+        let error = |(j, slope): (usize, &f64)| {
+            let speed = step.k.iter().map(|k| k[j].abs()).fold(0.0, f64::max);
+            let moved = (step.y[j] - step.x[j]).abs().max(step.h * speed);
+            slope.abs() * (self.options.rtol * moved + self.options.atol.unwrap_or(0.0))
+        };
+        side * (self.released[i] + MOST * gradient.iter().enumerate().map(error).sum::<f64>())
     }
 
     /// Watches an expression that has left zero after its contact opened as others are watched.

@@ -3,8 +3,8 @@
 use std::cell::Cell;
 use std::collections::HashMap;
 
-use twofold_num::Elementary as _;
 use twofold_num::random::RandomStream;
+use twofold_num::{Arithmetic as _, Elementary as _};
 use twofold_system::expression::{Function, General};
 
 use super::locate::TANGENT;
@@ -2246,6 +2246,7 @@ impl Follower<'_> {
         /// In units of the tolerance, the error of the multistep method's first steps, which are of
         /// first order, and of the implicit one's polynomial within a step.
         const ERRORS: f64 = 10.0;
+        let dip = self.dip_of_rounding(i);
         let e = &self.equation.watched[i];
         let beyond = -self.equation.value(e, self.t, &self.x) * self.watch_side[i];
         let error = match self.options.method {
@@ -2253,7 +2254,36 @@ impl Follower<'_> {
             _ => 64.0 * f64::EPSILON,
         };
         self.released[i] =
-            beyond.max(0.0) + 4.0 * self.grain_of(i, speeds) + error * self.magnitude(e);
+            beyond.max(0.0) + 4.0 * self.grain_of(i, speeds) + error * self.magnitude(e) + dip;
+    }
+
+    /// How far a watched expression that leaves zero as a cube may go beyond it, where rounding of
+    /// the time and of forces makes its acceleration begin on the other side. What has never moved
+    /// has no size that says it.
+    fn dip_of_rounding(&mut self, i: usize) -> f64 {
+        /// Roundings that may come together.
+        const ROUNDINGS: f64 = 64.0;
+        let n = self.n;
+        let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; n]);
+        self.rhs(t, &x, &mut field);
+        let place = self.compiled.active.len() + i;
+        let time = Range::new(t, f64::EPSILON * t.abs());
+        let rest = self.variables[n + 1..].iter().map(|v| Range::from_f64(*v));
+        let states = x.iter().map(|x| Range::from_f64(*x));
+        let given: Vec<Range> = states.chain([time]).chain(rest).collect();
+        let mut forces = vec![Range::default(); n];
+        self.compiled.field.evaluate(&given, &mut forces);
+        let mut error = 0.0;
+        for (j, force) in forces.iter().enumerate() {
+            let mut unit = vec![0.0; n];
+            unit[j] = 1.0;
+            error += (self.second_in(&field, &unit)[place] * force.radius()).abs();
+        }
+        let (value, brief) = (self.watched_values()[place], self.brief(&field));
+        let jerk = 6.0 * (self.watched_ahead(place)[0] - value).abs() / (brief * brief * brief);
+        let error = ROUNDINGS * error;
+        let dip = error * error * error / (jerk * jerk);
+        if dip.is_finite() { dip } else { 0.0 }
     }
 
     /// Whether a watched expression has no speed at the present point.
