@@ -1298,10 +1298,21 @@ impl<'a> Follower<'a> {
                 // If switches or events are frequent, a step is no longer than the time between
                 // them.
                 let longest = if h > 0.0 { h } else { f64::INFINITY };
+                let reach = match no_series {
+                    None => self.step_of_series(&step)?,
+                    Some(_) => f64::INFINITY,
+                };
                 match no_series {
+                    // Beside the root series reach less far than they do.
+                    None if reach < implicit && leaving < MOST_LEAVING => {
+                        leaving += 1;
+                        step.series = None;
+                        step.jacobian = Some(self.finite_jacobian(step.t, &step.x));
+                        h = implicit.min(longest);
+                    }
                     None => {
                         (implicit, leaving) = (0.0, 0);
-                        h = self.step_of_series(&step)?.min(longest);
+                        h = reach.min(longest);
                         // Before a switch at which a root ends series reach ever less far.
                         let short = h < SHORT_STEP * (self.options.t_end - self.options.t_start);
                         if short && self.breaks_ahead(10.0 * h) && self.land_at_an_edge()? {

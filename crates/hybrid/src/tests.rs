@@ -6439,7 +6439,7 @@ fn an_empty_tank_is_refilled_where_a_table_passes_zero() {
         .unwrap();
     let model = model.with_table("w", "t,w\n0,0\n6.5,0\n8.5,0.5\n12,0\n").unwrap();
     let root = 0.25 * ((0.777_f64 * 0.777 + 8.0 / 5.75).sqrt() - 0.777);
-    for method in [Method::Dopri5, Method::Radau5, Method::Lsoda] {
+    for method in Method::ALL {
         let options = Options { t_end: 12.0, method, ..Options::default() };
         let end = follow(&model, &options, &mut |_| true);
         let x = end.unwrap_or_else(|e| panic!("{method:?}: {e}")).x;
