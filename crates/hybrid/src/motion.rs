@@ -579,8 +579,8 @@ struct Follower<'a> {
     tables_step: bool,
     /// The largest size of each state so far.
     size: Vec<f64>,
-    /// Guards that are, or were, slid upon in higher order, and for each the states that their sides
-    /// move.
+    /// Guards that are, or were, slid upon in higher order, and for each the states that their
+    /// sides move.
     turned: Vec<(usize, Vec<bool>)>,
     /// The same of late: forgotten as a state falls far below it, and where an event sets it.
     lately: Vec<f64>,
