@@ -41,6 +41,8 @@ pub struct Family {
     pub ends: Option<[Vec<f64>; 2]>,
     /// Whether stability is another in different parts of a curve.
     pub changes: bool,
+    /// Whether motion that begins beyond an end goes on along the curve's direction, away from it.
+    pub leaves: bool,
     /// Points of the curve, in order.
     points: Vec<Vec<f64>>,
 }
@@ -119,6 +121,9 @@ impl Rest {
                 _ if repels => "unstable: neighbours leave the set",
                 (true, _) => "unstable: neighbours leave the set",
                 (false, true) => "not decided by the linearised motion",
+                _ if self.family.as_ref().is_some_and(|f| f.leaves) => {
+                    "stable but for an end, at which neighbours leave the set"
+                }
                 (false, false) => "stable: neighbours come to the set",
             }
             .into(),
@@ -508,6 +513,8 @@ const SHORTEST: f64 = 1e-6;
 /// Length of that walk in widths of the box, and of a step along a curve of rests.
 const WALK: f64 = 1e-4;
 const STRIDE: f64 = 0.02;
+/// Points of a curve that are nearer to its end, in widths of the box, are that end.
+const NEAR_AN_END: f64 = 1e-7;
 /// A curve of rests is given up after so many steps to each side.
 const MOST_STRIDES: usize = 2000;
 
@@ -694,6 +701,32 @@ impl Search<'_> {
         let (along, spurious): (Vec<_>, Vec<_>) =
             zero.open.clone().into_iter().partition(|d| continues(&zero, d));
         let dimension = along.len();
+        // Curves that cross are no set of more dimensions: between two of them there are no rests.
+        let fills = |zero: &Zero| {
+            let pairs = (0..dimension).flat_map(|i| (0..i).map(move |j| (i, j)));
+            pairs.into_iter().all(|(i, j)| {
+                let half = std::f64::consts::FRAC_1_SQRT_2;
+                let between = along[i].iter().zip(&along[j]);
+                continues(zero, &between.map(|(a, b)| half * (a + b)).collect::<Vec<_>>())
+            })
+        };
+        if dimension > 1 && !fills(&zero) {
+            let branches = along.iter().flat_map(|d| [(d, WALK), (d, -WALK)]);
+            for (direction, by) in branches {
+                let (aim, weights) = self.moved(&zero, direction, by);
+                let beside = self.settle(config, on, &aim, &weights, DEPENDENT).filter(|beside| {
+                    beside.open.len() == 1
+                        && self.distance(&beside.x, &aim) <= 0.1 * WALK
+                        && self.is_valid(config, on, beside)
+                });
+                if let Some(beside) = beside
+                    && !self.is_known(config, on, &beside.x, 1, found)
+                {
+                    found.extend(self.family(config, on, beside, 1));
+                }
+            }
+            return;
+        }
         let rest = if dimension > 0 {
             zero.open = along;
             self.family(config, on, zero, dimension)
@@ -1167,8 +1200,13 @@ impl Search<'_> {
     ) -> Option<Rest> {
         if dimension > 1 {
             let mut rest = self.rest(config, on, zero)?;
-            rest.family =
-                Some(Family { dimension, ends: None, changes: false, points: Vec::new() });
+            rest.family = Some(Family {
+                dimension,
+                ends: None,
+                changes: false,
+                leaves: false,
+                points: Vec::new(),
+            });
             return Some(rest);
         }
         let first = zero.open.first()?.clone();
@@ -1225,18 +1263,43 @@ impl Search<'_> {
                 [a, b]
             }
         });
-        // At an end the equations change.
-        let inner = points.get(1..points.len().saturating_sub(1)).unwrap_or_default();
-        let family = Family { dimension, ends, changes: false, points: Vec::new() };
+        // At an end the equations change, and a stride may come to it.
+        let is_inner =
+            |x: &&Vec<f64>| ends.iter().flatten().all(|end| self.distance(x, end) > NEAR_AN_END);
+        let inner: Vec<&Vec<f64>> = points.iter().filter(is_inner).collect();
+        let leaves = !closed && self.leaves_at_an_end(config.mode, &points);
+        let family = Family { dimension, ends, changes: false, leaves: false, points: Vec::new() };
         let at = |x: &Vec<f64>| {
             let there = self.settle(config, on, x, &zero.weights, DEPENDENT)?;
             Some(Rest { family: Some(family.clone()), ..self.rest(config, on, there)? })
         };
         let mut rest = at(&middle)?;
         let kind = rest.kind();
-        let changes = inner.iter().filter_map(&at).any(|other| other.kind() != kind);
-        rest.family = Some(Family { changes, points, ..family });
+        let changes = inner.into_iter().filter_map(&at).any(|other| other.kind() != kind);
+        rest.family = Some(Family { changes, leaves, points, ..family });
         Some(rest)
+    }
+
+    /// Whether the field beyond an end of a curve of rests, where that is in the box, points along
+    /// the curve and away from it.
+    fn leaves_at_an_end(&self, mode: usize, points: &[Vec<f64>]) -> bool {
+        const STRAIGHT: f64 = 1e-6;
+        let leaves = |points: &[&Vec<f64>]| {
+            let (end, others) = points.split_last()?;
+            let before = others.iter().rfind(|x| self.distance(x, end) > NEAR_AN_END)?;
+            let way = self.scaled(end, before);
+            let length = sqrt(dot(&way, &way));
+            let way: Vec<f64> = way.iter().map(|v| v / length).collect();
+            let beyond = end.iter().zip(&way).zip(&self.widths);
+            let beyond: Vec<f64> = beyond.map(|((x, d), w)| x + WALK * d * w).collect();
+            let field = self.local(&self.configuration(mode, &beyond), &beyond).field;
+            let field: Vec<f64> = field.iter().zip(&self.widths).map(|(f, w)| f / w).collect();
+            let (out, size) = (dot(&field, &way), sqrt(dot(&field, &field)));
+            Some(self.is_inside(&beyond) && out > 0.0 && out >= (1.0 - STRAIGHT) * size)
+        };
+        let forth: Vec<&Vec<f64>> = points.iter().collect();
+        let back: Vec<&Vec<f64>> = points.iter().rev().collect();
+        [leaves(&forth), leaves(&back)].contains(&Some(true))
     }
 }
 

@@ -2948,6 +2948,38 @@ fn rests_of_many_linear_pieces_are_found() {
     }
 }
 
+/// A curve of rests is named by what neighbours of all of it do: not by its end, where the equations
+/// change, nor by a point where it crosses another one.
+#[test]
+fn curves_of_rests_have_the_names_of_their_neighbours() {
+    const COME: &str = "stable: neighbours come to the set";
+    const LEAVE: &str = "stable but for an end, at which neighbours leave the set";
+    const CHANGES: &str = "stability changes along the curve";
+    const OPEN: &str = "not decided by the linearised motion";
+    for (f, right) in [
+        ("'max(x - 1, 0)'", &[LEAVE][..]),
+        ("'max(-x - 1, 0)'", &[COME]),
+        ("'max(-x, 0)', '-y'", &[COME]),
+        ("'if(x < 0, 2, 0)', '-y'", &[COME]),
+        ("'1 - sign(x)', '-y'", &[COME]),
+        ("'clip(x, -1, 1) - x', '-y'", &[COME]),
+        ("'max(x - 1, 0)', '-y'", &[LEAVE]),
+        ("'max(x - 1, 0)', 'y'", &["unstable: neighbours leave the set"]),
+        ("'0', 'x*y'", &[CHANGES, OPEN]),
+        ("'x*y', '0'", &[OPEN, CHANGES]),
+        ("'x*y', '-x*y'", &[CHANGES, CHANGES]),
+        ("'x^2 - y^2', '0'", &[CHANGES, CHANGES]),
+    ] {
+        let n = f.matches('\'').count() / 2;
+        let text = format!("states = [{}]\nf = [{f}]", &"'x', 'y'"[..5 * n - 2]);
+        let found = crate::rests::rests(&model(&text), &vec![(-10.0, 10.0); n]).unwrap();
+        let kinds: Vec<String> = found.iter().map(|r| r.kind()).collect();
+        assert_eq!(kinds, right, "{f}");
+        let is_curve = |r: &crate::rests::Rest| r.family.as_ref().is_some_and(|f| f.dimension == 1);
+        assert!(found.iter().all(is_curve), "{f}");
+    }
+}
+
 /// As many as there are, of which 400 starts do not find all.
 #[test]
 fn many_rests_are_found() {
