@@ -2948,8 +2948,8 @@ fn rests_of_many_linear_pieces_are_found() {
     }
 }
 
-/// A curve of rests is named by what neighbours of all of it do: not by its end, where the equations
-/// change, nor by a point where it crosses another one.
+/// A curve of rests is named by what neighbours of all of it do: not by its end, where the
+/// equations change, nor by a point where it crosses another one.
 #[test]
 fn curves_of_rests_have_the_names_of_their_neighbours() {
     const COME: &str = "stable: neighbours come to the set";
