@@ -6268,6 +6268,15 @@ fn sliding_of_higher_order_is_followed_by_every_method() {
             near(y[i + 2], y[i], 1e-13);
         }
     }
+    // The disturbance grows faster than the gain bears at times, and the motion comes back. (taylor
+    // refuses to leave: notes/defects.md.)
+    let f = "['-1.5*sign(x)*sqrt(abs(x)) + w + 0.4*sin(2*t) + 0.6*sin(t)', '-1.1*sign(x)']";
+    for method in [Method::Dopri5, Method::Radau5, Method::Lsoda] {
+        let text = format!("states = ['x', 'w']\nstart = [0.4, 0]\nf = {f}");
+        let x = end_of(&text, 20.0, method).unwrap();
+        near(x[0], 0.0, 1e-12);
+        near(x[1], -0.4 * 40.0_f64.sin() - 0.6 * 20.0_f64.sin(), 1e-12);
+    }
     // In units of a millionth.
     for method in Method::ALL {
         let f = "['-1.5e-3*sign(x)*sqrt(abs(x)) + w + 3e-7*cos(t)', '-1.1e-6*sign(x)']";

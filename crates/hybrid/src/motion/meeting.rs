@@ -1942,6 +1942,12 @@ impl Follower<'_> {
                 break;
             }
         }
+        // What is left of a state at zero is no size.
+        for (i, x) in variables.iter_mut().enumerate().take(self.n) {
+            if x.abs() < f64::EPSILON * f64::EPSILON * self.width(i) {
+                *x = 0.0;
+            }
+        }
         variables.truncate(self.n);
         Some(variables)
     }
