@@ -193,24 +193,31 @@ impl GeneralOutcome {
                     Verdict::Periodic(_) | Verdict::Spiralling(_) => {
                         !driven && narrows(&section, shown_from, least)
                     }
+                    // Where few turns are left a motion may have come near to a rest.
+                    Verdict::Escaped { .. } | Verdict::TooFew { .. } => !driven,
                     _ => false,
                 };
                 let growth = if asks { self.growth(monitor)? } else { Vec::new() };
                 let has_sign = |of: usize| growth.get(of).is_some_and(Growth::is_clear);
+                let left =
+                    matches!(evidence.verdict, Verdict::Escaped { .. } | Verdict::TooFew { .. });
                 if !driven && has_sign(0) && growth[0].total() < -FALLS {
                     // Along any other motion the field's own direction neither grows nor shrinks.
                     place.push(found.x.clone());
                     bare("rest")
                 } else {
-                    if asks {
+                    if asks && !left {
                         let lyapunov = growth.first().and_then(Growth::exponent);
                         let question = attractor::Question { lyapunov, ..question };
                         (evidence, middle) = judged(&section, &question, least);
                         let regular = !has_sign(0) && (driven || !has_sign(1));
                         let open = matches!(evidence.verdict, Verdict::Undecided { .. });
-                        if open || !is_borne_out(&evidence, regular) {
+                        let keeps_size = keeps_its_size(&section, shown_from);
+                        let grows =
+                            matches!(evidence.verdict, Verdict::Chaotic { .. }) && !keeps_size;
+                        if open || grows || !is_borne_out(&evidence, regular) {
                             let parts = growth.first().is_some_and(|g| g.is_clear() && g.parts());
-                            evidence.verdict = if parts && keeps_its_size(&section, shown_from) {
+                            evidence.verdict = if parts && keeps_size {
                                 Verdict::Chaotic { lyapunov, bands: 1 }
                             } else {
                                 Verdict::Undecided { lyapunov }
@@ -728,6 +735,32 @@ mod tests {
             assert_eq!(word(&bistable(x), Some("y"), 500.0), "rest", "{x}");
         }
         assert_eq!(word(&bistable(1.3), Some("y"), 3000.0), "period-1");
+    }
+
+    /// A linear focus, however far it is come to: it crosses a plane beside it in a part of the run.
+    #[test]
+    fn a_focus_that_is_reached_is_a_rest() {
+        for a in [0.02, 0.03, 0.04, 0.06] {
+            let text = format!(
+                "states = ['x', 'y']\nstart = [-0.7, 0.187]\n\
+                 f = ['-{a}*x + y + 0.013', '-x - {a}*y - {a}*0.013']"
+            );
+            for section in ["x", "y"] {
+                assert_eq!(word(&text, Some(section), 400.0), "rest", "{a} {section}");
+            }
+        }
+    }
+
+    /// Linear growth in the plane is no chaos.
+    #[test]
+    fn unbounded_growth_is_not_irregular() {
+        for a in [0.2, 0.3, 0.4] {
+            let text = format!(
+                "states = ['x', 'y']\nstart = [0.3, 0.187]\n\
+                    f = ['{a}*x + y + 0.013', '-x + {a}*y + {a}*0.013']"
+            );
+            assert_eq!(word(&text, Some("y"), 400.0), "undecided", "{a}");
+        }
     }
 
     #[test]
