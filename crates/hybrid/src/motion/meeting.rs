@@ -1763,16 +1763,25 @@ impl Follower<'_> {
         const SEEN: f64 = 1e5;
         /// A derivative of so many times its own rounding may be zero.
         const NOISE: f64 = 16.0;
+        /// Speeds that differ by no more may be one but for a root of rounding.
+        const ALIKE: f64 = 0.1;
         let mut config = self.config.clone();
         let own = &self.equation.guards[guard];
         if config.higher.contains(&guard) || own.whole || own.kink {
+            return Ok(false);
+        }
+        // Its own speed is one on both sides; of most functions it is not. (A root has no value on
+        // the wrong side.)
+        let plain = config.clone();
+        let [up, down] = [1.0, -1.0].map(|side| self.beside(guard, &plain, side, 0.0));
+        let (Some((_, up, _)), Some((_, down, _))) = (up, down) else { return Ok(false) };
+        if (up - down).abs() > ALIKE * (up.abs() + down.abs()) {
             return Ok(false);
         }
         config.higher.push(guard);
         let at = config.higher.len() - 1;
         let compiled = self.equation.compiled(&config);
         let Some((program, outputs)) = &compiled.derivatives[at] else { return Ok(false) };
-        let plain = self.config.clone();
         let turns = self.switch_trains[guard].turns();
         let left = match outputs {
             2 => turns.or_else(|| self.brakes(guard, &config, &plain)),
