@@ -670,8 +670,9 @@ impl Equation {
         known.then(|| self.value(e, 0.0, &[])).filter(|v| v.is_finite())
     }
 
-    /// What an expression is the least or the greatest of, itself, as a term or as the limits of
-    /// `clip`: from above (`least`) clip(x, l, h) is min(max(x, l), h), else max(min(x, h), l).
+    /// The expressions of which one is the least or the greatest, itself, as a term or as the
+    /// limits of `clip`: from above (`least`) clip(x, l, h) is min(max(x, l), h), else
+    /// max(min(x, h), l).
     fn least_or_greatest<'a>(
         &'a self,
         e: &'a Expression,

@@ -363,7 +363,7 @@ impl Follower<'_> {
                         first_behind_tangent(*side, from, to, &mut |theta| f(theta) - begin)
                     }
                 };
-                // What leaves zero to its side has not come back at once.
+                // A function that leaves zero to its side has not come back at once.
                 let leaves = |theta: &f64| {
                     begins
                         && *theta < AT_ONCE

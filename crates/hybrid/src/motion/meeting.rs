@@ -1951,7 +1951,7 @@ impl Follower<'_> {
                 break;
             }
         }
-        // What is left of a state at zero is no size.
+        // Rounding that is left of a state at zero is no size.
         for (i, x) in variables.iter_mut().enumerate().take(self.n) {
             if x.abs() < f64::EPSILON * f64::EPSILON * self.width(i) {
                 *x = 0.0;

@@ -589,7 +589,7 @@ impl Follower<'_> {
                 .collect();
             let small = |defect: f64| defect <= LARGEST_DEFECT;
             if !defects.iter().all(|defect| small(*defect)) {
-                // What a stiff equation makes of an error of the polynomial it forgets; and from a
+                // Errors of the polynomial are forgotten by a stiff equation; and from a
                 // root of zero, where no polynomial is near, the step's end alone is known.
                 let forgets = step.jacobian.is_some() && {
                     let jacobian = self.jacobian(step.t + middle * step.h, &at);

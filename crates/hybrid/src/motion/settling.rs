@@ -1985,7 +1985,7 @@ impl Follower<'_> {
             let small = 1e-12 * size;
             let away = value.abs() > small;
             if side == 0.0 {
-                // What rested at zero is on the side where it arrives.
+                // An expression that rested at zero is on the side where it arrives.
                 if away && before[i].abs() <= small {
                     (self.watch_side[i], self.fresh_watch[i]) = (value.signum(), false);
                 }
@@ -2257,9 +2257,9 @@ impl Follower<'_> {
             beyond.max(0.0) + 4.0 * self.grain_of(i, speeds) + error * self.magnitude(e) + dip;
     }
 
-    /// How far a watched expression that leaves zero as a cube may go beyond it, where rounding of
-    /// the time and of forces makes its acceleration begin on the other side. What has never moved
-    /// has no size that says it.
+    /// The distance to which a watched expression that leaves zero as a cube may go beyond it,
+    /// where rounding of the time and of forces makes its acceleration begin on the other side.
+    /// What has never moved has no size that says it.
     fn dip_of_rounding(&mut self, i: usize) -> f64 {
         /// Roundings that may come together.
         const ROUNDINGS: f64 = 64.0;

@@ -55,7 +55,7 @@ impl Linear {
     }
 }
 
-/// What is required of a point: a linear function of it, and a constant, that is not negative.
+/// A requirement of a point: a linear function of it, and a constant, that is not negative.
 struct Required(Vec<f64>);
 
 /// Patterns of sides, as far as they were counted.
@@ -240,7 +240,7 @@ impl Space {
         }
         let depth = rows.iter().fold(0.0_f64, |most, (_, right)| most.max(-right));
         rows.iter_mut().for_each(|(_, right)| *right += depth);
-        // What is the deepest point of a few requirements may be infinitely deep; no cell of the
+        // The deepest point of a few requirements may be infinitely deep; no cell of the
         // box is deeper than 2.
         for i in 0..=n {
             let unit = (0..=n).map(|j| if i == j { 1.0 } else { 0.0 }).collect();

@@ -737,7 +737,8 @@ mod tests {
         assert_eq!(word(&bistable(1.3), Some("y"), 3000.0), "period-1");
     }
 
-    /// A linear focus, however far it is come to: it crosses a plane beside it in a part of the run.
+    /// A linear focus, however near it is come to: it crosses a plane beside it in a part of the
+    /// run.
     #[test]
     fn a_focus_that_is_reached_is_a_rest() {
         for a in [0.02, 0.03, 0.04, 0.06] {
