@@ -293,6 +293,8 @@ enum Stroke {
 /// A piece of a path in one style.
 struct Line {
     look: Stroke,
+    /// Number of points of the path between two resets.
+    whole: usize,
     t: Vec<f64>,
     /// Per state.
     x: Vec<Vec<f64>>,
@@ -341,18 +343,14 @@ fn lines(answer: &Answer, run: &Frame) -> Result<Vec<Line>, PlotError> {
     for row in 1..=looks.len() {
         if row == looks.len() || looks[row] != looks[from] {
             let t = motion.numbers("t")[from..row].to_vec();
-            found.push(Line { look: looks[from].0, t, x: columns(motion, from..row) });
+            let (look, whole) = (looks[from].0, t.len());
+            found.push(Line { look, whole, t, x: columns(motion, from..row) });
             from = row;
         }
     }
     // Sliding above flight, the way in above the ways out.
     found.sort_by_key(|line| line.look);
     Ok(found)
-}
-
-/// Number of points of all lines.
-fn length(lines: &[Line]) -> usize {
-    lines.iter().map(|line| line.t.len()).sum()
 }
 
 /// The pieces of a path: it is cut at resets, and where it comes onto a switching surface or leaves
@@ -364,8 +362,8 @@ fn pieces(path: &Table, columns: impl Fn(std::ops::Range<usize>) -> Vec<Vec<f64>
         .map(|signs| if signs.contains('0') { Stroke::Surface } else { Stroke::Smooth })
         .collect();
     looks.resize(t.len(), Stroke::Smooth);
-    let mut found = Vec::new();
-    let mut from = 0;
+    let mut found: Vec<Line> = Vec::new();
+    let (mut from, mut first, mut begin) = (0, 0, 0);
     for row in 1..=t.len() {
         // A reset is no line: two rows of one time.
         let reset = row == t.len() || t[row] == t[row - 1];
@@ -373,8 +371,12 @@ fn pieces(path: &Table, columns: impl Fn(std::ops::Range<usize>) -> Vec<Vec<f64>
             continue;
         }
         let look = looks[row - 1];
-        found.push(Line { look, t: t[from..row].to_vec(), x: columns(from..row) });
+        found.push(Line { look, whole: 0, t: t[from..row].to_vec(), x: columns(from..row) });
         from = if reset { row } else { row - 1 };
+        if reset {
+            found[first..].iter_mut().for_each(|line| line.whole = row - begin);
+            (first, begin) = (found.len(), row);
+        }
     }
     found.sort_by_key(|line| line.look);
     found
@@ -453,7 +455,7 @@ fn series(mut sheet: Sheet, run: &Frame, lines: &[Line], shown: &[usize]) -> She
         }
         for line in lines {
             let points = line.t.iter().zip(&line.x[*state]).map(|(t, x)| [*t, *x]).collect();
-            panel = panel.line(points, line_style(line.look, length(lines)));
+            panel = panel.line(points, line_style(line.look, line.whole));
         }
         sheet = sheet.panel("", "", panel);
     }
@@ -509,7 +511,7 @@ fn plane(sheet: Sheet, run: &Frame, lines: &[Line], shown: &[usize]) -> Sheet {
         panel = surface_curve(panel, &level, ranges, &mut looks);
     }
     for line in lines {
-        panel = panel.line(line.points([u, v]), line_style(line.look, length(lines)));
+        panel = panel.line(line.points([u, v]), line_style(line.look, line.whole));
     }
     let start = lines
         .iter()
@@ -549,7 +551,7 @@ fn space(
         panel = panel.surface(patches);
     }
     for line in lines {
-        panel = panel.line(line.points(order), line_style(line.look, length(lines)));
+        panel = panel.line(line.points(order), line_style(line.look, line.whole));
     }
     let exits: Vec<[f64; 3]> =
         exits(answer, run).into_iter().map(|x| order.map(|i| x[i])).collect();
@@ -696,5 +698,6 @@ mod tests {
             ]
         );
         assert_eq!(found[3].x, [[10.0, 20.0, 30.0]]);
+        assert!(found.iter().map(|line| line.whole).eq([5, 5, 2, 5]));
     }
 }
