@@ -6285,6 +6285,21 @@ fn sliding_of_higher_order_is_followed_by_every_method() {
     }
 }
 
+/// Neighbours of sliding of higher order have no common linear motion, wherever it begins.
+#[test]
+fn sliding_of_higher_order_has_no_tangent_vectors() {
+    for start in ["[0.4, 0]", "[0, -0.3]"] {
+        let text = format!(
+            "states = ['x', 'w']\nstart = {start}\n\
+            f = ['-1.5*sign(x)*sqrt(abs(x)) + w + 0.3*cos(t)', '-1.1*sign(x)']"
+        );
+        let options = Options { t_end: 3.0, ..Options::default() };
+        let found = crate::motion::sensitivity::sensitivities(&model(&text), &options, &[]);
+        let why = found.unwrap_err().to_string();
+        assert!(why.contains("slides in higher order"), "{start}: {why}");
+    }
+}
+
 /// Where the sides do not brake, or push away, turns about a zero are no sliding.
 #[test]
 fn turns_that_are_not_braked_go_on() {

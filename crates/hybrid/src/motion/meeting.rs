@@ -1818,10 +1818,7 @@ impl Follower<'_> {
             let decided = self.decide(&self.sliding.clone(), &none).is_ok();
             if decided && self.config.higher.contains(&guard) {
                 if self.tangents.is_some() {
-                    return Err(self.no_tangents(
-                        "sliding of higher order begins, where neighbours have no common linear \
-                            motion",
-                    ));
+                    return Err(self.no_tangents_in_higher_order());
                 }
                 return Ok(true);
             }

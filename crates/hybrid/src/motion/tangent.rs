@@ -379,6 +379,9 @@ impl Follower<'_> {
         if self.dependent {
             return Err(self.no_tangents("motion begins on surfaces that depend on each other"));
         }
+        if !self.config.higher.is_empty() {
+            return Err(self.no_tangents_in_higher_order());
+        }
         if self.part_rests {
             return Err(self.no_tangents(
                 "a part of the states rests where switches meet, where neighbours have no common \
@@ -630,6 +633,14 @@ impl Follower<'_> {
             x: self.x.clone(),
             why: format!("tangent vectors end: {why}"),
         }
+    }
+
+    /// Neighbours come to sliding of higher order in a time like the root of their distance, in
+    /// which they move others by as much as that distance, by either side.
+    pub(super) fn no_tangents_in_higher_order(&self) -> HybridError {
+        self.no_tangents(
+            "the motion slides in higher order, where neighbours have no common linear motion",
+        )
     }
 
     /// Notes the derivative of a reset, for tangent vectors, after those of this moment that were
