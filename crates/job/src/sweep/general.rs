@@ -10,7 +10,7 @@ use twofold_hybrid::motion::tangent::exponents_watched;
 use twofold_hybrid::motion::{Method, Record, follow_to_rest};
 use twofold_hybrid::{Ending, Options};
 use twofold_integrate::Monitor;
-use twofold_num::elementary::sqrt;
+use twofold_num::elementary::{ln, sqrt};
 use twofold_system::Expression;
 
 use super::outcome::place_of;
@@ -212,12 +212,12 @@ impl GeneralOutcome {
                         (evidence, middle) = judged(&section, &question, least);
                         let regular = !has_sign(0) && (driven || !has_sign(1));
                         let open = matches!(evidence.verdict, Verdict::Undecided { .. });
-                        let keeps_size = keeps_its_size(&section, shown_from);
-                        let grows =
-                            matches!(evidence.verdict, Verdict::Chaotic { .. }) && !keeps_size;
+                        let by = growth.first().map_or(f64::INFINITY, |g| g.value);
+                        let grows = matches!(evidence.verdict, Verdict::Chaotic { .. })
+                            && grows_by(&section, shown_from, by);
                         if open || grows || !is_borne_out(&evidence, regular) {
                             let parts = growth.first().is_some_and(|g| g.is_clear() && g.parts());
-                            evidence.verdict = if parts && keeps_size {
+                            evidence.verdict = if parts && keeps_its_size(&section, shown_from) {
                                 Verdict::Chaotic { lyapunov, bands: 1 }
                             } else {
                                 Verdict::Undecided { lyapunov }
@@ -328,6 +328,18 @@ fn keeps_its_size(section: &[SectionPoint], from: f64) -> bool {
     let late: Vec<SectionPoint> = section.iter().filter(|p| p.t >= from).copied().collect();
     let (earlier, last) = late.split_at(late.len() / 2);
     Late::of(last, from).swing <= FURTHER * Late::of(earlier, from).swing
+}
+
+/// Whether the later half of a run's points from `from` on reaches farther than the earlier one as
+/// motion does that grows by this exponent: chaos, too, may reach farther now and then.
+fn grows_by(section: &[SectionPoint], from: f64, exponent: f64) -> bool {
+    /// Part of the exponent.
+    const PART: f64 = 0.5;
+    let late: Vec<SectionPoint> = section.iter().filter(|p| p.t >= from).copied().collect();
+    let (earlier, last) = late.split_at(late.len() / 2);
+    let (Some(a), Some(b)) = (earlier.last(), last.last()) else { return false };
+    let farther = Late::of(last, from).swing / Late::of(earlier, from).swing;
+    ln(farther) > PART * exponent * (b.t - a.t)
 }
 
 /// Whether the two sides of the turns come together, as they do on the way to a rest: points at
