@@ -6196,7 +6196,7 @@ fn moving_targets_are_reached() {
 /// target that moves, under a disturbance, beside states that their sides do not move, and from
 /// where they are there already.
 #[test]
-fn sliding_of_higher_order_is_followed_by_every_method() {
+fn sliding_of_higher_order_is_followed() {
     let (s, c) = 10.0_f64.sin_cos();
     // The equations, the start, the states at t = 10.
     let known = [
@@ -6244,7 +6244,8 @@ fn sliding_of_higher_order_is_followed_by_every_method() {
     ];
     for (states, f, start, want) in known {
         // (Cube roots are refused by the other two at some ends of the run: notes/defects.md.)
-        let methods = if want.len() == 3 { &Method::ALL[2..] } else { &Method::ALL };
+        let cube_roots = [Method::Taylor, Method::Lsoda];
+        let methods = if want.len() == 3 { &cube_roots[..] } else { &Method::ALL };
         for method in methods.iter().copied() {
             let text = format!("states = {states}\nstart = {start}\nf = {f}");
             let x = end_of(&text, 10.0, method).unwrap_or_else(|e| panic!("{method:?} {f}: {e}"));
