@@ -1477,6 +1477,19 @@ pub(crate) struct Affine {
 }
 
 impl Affine {
+    /// Its speed along a field of the states, while the time goes on, and the size of what this is
+    /// a sum of.
+    pub(crate) fn speed(&self, field: &[f64]) -> (f64, f64) {
+        self.factors.iter().fold((0.0, 0.0), |(slope, size), (variable, factor)| {
+            let change = match *variable {
+                i if i < field.len() => factor * field[i],
+                i if i == field.len() => *factor,
+                _ => 0.0,
+            };
+            (slope + change, size + change.abs())
+        })
+    }
+
     fn plus(mut self, other: &Self, factor: f64) -> Self {
         self.constant += factor * other.constant;
         for (variable, f) in &other.factors {

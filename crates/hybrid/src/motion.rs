@@ -1131,7 +1131,8 @@ impl<'a> Follower<'a> {
     }
 
     fn run(&mut self, observe: &mut dyn FnMut(&Point) -> bool) -> Result<Ending, HybridError> {
-        let definition = self.model.definition().clone();
+        let model = self.model;
+        let definition = model.definition();
         let at_start = std::mem::take(&mut self.at_start);
         let mut clock = Clock::new(self, &at_start)?;
         let mut step = Step::new(self.n);

@@ -729,11 +729,11 @@ impl Follower<'_> {
     /// An event that has happened whose condition is false here and true right after, and that
     /// makes it false there as well: it happens infinitely often in no time.
     fn endless(&mut self, definition: &crate::Definition, fired: &[usize]) -> Option<usize> {
-        let x = self.x.clone();
         fired.iter().copied().find(|i| {
             let event = &definition.events()[*i];
             let When::Becomes(e) = &event.when else { return false };
             let goes_on = self.holds[*i] && event.mode.is_none() && !event.set.is_empty();
+            let x = self.x.clone();
             if !goes_on || self.holds_at(e, &x) {
                 return false;
             }
@@ -1000,7 +1000,8 @@ impl Follower<'_> {
     /// Bodies that lie without a speed at surfaces on which motion may stick, and are pressed
     /// against them, by each other, too, stay there.
     pub(super) fn rest_on_stops(&mut self) -> Result<(), HybridError> {
-        let definition = self.model.definition().clone();
+        let model = self.model;
+        let definition = model.definition();
         while let Some(event) = (0..self.watch_side.len()).find_map(|i| self.lies(&definition, i)) {
             if !self.stick(&definition, &[event], self.t)? {
                 break;

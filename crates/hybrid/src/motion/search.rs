@@ -116,7 +116,7 @@ impl Follower<'_> {
         });
         let near =
             |(t, x): &(f64, Vec<f64>)| self.equation.value(&expression, *t, x).abs() <= small;
-        if !places.iter().all(near) || !self.is_kink(guard) {
+        if !places.iter().all(near) {
             return false;
         }
         let mut other = self.config.clone();
@@ -124,7 +124,7 @@ impl Follower<'_> {
         self.ask_new(&mut other);
         let (compiled, mut variables) = (self.equation.compiled(&other), self.load(&other));
         let (mut here, mut there) = (vec![0.0; n], vec![0.0; n]);
-        places.iter().all(|(t, x)| {
+        let agree = places.iter().all(|(t, x)| {
             variables[..n].copy_from_slice(x);
             variables[n] = *t;
             compiled.field.evaluate(&variables, &mut there);
@@ -136,7 +136,8 @@ impl Follower<'_> {
                 let error = ERRORS * (atol + rtol * self.scale_of(i).max(x[i].abs()));
                 ((here[i] - there[i]) * step.h).abs() <= error
             })
-        })
+        });
+        agree && self.is_kink(guard)
     }
 
     /// Whether the equations are continuous where this function is zero: by the way in which it is
@@ -893,14 +894,7 @@ impl Follower<'_> {
         let (n, mut field) = (self.n, std::mem::take(&mut self.room));
         field.resize(n, 0.0);
         self.rhs(t, &step.y, &mut field);
-        let slope = match &self.compiled.affine[place] {
-            Some(sum) => sum.factors.iter().fold(0.0, |slope, (i, factor)| match *i {
-                i if i < n => slope + factor * field[i],
-                i if i == n => slope + factor,
-                _ => slope,
-            }),
-            None => Self::along(&self.compiled, &self.variables, &field)[place],
-        };
+        let slope = self.speed_along(place, &field);
         if slope.abs() > FLAT * nearby.abs() {
             self.room = field;
             return;

@@ -1406,13 +1406,17 @@ impl Follower<'_> {
         if zero.len() < 3 || !self.left_out.is_empty() {
             return false;
         }
-        let is_kink = |follower: &mut Self, guard: usize| {
-            !follower.equation.guards[guard].whole
-                && !follower.slides[guard]
-                && follower.is_kink(guard)
+        // One that sees a state that no other sees does not follow from them.
+        let touches = |guard: usize| self.compiled.place(guard).map(|p| &self.compiled.touches[p]);
+        let mut seen = vec![0; self.n + 1];
+        zero.iter().flat_map(|g| touches(*g)).flatten().for_each(|v| seen[*v] += 1);
+        let shared = |guard: &usize| {
+            !self.equation.guards[*guard].whole
+                && !self.slides[*guard]
+                && touches(*guard).is_none_or(|touched| touched.iter().all(|v| seen[*v] > 1))
         };
-        let mut kinks: Vec<usize> =
-            zero.iter().copied().filter(|guard| is_kink(self, *guard)).collect();
+        let mut kinks: Vec<usize> = zero.iter().copied().filter(shared).collect();
+        kinks.retain(|guard| self.is_kink(*guard));
         let others: Vec<usize> = zero.iter().copied().filter(|g| !kinks.contains(g)).collect();
         let follows = |follower: &Self, kink: usize, from: &[usize]| {
             let all = [from, &[kink]].concat();
@@ -1833,14 +1837,18 @@ impl Follower<'_> {
         if self.held.is_empty() {
             return;
         }
-        let values = self.watched_values();
         let active = self.compiled.active.len();
+        let moves_freely = self.sliding.is_empty() && self.contacts.is_empty();
+        if moves_freely && self.compiled.touches[active..].iter().all(|list| !list.is_empty()) {
+            return;
+        }
+        let values = self.watched_values();
         let is_zero = |i: &usize| {
             values[active + i].abs() <= 1e-12 * self.magnitude(&self.equation.watched[*i])
                 && !self.contacts.iter().any(|contact| contact.watched == *i)
         };
         let zero: Vec<usize> = (0..self.held.len()).filter(is_zero).collect();
-        if self.sliding.is_empty() && self.contacts.is_empty() {
+        if moves_freely {
             zero.iter().for_each(|i| self.held[*i] = self.compiled.touches[active + i].is_empty());
             return;
         }
@@ -2047,12 +2055,7 @@ impl Follower<'_> {
             self.variables[n] = self.t;
             self.scratch.resize(n, 0.0);
             self.compiled.field.evaluate(&self.variables, &mut self.scratch);
-            let (mut slope, mut terms) = (0.0, 0.0_f64);
-            for (variable, factor) in sum.factors.iter().filter(|(v, _)| *v <= n) {
-                let change = factor * if *variable == n { 1.0 } else { self.scratch[*variable] };
-                slope += change;
-                terms += change.abs();
-            }
+            let (slope, terms) = sum.speed(&self.scratch);
             // Sliding is left without a speed, and to the side that it is left to.
             let left = self.left_watch[i];
             if met && left != 0.0 && slope.abs() <= TANGENT * left.abs() {
@@ -2072,6 +2075,14 @@ impl Follower<'_> {
         self.tangent[i] = !met && rates.first_or_zero(place) == 0.0;
         let direction = rates.direction(place);
         self.watch_side[i] = if direction == 0.0 { self.side_ahead(place) } else { direction };
+    }
+
+    /// The speed of a watched value along a field, at the state that the variables hold.
+    pub(super) fn speed_along(&self, place: usize, field: &[f64]) -> f64 {
+        match &self.compiled.affine[place] {
+            Some(sum) => sum.speed(field).0,
+            None => Self::along(&self.compiled, &self.variables, field)[place],
+        }
     }
 
     /// By how much the speed of an expression that bends so may be off where its time is: as much
@@ -2101,11 +2112,13 @@ impl Follower<'_> {
         let place = self.compiled.active.len() + i;
         let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; self.n]);
         self.rhs(t, &x, &mut field);
-        let value = self.watched_values()[place];
-        let speed = Self::along(&self.compiled, &self.variables, &field)[place];
+        let speed = self.speed_along(place, &field);
         let small = 1e-13 * self.magnitude(&self.equation.watched[i]);
-        (speed * self.brief(&field)).abs() <= small
-            && speed.abs() <= SMALLEST_SLOPE * self.speeds(&field, place)
+        if (speed * self.brief(&field)).abs() > small {
+            return false;
+        }
+        let value = self.watched_values()[place];
+        speed.abs() <= SMALLEST_SLOPE * self.speeds(&field, place)
             && self.turns(i)
             && self.watched_ahead(place).iter().all(|ahead| (ahead - value).abs() <= small)
     }
