@@ -312,8 +312,6 @@ const MOST_JUMPS: usize = 32;
 /// Derivatives of watched values that are smaller parts of their terms than this are zero.
 const SMALLEST_SLOPE: f64 = 1e-11;
 
-type Nested = Dual<Dual<f64, 1>, 1>;
-
 /// A condition that a step is searched for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Sought {

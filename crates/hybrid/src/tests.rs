@@ -6539,3 +6539,21 @@ fn a_body_lifts_off_from_rest_without_a_hit() {
         }
     }
 }
+
+/// A first-order reset element, which is reset where the error or its own state changes sign: the
+/// condition is a product whose factors are both zero to rounding after each reset.
+#[test]
+fn a_condition_that_is_a_product_is_met_once() {
+    let text = "states = ['y', 'v', 'xr', 'n']\nstart = [0, 0, 0, 0]\n\
+        f = ['v', '-0.728*v + 3.947*xr', '-0.632*xr + e', '0']\n[let]\ne = '1 - y'\n\
+        [[event]]\nwhen = 'e*xr < 0'\nset = { xr = '0', n = 'n + 1' }";
+    let model = model(text);
+    for method in Method::ALL {
+        let options = Options { t_end: 15.0, method, ..Options::default() };
+        let x = follow(&model, &options, &mut |_| true).unwrap().x;
+        assert_eq!(x[3], 7.0, "{method:?}");
+        // Matrix exponentials between the zeros of the error (SciPy).
+        near(x[0], 3.7722495010, 1e-8);
+        near(x[2], -2.5841105148, 1e-8);
+    }
+}

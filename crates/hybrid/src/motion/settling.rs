@@ -9,6 +9,7 @@ use twofold_system::expression::{Function, General};
 
 use super::locate::TANGENT;
 use super::meeting::DRIFT;
+use super::sliding::By;
 use super::*;
 use crate::cells;
 use crate::equation::{Gate, same_sign};
@@ -487,7 +488,7 @@ impl Follower<'_> {
 
     /// The side to which a function of third order or more leaves zero in a configuration: it grows
     /// by more than a square. 0 if it stays.
-    fn side_ahead_in(&mut self, config: &Configuration, guard: usize) -> f64 {
+    fn side_ahead_in(&self, config: &Configuration, guard: usize) -> f64 {
         match self.values_ahead(config, &[], guard, [0.005, 0.01]) {
             Some([near, far]) if same_sign(near, far) && far.abs() > 5.0 * near.abs() => {
                 far.signum()
@@ -516,7 +517,7 @@ impl Follower<'_> {
     /// The values of a function after these parts of the time that a state takes to move by its
     /// size in this configuration, sliding on the functions that `flips` have on their other sides.
     fn values_ahead(
-        &mut self,
+        &self,
         config: &Configuration,
         flips: &[(usize, Configuration)],
         guard: usize,
@@ -1697,6 +1698,7 @@ impl Follower<'_> {
         let mut field = vec![Range::default(); self.n];
         compiled.field.evaluate(&near, &mut field);
         let gradients = compiled.gradients(&variables);
+        let mut bends = None;
         for guard in zero {
             let Some(place) = compiled.place(*guard) else { continue };
             let along = compiled.touches[place].iter().zip(&gradients[place]);
@@ -1714,6 +1716,20 @@ impl Follower<'_> {
             if rates.first[place] != 0.0 && rates.first[place].abs() <= noise {
                 rates.first[place] = 0.0;
                 some = true;
+                // So may be its change, as of a product whose factors are both zero. (A brief step
+                // says nothing beside a root of zero.)
+                if self.equation.has_domain_ends {
+                    continue;
+                }
+                let bend = bends.get_or_insert_with(|| {
+                    Self::second_along_in(compiled, &near, &field, By::Field)
+                })[place];
+                if rates.second[place].abs() <= bend.radius() {
+                    let ahead = self.side_ahead_in(config, *guard);
+                    if ahead != 0.0 {
+                        rates.second[place] = ahead * rates.second[place].abs();
+                    }
+                }
             }
         }
         some

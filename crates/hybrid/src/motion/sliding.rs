@@ -10,7 +10,7 @@ use crate::cells;
 use crate::range::Range;
 use crate::selection::shortest;
 use crate::step::SETTLED;
-use twofold_num::Arithmetic as _;
+use twofold_num::{Arithmetic, Elementary};
 
 /// A state this much smaller than it was has digits that rounding may take.
 const SMALL: f64 = 1e-3;
@@ -29,7 +29,7 @@ const BACK: f64 = 1e-5;
 
 /// By which numbers speeds are differentiated.
 #[derive(Clone, Copy)]
-enum By<'a> {
+pub(super) enum By<'a> {
     /// States and time along the field.
     Field,
     /// One variable.
@@ -1015,36 +1015,45 @@ impl Follower<'_> {
         Self::second_along_in(&self.compiled, &self.variables, field, by)
     }
 
-    fn second_along_in(compiled: &Compiled, variables: &[f64], field: &[f64], by: By) -> Vec<f64> {
+    /// The same of any numbers, as those that are known to rounding.
+    pub(super) fn second_along_in<S: Arithmetic + Elementary>(
+        compiled: &Compiled,
+        variables: &[S],
+        field: &[S],
+        by: By,
+    ) -> Vec<S> {
         let n = field.len();
-        let mut direction = vec![0.0; variables.len()];
+        let mut direction = vec![S::zero(); variables.len()];
         match by {
-            By::Variable(i) => direction[i] = 1.0,
-            By::Direction(states) => direction[..n].copy_from_slice(states),
+            By::Variable(i) => direction[i] = S::one(),
+            By::Direction(states) => {
+                let given = states.iter().map(|d| S::from_f64(*d));
+                direction.iter_mut().zip(given).for_each(|(direction, given)| *direction = given);
+            }
             By::Field => {
                 direction[..n].copy_from_slice(field);
-                direction[n] = 1.0;
+                direction[n] = S::one();
             }
         }
-        let duals: Vec<Dual<f64, 1>> = variables
+        let duals: Vec<Dual<S, 1>> = variables
             .iter()
             .zip(&direction)
             .map(|(v, d)| Dual { value: *v, partials: [*d] })
             .collect();
-        let mut slopes = vec![Dual::constant(0.0); n];
+        let mut slopes = vec![Dual::constant(S::zero()); n];
         compiled.field.evaluate(&duals, &mut slopes);
-        let nested: Vec<Nested> = (0..variables.len())
+        let nested: Vec<Dual<Dual<S, 1>, 1>> = (0..variables.len())
             .map(|i| {
                 let inner = Dual { value: variables[i], partials: [direction[i]] };
                 let outer = match i {
                     i if i < n => Dual { value: field[i], partials: slopes[i].partials },
-                    i if i == n => Dual::constant(1.0),
-                    _ => Dual::constant(0.0),
+                    i if i == n => Dual::constant(S::one()),
+                    _ => Dual::constant(S::zero()),
                 };
                 Dual { value: inner, partials: [outer] }
             })
             .collect();
-        let mut out = vec![Nested::constant(Dual::constant(0.0)); compiled.outputs];
+        let mut out = vec![Dual::constant(Dual::constant(S::zero())); compiled.outputs];
         compiled.watched.evaluate(&nested, &mut out);
         out.iter().map(|d| d.partials[0].partials[0]).collect()
     }
