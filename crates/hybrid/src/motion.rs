@@ -577,6 +577,8 @@ struct Follower<'a> {
     tables_step: bool,
     /// The largest size of each state so far.
     size: Vec<f64>,
+    /// By no less the errors of states are measured that come from zero.
+    least: f64,
     /// Guards that are, or were, slid upon in higher order, and for each the states that their
     /// sides move.
     turned: Vec<(usize, Vec<bool>)>,
@@ -831,6 +833,18 @@ const AT_THE_END: f64 = 1e-12;
 /// There a state's way in a part of the run counts for its size up to so many times the one before.
 const MOST_OF_SIZE: f64 = 1e6;
 
+/// By no less the errors of states are measured that come from zero, in a run from `start`: by a
+/// part of its largest state, if that is as small.
+fn least_beside(start: &[f64]) -> f64 {
+    const OF_LARGEST: f64 = 1e-50;
+    let largest = start.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+    if largest > 0.0 {
+        LEAST_STATE.min(OF_LARGEST * largest).max(LEAST_FALLING)
+    } else {
+        LEAST_STATE
+    }
+}
+
 /// Scale of each state's error in a step.
 fn scale_now(follower: &Follower, step: &Step, out: &mut Vec<f64>) {
     let options = follower.options;
@@ -1060,6 +1074,7 @@ impl<'a> Follower<'a> {
             watched_before: Vec::new(),
             tables_step: false,
             size: x.iter().map(|v| v.abs()).collect(),
+            least: least_beside(&x),
             turned: Vec::new(),
             lately: x.iter().map(|v| v.abs()).collect(),
             before: x.iter().map(|v| v.abs()).collect(),
@@ -1536,7 +1551,7 @@ impl<'a> Follower<'a> {
 
     /// By no less the errors of a state are measured.
     fn least_of(&self, i: usize) -> f64 {
-        if self.size[i] > LEAST_STATE { LEAST_FALLING } else { LEAST_STATE }
+        if self.size[i] > LEAST_STATE { LEAST_FALLING } else { self.least }
     }
 
     /// Makes the states zero that fall below [`UNDERFLOW`] together.

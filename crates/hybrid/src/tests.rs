@@ -6557,3 +6557,18 @@ fn a_condition_that_is_a_product_is_met_once() {
         near(x[2], -2.5841105148, 1e-8);
     }
 }
+
+/// An oscillator however small it begins, as far as rounding has digits.
+#[test]
+fn states_that_begin_small_have_their_digits() {
+    let model = model("states = ['x', 'v']\nf = ['v', '-x']");
+    for size in [1e-145, 1e-150, 1e-151, 1e-200, 1e-230] {
+        for method in Method::ALL {
+            let start = Some(vec![size, 0.0]);
+            let options = Options { start, t_end: 6.0, method, ..Options::default() };
+            let x = follow(&model, &options, &mut |_| true).unwrap().x;
+            near(x[0] / size, 6.0_f64.cos(), 1e-8);
+            near(x[1] / size, -(6.0_f64.sin()), 1e-8);
+        }
+    }
+}

@@ -264,7 +264,7 @@ impl Follower<'_> {
                 }
                 // States below the least one count for nothing, as in the scale of a step.
                 let by = |size: f64, power: usize| {
-                    let least = if is_state { self.least_of(i) } else { LEAST_STATE };
+                    let least = if is_state { self.least_of(i) } else { self.least };
                     rough_pow((size + least) / c[k].abs(), 1.0 / power as f64)
                 };
                 let mut h = if is_state {
@@ -327,7 +327,7 @@ impl Follower<'_> {
             for k in 6..c.len() {
                 // Of k = 6 alone little is seen where it vanishes.
                 most = most
-                    .max(rough_pow(c[k].abs() / (tolerance * size + LEAST_STATE), 1.0 / k as f64));
+                    .max(rough_pow(c[k].abs() / (tolerance * size + self.least), 1.0 / k as f64));
             }
         }
         most.min(MOST_SEARCHED).ceil() as usize
