@@ -216,6 +216,8 @@ pub struct Outcome {
     pub switches: u64,
     /// Events that happened.
     pub events: u64,
+    /// The largest size of each state.
+    pub sizes: Vec<f64>,
 }
 
 /// Why a system cannot be followed further.
@@ -1102,6 +1104,7 @@ impl<'a> Follower<'a> {
                 steps: 0,
                 switches: 0,
                 events: 0,
+                sizes: Vec::new(),
             },
             config,
             x,
@@ -1140,6 +1143,7 @@ impl<'a> Follower<'a> {
         self.outcome.t = self.t;
         self.outcome.x = self.x.clone();
         self.outcome.mode = self.config.mode;
+        self.outcome.sizes = self.size.clone();
         Ok((self.outcome.clone(), self))
     }
 

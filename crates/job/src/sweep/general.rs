@@ -179,13 +179,19 @@ impl GeneralOutcome {
                     ..attractor::Question::default()
                 };
                 let driven = model.is_driven();
-                let (mut evidence, mut middle) = judged(&section, &question, least);
+                let of_states = |seen: [usize; 2]| {
+                    let sizes = seen.iter().filter_map(|i| found.sizes.get(*free.get(*i)?));
+                    sizes.fold(0.0_f64, |most, size| most.max(*size))
+                };
+                let mut former = of_states([0, 1]);
+                let (mut evidence, mut middle) = judged(&section, &question, least, former);
                 if !matches!(evidence.verdict, Verdict::Periodic(_))
                     && let Some(other) =
-                        told_apart(&section, &states.into_inner(), &question, least)
+                        told_apart(&section, &states.into_inner(), &question, least, &of_states)
                 {
-                    (section, (evidence, middle)) = other;
+                    (section, former, (evidence, middle)) = other;
                 }
+                let thin = is_thin(&evidence, &section, shown_from, least * former);
                 let asks = match evidence.verdict {
                     Verdict::Chaotic { .. }
                     | Verdict::QuasiPeriodic(_)
@@ -197,7 +203,7 @@ impl GeneralOutcome {
                     Verdict::Escaped { .. } | Verdict::TooFew { .. } => !driven,
                     _ => false,
                 };
-                let growth = if asks { self.growth(monitor)? } else { Vec::new() };
+                let growth = if asks || thin { self.growth(monitor)? } else { Vec::new() };
                 let has_sign = |of: usize| growth.get(of).is_some_and(Growth::is_clear);
                 let left =
                     matches!(evidence.verdict, Verdict::Escaped { .. } | Verdict::TooFew { .. });
@@ -209,7 +215,7 @@ impl GeneralOutcome {
                     if asks && !left {
                         let lyapunov = growth.first().and_then(Growth::exponent);
                         let question = attractor::Question { lyapunov, ..question };
-                        (evidence, middle) = judged(&section, &question, least);
+                        (evidence, middle) = judged(&section, &question, least, former);
                         let regular = !has_sign(0) && (driven || !has_sign(1));
                         let open = matches!(evidence.verdict, Verdict::Undecided { .. });
                         let by = growth.first().map_or(f64::INFINITY, |g| g.value);
@@ -223,6 +229,15 @@ impl GeneralOutcome {
                                 Verdict::Undecided { lyapunov }
                             };
                         }
+                    } else if thin && growth.first().is_some_and(|g| g.is_clear() && g.value > 0.0)
+                    {
+                        let lyapunov = growth[0].exponent();
+                        evidence.lyapunov = lyapunov;
+                        evidence.verdict = if growth[0].parts() {
+                            Verdict::Chaotic { lyapunov, bands: 1 }
+                        } else {
+                            Verdict::Undecided { lyapunov }
+                        };
                     }
                     place = place_of(&evidence);
                     place.iter_mut().flatten().enumerate().for_each(|(i, u)| *u += middle[i % 2]);
@@ -321,6 +336,17 @@ fn is_borne_out(evidence: &Evidence, regular: bool) -> bool {
     }
 }
 
+/// Whether the dots of a closed orbit have widths from `from` on that are no rounding and do not
+/// shrink: they may be bands of weak chaos. Below `least` widths are rounding.
+fn is_thin(evidence: &Evidence, section: &[SectionPoint], from: f64, least: f64) -> bool {
+    let Verdict::Periodic(cycle) = &evidence.verdict else { return false };
+    let late = section.iter().filter(|p| p.t >= from && p.upward);
+    let late: Vec<[f64; 2]> = late.map(|p| p.u).collect();
+    let apart =
+        |(a, b): (&[f64; 2], &[f64; 2])| [0, 1].iter().any(|k| (a[*k] - b[*k]).abs() > least);
+    late.iter().zip(late.iter().skip(cycle.period)).any(apart) && !shrinks(section, cycle.period)
+}
+
 /// Whether the later half of a run's points from `from` on reaches not twice as far as the earlier
 /// one: what grows without end by such an exponent reaches far more.
 fn keeps_its_size(section: &[SectionPoint], from: f64) -> bool {
@@ -385,12 +411,13 @@ impl Late {
 }
 
 /// The verdict on a section wherever the origin of its states lies: seen from the middle of its
-/// later half, where points are the same that the run does not tell apart. Points on a line are no
-/// closed curve. Also that middle.
+/// later half, where points are the same that the run does not tell apart; `former` is the largest
+/// size of their states. Points on a line are no closed curve. Also that middle.
 fn judged(
     section: &[SectionPoint],
     question: &attractor::Question<'_>,
     least: f64,
+    former: f64,
 ) -> (Evidence, [f64; 2]) {
     let Late { mut middle, swing, size } = Late::of(section, question.shown_from);
     let from = |middle: [f64; 2]| -> (Vec<SectionPoint>, f64) {
@@ -400,12 +427,11 @@ fn judged(
         let extent = seen.iter().flat_map(|p| p.u).fold(0.0_f64, |most, u| most.max(u.abs()));
         (seen, extent)
     };
-    let former = section.iter().flat_map(|p| p.u).fold(0.0_f64, |most, u| most.max(u.abs()));
     let same = (SAME_OF_SWING * swing).max(least * size).max(OF_FORMER * least * former);
     let (mut seen, mut extent) = from(middle);
     if extent <= same {
-        // One point from the first on: it has the size of its states for an extent.
-        middle = [0.0; 2];
+        // One point from the first on: it has the size of its states for an extent, also at zero.
+        middle = if size > same { [0.0; 2] } else { [-former; 2] };
         (seen, extent) = from(middle);
     }
     let by = |same: f64| {
@@ -442,8 +468,8 @@ fn judged(
     (evidence, middle)
 }
 
-/// A section as seen in two of its states, and the verdict.
-type Seen = (Vec<SectionPoint>, (Evidence, [f64; 2]));
+/// A section as seen in two of its states, their largest size, and the verdict.
+type Seen = (Vec<SectionPoint>, f64, (Evidence, [f64; 2]));
 
 /// The section in the first two states in which an orbit's points lie apart, if they return in all
 /// states: in the first two of all they may fall together.
@@ -452,6 +478,7 @@ fn told_apart(
     states: &[Vec<f64>],
     question: &attractor::Question<'_>,
     least: f64,
+    sizes: &dyn Fn([usize; 2]) -> f64,
 ) -> Option<Seen> {
     let up: Vec<&Vec<f64>> =
         section.iter().zip(states).filter(|(p, _)| p.upward).map(|(_, x)| x).collect();
@@ -477,10 +504,10 @@ fn told_apart(
             let points = section.iter().zip(states);
             let seen: Vec<SectionPoint> =
                 points.map(|(p, x)| SectionPoint { u: pair.map(|i| x[i]), ..*p }).collect();
-            let found = judged(&seen, question, least);
-            (seen, found)
+            let found = judged(&seen, question, least, sizes(pair));
+            (seen, sizes(pair), found)
         })
-        .find(|(_, (evidence, _))| {
+        .find(|(_, _, (evidence, _))| {
             matches!(&evidence.verdict, Verdict::Periodic(cycle) if cycle.period == period)
         })
 }
@@ -629,6 +656,10 @@ mod tests {
 
     /// The outcome of a run by a section `NAME = 0`, or every unit of time.
     fn word(text: &str, section: Option<&str>, t_end: f64) -> String {
+        outcome(text, section, t_end).word
+    }
+
+    fn outcome(text: &str, section: Option<&str>, t_end: f64) -> Outcome {
         let model = Model::new(Definition::from_toml(text, "f").unwrap());
         let record = match section {
             Some(name) => {
@@ -637,7 +668,7 @@ mod tests {
             None => Record::Times { every: 1.0 },
         };
         let options = Options { record, t_end, ..Options::default() };
-        GeneralOutcome(GeneralRun { model, options }).ending(&()).unwrap().outcome.word
+        GeneralOutcome(GeneralRun { model, options }).ending(&()).unwrap().outcome
     }
 
     /// A decay to a driven cycle, from a start between two multiples of the period to an end there:
@@ -773,6 +804,36 @@ mod tests {
                     f = ['{a}*x + y + 0.013', '-x + {a}*y + {a}*0.013']"
             );
             assert_eq!(word(&text, Some("y"), 400.0), "undecided", "{a}");
+        }
+    }
+
+    /// A relay with hysteresis, of period 2 ln((1 + w)/(1 - w)) from the first turn on, seen where
+    /// its one state is zero but for rounding.
+    #[test]
+    fn a_point_at_zero_has_the_size_of_its_states() {
+        for w in [0.1_f64, 0.3, 0.5, 0.7, 0.9] {
+            let text = format!(
+                "states = ['x']\nstart = [0]\n[modes.up]\nf = ['1 - x']\n[modes.down]\n\
+                 f = ['-x - 1']\n[[event]]\nfrom = 'up'\nwhen = 'x > {w}'\nmode = 'down'\n\
+                 [[event]]\nfrom = 'down'\nwhen = 'x < -{w}'\nmode = 'up'"
+            );
+            let found = outcome(&text, Some("x"), 200.0);
+            assert_eq!(found.word, "period-1", "{w}");
+            let period = 2.0 * ((1.0 + w) / (1.0 - w)).ln();
+            assert!((found.turn.unwrap() - period).abs() < 1e-9, "{w}");
+            assert!(found.captured_at.unwrap() < 1.01 * period, "{w}");
+        }
+    }
+
+    /// A tent map with a slope above one has no attracting orbit, however thin its bands are.
+    #[test]
+    fn thin_bands_of_weak_chaos_are_no_orbit() {
+        for r in [1.0114489739419963_f64, 1.016477449795421] {
+            let tent = map("x", "[0.3]", &[&format!("if(x < 0.5, {r}*x, {r}*(1 - x))")]);
+            let found = outcome(&tent, None, 2000.0);
+            assert_eq!(found.word, "undecided", "{r}");
+            let off = (found.exponent.unwrap() - r.ln()).abs();
+            assert!(off <= 3.0 * found.exponent_error.unwrap(), "{r}");
         }
     }
 
