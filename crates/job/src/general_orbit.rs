@@ -90,6 +90,9 @@ impl Question for GeneralOrbit {
             None => self.run.model.clone(),
         };
         let mut options = self.run.options.clone();
+        let began = start_of(&model, &options)?;
+        // The largest size that each state has had.
+        let mut sizes: Vec<f64> = began.iter().map(|x| x.abs()).collect();
         // The phase of a drive is kept: whole periods.
         let settle = match self.after {
             Return::Period(period) => (self.settle / period).ceil() * period,
@@ -135,7 +138,7 @@ impl Question for GeneralOrbit {
                 if end.ending == Ending::Interrupted {
                     return Err(JobError::Interrupted);
                 }
-                (options.start, options.mode) = (Some(end.x), end.mode);
+                (options.start, options.mode, sizes) = (Some(end.x), end.mode, end.sizes);
                 // An event that would come at the very end would be lost.
                 let whole = matches!(self.after, Return::Period(_));
                 if whole || !starts_on_an_event(&model, &options)? {
@@ -147,7 +150,6 @@ impl Question for GeneralOrbit {
             Return::Period(period) => Strobe::new(&model, &mut options, period)?,
             Return::Crossings(_) => None,
         };
-        let began = start_of(&model, &self.run.options)?;
         let former = began.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
         let mut found = match closed_orbit(&model, &options, &self.after, former) {
             Err(HybridError::NoOrbit(why)) => {
@@ -198,7 +200,7 @@ impl Question for GeneralOrbit {
         // Newton's method may come to states from which there is no return, or one of days.
         let usual = once_around(&model, &options, &self.after, &found_here)?;
         options.max_steps = options.max_steps.min(LONGEST * usual.steps.max(LEAST_STEPS));
-        let units = self.units(&usual.bounds);
+        let units = units(&usual.bounds, &sizes);
         let map = Map { model: &model, options, after: &self.after, along, units };
         let rtol = self.run.options.rtol;
         let least = map.units.iter().copied().fold(f64::INFINITY, f64::min);
@@ -320,34 +322,28 @@ impl GeneralOrbit {
             unknown,
         ))
     }
+}
 
-    /// The unit of each state, a power of two: its size on a way with these bounds, or at the start
-    /// if it has come to zero since, to rounding. Of a state that is zero it is the largest one.
-    fn units(&self, bounds: &[[f64; 2]]) -> Vec<f64> {
-        let suggested = || self.run.model.start().ok().flatten().unwrap_or_default();
-        let start = self.run.options.start.clone().unwrap_or_else(suggested);
-        let sizes: Vec<f64> = bounds
-            .iter()
-            .enumerate()
-            .map(|(i, [low, high])| {
-                let (now, began) =
-                    (low.abs().max(high.abs()), start.get(i).map_or(0.0, |x| x.abs()));
-                if now > ROUNDED * began { now } else { began }
-            })
-            .collect();
-        let largest = sizes.iter().copied().fold(0.0, f64::max);
-        let unit = |size: &f64| {
-            let (mut unit, size) = (1.0, if *size > 0.0 { *size } else { largest });
-            while size >= 2.0 * unit {
-                unit *= 2.0;
-            }
-            while size < unit && size > 0.0 {
-                unit *= 0.5;
-            }
-            unit
-        };
-        sizes.iter().map(unit).collect()
-    }
+/// The unit of each state, a power of two: its size on a way with these bounds, or its largest one
+/// before if it has come to zero since, to rounding. Of a state that is zero it is the largest one.
+fn units(bounds: &[[f64; 2]], before: &[f64]) -> Vec<f64> {
+    let size = |([low, high], before): (&[f64; 2], &f64)| {
+        let now = low.abs().max(high.abs());
+        if now > ROUNDED * before { now } else { *before }
+    };
+    let sizes: Vec<f64> = bounds.iter().zip(before).map(size).collect();
+    let largest = sizes.iter().copied().fold(0.0, f64::max);
+    let unit = |size: &f64| {
+        let (mut unit, size) = (1.0, if *size > 0.0 { *size } else { largest });
+        while size >= 2.0 * unit {
+            unit *= 2.0;
+        }
+        while size < unit && size > 0.0 {
+            unit *= 0.5;
+        }
+        unit
+    };
+    sizes.iter().map(unit).collect()
 }
 
 /// The state at which a run begins.
@@ -607,6 +603,27 @@ mod tests {
             run.options.record = Record::Section(expression("x", &run.model).unwrap());
         }
         Executor::quiet().ask(&GeneralOrbit { run, settle, after, along: None })
+    }
+
+    /// The normal form of a torus bifurcation as a map, with eigenvalues (1 + m) exp(+-1.3 i), from
+    /// where it has settled on zero, one state from zero.
+    #[test]
+    fn a_branch_begins_where_the_motion_settles_on_zero() {
+        let text = "states = ['x', 'y']\nstart = [0.3, 0]\nf = ['0', '0']\n[parameters]\n\
+            m = -0.2\na = 1.3\n[let]\nq = '1 + m - x^2 - y^2'\n[[event]]\nevery = 1\n\
+            set = { x = 'q*(cos(a)*x - sin(a)*y)', y = 'q*(sin(a)*x + cos(a)*y)' }";
+        let along = Along { parameter: "m".into(), from: -0.2, to: 0.5, steps: 20, most: 1000 };
+        let question = GeneralOrbit {
+            run: run(text, 1e3),
+            settle: 200.0,
+            after: Return::Period(1.0),
+            along: Some(along),
+        };
+        let answer = Executor::quiet().ask(&question).unwrap();
+        assert_eq!(answer.fact::<End>("end").unwrap(), End::Reached);
+        let changes = answer.table("bifurcations").unwrap();
+        assert_eq!(changes.words("change").collect::<Vec<_>>(), ["torus"]);
+        assert!(changes.numbers("m")[0].abs() < 1e-9);
     }
 
     /// Where the motion settles on a rest, or is on its way to one, it is said, whether it lies on
