@@ -179,7 +179,7 @@ impl Question for ClosedOrbit {
         let first = match branch::closed_orbit(&map, &guess, value, newton) {
             Ok(first) => first,
             Err(trouble) => {
-                return match self.rest_instead(&trouble, &guess, value)? {
+                return match self.rest_instead(executor, &trouble, &guess, value)? {
                     Some(rest) => Ok(at_rest(&self.names(), &rest)),
                     None => Err(map.error(trouble.said)),
                 };
@@ -242,9 +242,30 @@ enum Guess {
 }
 
 impl ClosedOrbit {
-    /// The rest that the search came to, if it came to one.
+    /// The motion from a start, which is looked at on the plane.
+    fn motion(&self, system: &System, switch: SwitchSpec, start: &[f64], t_end: f64) -> RunSpec {
+        RunSpec {
+            system: system.clone(),
+            switch,
+            start: start[..system.dimension()].to_vec(),
+            t_end,
+            method: super::spec::MethodSpec {
+                name: super::spec::Method::Dopri5,
+                tolerance: Tolerance { rtol: 1e-9, atol: (100.0 * self.tolerance.atol).min(1e-9) },
+                step_cap: twofold_integrate::StepCap::None,
+                max_steps: super::spec::DEFAULT_MAX_STEPS,
+                precision: None,
+                order: None,
+            },
+            schedule: Schedule::default(),
+            observe: Observation::Section { coordinate: self.plane.axis, value: self.plane.value },
+        }
+    }
+
+    /// The rest that the search came to, or the motion from a point that it does not return to.
     fn rest_instead(
         &self,
+        executor: &dyn Ask,
         trouble: &Trouble,
         guess: &[f64],
         value: f64,
@@ -254,7 +275,15 @@ impl ClosedOrbit {
         let there = |r: &Rest| {
             apart(&r.state, point) <= AT_REST * apart(&r.state, guess).max(apart(point, guess))
         };
-        Ok(rest::near(&system, switch, point).filter(there))
+        if let Some(rest) = rest::near(&system, switch, point).filter(there) {
+            return Ok(Some(rest));
+        }
+        let motion = self.motion(&system, switch, point, self.longest_return);
+        match executor.ask(&Run(motion.clone())) {
+            Ok(answer) => rest::at_end(executor, &motion, &answer),
+            Err(JobError::Interrupted) => Err(JobError::Interrupted),
+            Err(_) => Ok(None),
+        }
     }
 
     fn validate(&self) -> Result<(), JobError> {
@@ -342,28 +371,7 @@ impl ClosedOrbit {
         let mut point = self.start.clone();
         let mut returns = self.returns;
         if self.settle > 0.0 {
-            let spec = RunSpec {
-                system: system.clone(),
-                switch,
-                start: self.start.clone(),
-                t_end: self.settle,
-                method: super::spec::MethodSpec {
-                    name: super::spec::Method::Dopri5,
-                    tolerance: Tolerance {
-                        rtol: 1e-9,
-                        atol: (100.0 * self.tolerance.atol).min(1e-9),
-                    },
-                    step_cap: twofold_integrate::StepCap::None,
-                    max_steps: super::spec::DEFAULT_MAX_STEPS,
-                    precision: None,
-                    order: None,
-                },
-                schedule: Schedule::default(),
-                observe: Observation::Section {
-                    coordinate: self.plane.axis,
-                    value: self.plane.value,
-                },
-            };
+            let spec = self.motion(&system, switch, &self.start, self.settle);
             let settled = executor.ask(&Run(spec.clone()))?;
             if settled.stop == Stop::Interrupted {
                 return Err(JobError::Interrupted);
@@ -867,6 +875,25 @@ mod tests {
         for (x, time) in [(1e-9, 1e-9), (1.0, 1e-9), (1e-6, 1e-9), (1.0, 1e9), (1e-9, 1e-6)] {
             of((x, time, 1.0, 1.0));
         }
+    }
+
+    /// Slides along y = 0 to a pseudo-node at x = 1, past the plane x = 2 while it settles, and
+    /// does not return: x - 1 = 2 exp(-t/20).
+    #[test]
+    fn a_motion_that_slides_to_a_rest_beyond_the_plane_comes_to_it() {
+        let text = "states = ['x', 'y']\nh = 'y'\nplus = ['0.05*(1 - x)', '-1']\n\
+            minus = ['0.05*(1 - x)', '1']";
+        let exit = ExitRule::Undecided;
+        let question = ClosedOrbit {
+            start: vec![3.0, 0.5],
+            settle: 20.0,
+            plane: ReturnPlane { axis: 0, value: 2.0, upward: false },
+            longest_return: 1000.0,
+            ..question(cases::of(text), SwitchSpec::Filippov { exit, funnel: None }, 0)
+        };
+        let answer = question.compute(&Executor::quiet(), &()).unwrap();
+        let rest = answer.table("rest").expect("a rest");
+        assert!((rest.numbers("x")[0] - 1.0).abs() < 1e-9 && rest.numbers("y")[0].abs() < 1e-9);
     }
 
     /// The Brusselator's orbits end at its Hopf point, B = 1 + A^2, on a plane on which the rest
