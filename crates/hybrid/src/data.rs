@@ -119,7 +119,8 @@ impl Table {
             (0..h.len()).map(piece).collect()
         };
         let pieces = match interpolation {
-            Interpolation::Previous => (0..h.len()).map(|i| [values[i], 0.0, 0.0, 0.0]).collect(),
+            // The last row's value holds at its time alone.
+            Interpolation::Previous => values.iter().map(|value| [*value, 0.0, 0.0, 0.0]).collect(),
             Interpolation::Linear => {
                 (0..h.len()).map(|i| [values[i], slope[i], 0.0, 0.0]).collect()
             }

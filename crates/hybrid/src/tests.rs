@@ -6572,3 +6572,23 @@ fn states_that_begin_small_have_their_digits() {
         }
     }
 }
+
+/// A table of previous values has its last one at its last time: events of that moment see it,
+/// and it may jump onto or over the zero of others.
+#[test]
+fn a_table_of_previous_values_ends_with_its_last_row() {
+    let table = "\n[tables.u]\nfile = 'u.csv'\ntime = 't'\ncolumn = 'u'\n\
+        interpolation = 'previous'";
+    for method in Method::ALL {
+        for event in ["at = 2", "when = 'u >= 2'", "when = 'u > 1'", "when = 'u - 2'"] {
+            let text = format!(
+                "states = ['n', 'm']\nstart = [0, 0]\nf = ['0', '1']\n[[event]]\n{event}\n\
+                    set = {{ n = 'n + u' }}{table}"
+            );
+            let model = model(&text).with_table("u", "t,u\n0,0\n1,1\n2,2\n").unwrap();
+            let options = Options { t_end: 2.0, method, ..Options::default() };
+            let x = follow(&model, &options, &mut |_| true).unwrap().x;
+            assert_eq!(x[0], 2.0, "{event}: {method:?}");
+        }
+    }
+}
