@@ -291,6 +291,8 @@ fn a_claim_that_does_not_hold_differs() {
     assert!(code == 3 && out.contains("\"point/7\": there is no \"7\""), "{out}");
     let (code, _, said) = paper(&["bless", "--reason", "x", "--quiet"], &root);
     assert!(code == 3 && said.contains("what fails is not blessed"), "{said}");
+    let (_, out, _) = paper(&["check", "--quiet"], &root);
+    assert!(out.contains("; once nothing fails keep them: twofold paper bless"), "{out}");
 }
 
 /// The ends of all paths in a JSON value, which are no lists or tables.

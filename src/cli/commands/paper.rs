@@ -171,8 +171,11 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
                 print(&if same { format!("{score}; all the same as expected") } else { score })?;
                 let new = findings.iter().filter(|f| f.state == State::New).count();
                 if new > 0 {
+                    // What fails is not blessed, nor anything beside it.
+                    let fails = findings.iter().any(|f| matches!(f.state, State::Failed { .. }));
+                    let keep = if fails { "once nothing fails keep them" } else { "keep them" };
                     print(&format!(
-                        "{new} new, with nothing to compare; keep them: twofold paper bless {} \
+                        "{new} new, with nothing to compare; {keep}: twofold paper bless {} \
                             --reason \"...\"",
                         flags.folder.display()
                     ))?;
