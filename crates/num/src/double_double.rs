@@ -12,8 +12,8 @@
 mod products;
 
 use std::cmp::Ordering;
-use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
+use super::scalar::operators;
 use super::{Arithmetic, Elementary, Scalar};
 
 /// A number of about 106 bits (32 decimal digits).
@@ -270,59 +270,16 @@ impl PartialOrd for DoubleDouble {
     }
 }
 
-impl Add for DoubleDouble {
-    type Output = Self;
-    #[inline]
-    fn add(self, other: Self) -> Self {
-        self.plus(other)
-    }
-}
-
-impl Sub for DoubleDouble {
-    type Output = Self;
-    #[inline]
-    fn sub(self, other: Self) -> Self {
-        self + -other
-    }
-}
-
-impl Neg for DoubleDouble {
-    type Output = Self;
-    #[inline]
-    fn neg(self) -> Self {
-        self.negative()
-    }
-}
-
-impl Mul for DoubleDouble {
-    type Output = Self;
-    #[inline]
-    fn mul(self, other: Self) -> Self {
-        self.times(other)
-    }
-}
-
-impl Div for DoubleDouble {
-    type Output = Self;
-    /// Three quotients; two by an `f64`.
-    #[inline]
-    fn div(self, other: Self) -> Self {
+operators! {
+    impl [] DoubleDouble, inline:
+    Add add(self, other) { self.plus(other) }
+    Sub sub(self, other) { self + -other }
+    Mul mul(self, other) { self.times(other) }
+    // Three quotients; two by an `f64`.
+    Div div(self, other) {
         if other.low == 0.0 { self.over(other.high) } else { self.divided_by(other) }
     }
-}
-
-impl AddAssign for DoubleDouble {
-    #[inline]
-    fn add_assign(&mut self, other: Self) {
-        *self = *self + other;
-    }
-}
-
-impl SubAssign for DoubleDouble {
-    #[inline]
-    fn sub_assign(&mut self, other: Self) {
-        *self = *self - other;
-    }
+    -(self) { self.negative() }
 }
 
 impl Arithmetic for DoubleDouble {

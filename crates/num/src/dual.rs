@@ -5,8 +5,8 @@
 //! derivatives at a fold come from the equations themselves.
 
 use std::cmp::Ordering;
-use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
+use super::scalar::operators;
 use super::{Arithmetic, Elementary, Scalar};
 
 /// A value and its partial derivatives with respect to `N` variables.
@@ -39,6 +39,16 @@ impl<S: Arithmetic, const N: usize> Dual<S, N> {
         Self { value, partials }
     }
 
+    /// `f` of the values and of each pair of derivatives.
+    #[inline]
+    fn pairwise(mut self, other: Self, f: impl Fn(S, S) -> S) -> Self {
+        self.value = f(self.value, other.value);
+        for (a, b) in self.partials.iter_mut().zip(other.partials) {
+            *a = f(*a, b);
+        }
+        self
+    }
+
     /// f(self), given the value and the derivative of f at `self.value`.
     #[inline]
     fn chain(self, value: S, slope: S) -> Self {
@@ -58,60 +68,18 @@ impl<S: PartialOrd, const N: usize> PartialOrd for Dual<S, N> {
     }
 }
 
-impl<S: Arithmetic, const N: usize> Add for Dual<S, N> {
-    type Output = Self;
-    #[inline]
-    fn add(mut self, other: Self) -> Self {
-        self += other;
-        self
-    }
-}
-
-impl<S: Arithmetic, const N: usize> AddAssign for Dual<S, N> {
-    #[inline]
-    fn add_assign(&mut self, other: Self) {
-        self.value += other.value;
-        for (a, b) in self.partials.iter_mut().zip(other.partials) {
-            *a += b;
-        }
-    }
-}
-
-impl<S: Arithmetic, const N: usize> Sub for Dual<S, N> {
-    type Output = Self;
-    #[inline]
-    fn sub(mut self, other: Self) -> Self {
-        self -= other;
-        self
-    }
-}
-
-impl<S: Arithmetic, const N: usize> SubAssign for Dual<S, N> {
-    #[inline]
-    fn sub_assign(&mut self, other: Self) {
-        self.value -= other.value;
-        for (a, b) in self.partials.iter_mut().zip(other.partials) {
-            *a -= b;
-        }
-    }
-}
-
-impl<S: Arithmetic, const N: usize> Mul for Dual<S, N> {
-    type Output = Self;
-    #[inline]
-    fn mul(self, other: Self) -> Self {
+operators! {
+    impl [S: Arithmetic, const N: usize] Dual<S, N>, inline:
+    Add add(self, other) { self.pairwise(other, |a, b| a + b) }
+    Sub sub(self, other) { self.pairwise(other, |a, b| a - b) }
+    Mul mul(self, other) {
         let mut partials = [S::zero(); N];
         for (i, p) in partials.iter_mut().enumerate() {
             *p = self.partials[i] * other.value + self.value * other.partials[i];
         }
         Self { value: self.value * other.value, partials }
     }
-}
-
-impl<S: Arithmetic, const N: usize> Div for Dual<S, N> {
-    type Output = Self;
-    #[inline]
-    fn div(self, other: Self) -> Self {
+    Div div(self, other) {
         let value = self.value / other.value;
         let mut partials = [S::zero(); N];
         for (i, p) in partials.iter_mut().enumerate() {
@@ -119,14 +87,7 @@ impl<S: Arithmetic, const N: usize> Div for Dual<S, N> {
         }
         Self { value, partials }
     }
-}
-
-impl<S: Arithmetic, const N: usize> Neg for Dual<S, N> {
-    type Output = Self;
-    #[inline]
-    fn neg(self) -> Self {
-        Self { value: -self.value, partials: self.partials.map(|p| -p) }
-    }
+    -(self) { Self { value: -self.value, partials: self.partials.map(|p| -p) } }
 }
 
 impl<S: Arithmetic, const N: usize> Arithmetic for Dual<S, N> {

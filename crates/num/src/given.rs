@@ -1,8 +1,6 @@
 //! A number whose tanh has a prescribed value.
 
-use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
-
-use super::scalar::{Arithmetic, Elementary};
+use super::scalar::{Arithmetic, Elementary, by_parts, operators};
 
 /// A number for which every tanh returns one prescribed value, whatever its argument: evaluates an
 /// equation at a given place in its layer.
@@ -33,6 +31,13 @@ impl<T: Elementary> Given<T> {
     fn map(self, f: impl Fn(T) -> T) -> Self {
         Self { value: f(self.value), ..self }
     }
+
+    /// `value`, which comes of this number and another one.
+    #[inline(always)]
+    fn with(self, other: Self, value: T) -> Self {
+        let tanh = if self.told { self.tanh } else { other.tanh };
+        Self { value, tanh, told: self.told || other.told }
+    }
 }
 
 impl<T: PartialEq> PartialEq for Given<T> {
@@ -41,41 +46,13 @@ impl<T: PartialEq> PartialEq for Given<T> {
     }
 }
 
-macro_rules! as_number {
-    ($($trait:ident, $function:ident, $operator:tt);*) => {$(
-        impl<T: Elementary> $trait for Given<T> {
-            type Output = Self;
-            #[inline(always)]
-            fn $function(self, other: Self) -> Self {
-                let tanh = if self.told { self.tanh } else { other.tanh };
-                Self { value: self.value $operator other.value, tanh,
-                    told: self.told || other.told }
-            }
-        }
-    )*};
-}
-as_number!(Add, add, +; Sub, sub, -; Mul, mul, *; Div, div, /);
-
-impl<T: Elementary> Neg for Given<T> {
-    type Output = Self;
-    #[inline(always)]
-    fn neg(self) -> Self {
-        self.map(|v| -v)
-    }
-}
-
-impl<T: Elementary> AddAssign for Given<T> {
-    #[inline(always)]
-    fn add_assign(&mut self, other: Self) {
-        *self = *self + other;
-    }
-}
-
-impl<T: Elementary> SubAssign for Given<T> {
-    #[inline(always)]
-    fn sub_assign(&mut self, other: Self) {
-        *self = *self - other;
-    }
+operators! {
+    impl [T: Elementary] Given<T>, inline(always):
+    Add add(self, other) { self.with(other, self.value + other.value) }
+    Sub sub(self, other) { self.with(other, self.value - other.value) }
+    Mul mul(self, other) { self.with(other, self.value * other.value) }
+    Div div(self, other) { self.with(other, self.value / other.value) }
+    -(self) { self.map(|v| -v) }
 }
 
 impl<T: Elementary> Arithmetic for Given<T> {
@@ -91,42 +68,11 @@ impl<T: Elementary> Elementary for Given<T> {
     fn tanh(self) -> Self {
         Self { value: if self.told { self.tanh } else { self.value.tanh() }, ..self }
     }
-    #[inline]
-    fn exp(self) -> Self {
-        self.map(Elementary::exp)
-    }
-    #[inline]
-    fn sin(self) -> Self {
-        self.map(Elementary::sin)
-    }
-    #[inline]
-    fn cos(self) -> Self {
-        self.map(Elementary::cos)
-    }
-    #[inline]
-    fn sqrt(self) -> Self {
-        self.map(Elementary::sqrt)
-    }
-    #[inline]
-    fn ln(self) -> Self {
-        self.map(Elementary::ln)
-    }
-    #[inline]
-    fn atan(self) -> Self {
-        self.map(Elementary::atan)
-    }
-    #[inline]
-    fn erf(self) -> Self {
-        self.map(Elementary::erf)
-    }
     #[inline(always)]
     fn pi() -> Self {
         Self { value: T::pi(), tanh: T::pi(), told: false }
     }
-    #[inline]
-    fn sign(self) -> Self {
-        self.map(Elementary::sign)
-    }
+    by_parts!(exp sin cos sqrt ln atan erf sign);
 }
 
 #[cfg(test)]

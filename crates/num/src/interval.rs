@@ -15,9 +15,8 @@
 //! "nothing is known". Everything computed from it is `ENTIRE` too, even a product with zero or a
 //! tanh, so that no inclusion can be verified by accident. Intersections say when they are empty.
 
-use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
-
 use super::double_double::{two_product, two_sum};
+use super::scalar::operators;
 use super::{Arithmetic, Decimal, Dual, Elementary, FromDecimal, elementary};
 
 /// All real numbers from `lower` to `upper`.
@@ -338,34 +337,13 @@ impl std::fmt::Debug for Interval {
     }
 }
 
-impl Add for Interval {
-    type Output = Self;
-    #[inline]
-    fn add(self, other: Self) -> Self {
+operators! {
+    impl [] Interval, inline:
+    Add add(self, other) {
         Self { lower: add_down(self.lower, other.lower), upper: add_up(self.upper, other.upper) }
     }
-}
-
-impl Sub for Interval {
-    type Output = Self;
-    #[inline]
-    fn sub(self, other: Self) -> Self {
-        self + -other
-    }
-}
-
-impl Neg for Interval {
-    type Output = Self;
-    #[inline]
-    fn neg(self) -> Self {
-        Self { lower: -self.upper, upper: -self.lower }
-    }
-}
-
-impl Mul for Interval {
-    type Output = Self;
-    #[inline]
-    fn mul(self, other: Self) -> Self {
+    Sub sub(self, other) { self + -other }
+    Mul mul(self, other) {
         let (a, b) = (self, other);
         if a.is_entire() || b.is_entire() {
             return Self::ENTIRE;
@@ -398,12 +376,7 @@ impl Mul for Interval {
         };
         Self { lower, upper }
     }
-}
-
-impl Div for Interval {
-    type Output = Self;
-    #[inline]
-    fn div(self, other: Self) -> Self {
+    Div div(self, other) {
         let (a, b) = (self, other);
         if a.is_entire() || b.contains(0.0) {
             return Self::ENTIRE;
@@ -417,20 +390,7 @@ impl Div for Interval {
         let upper = div_up(a.upper, if a.upper <= 0.0 { b.upper } else { b.lower });
         Self { lower, upper }
     }
-}
-
-impl AddAssign for Interval {
-    #[inline]
-    fn add_assign(&mut self, other: Self) {
-        *self = *self + other;
-    }
-}
-
-impl SubAssign for Interval {
-    #[inline]
-    fn sub_assign(&mut self, other: Self) {
-        *self = *self - other;
-    }
+    -(self) { Self { lower: -self.upper, upper: -self.lower } }
 }
 
 impl Arithmetic for Interval {

@@ -11,9 +11,8 @@
 //! and roots are bounded by their own residuals, and the elementary functions are computed in ball
 //! arithmetic, so that their bounds follow from those two and a bound on the truncated series.
 
-use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
-
 use super::interval::{Enclosure, Interval};
+use super::scalar::operators;
 use super::{Arithmetic, Decimal, DoubleDouble, Elementary, FromDecimal};
 
 /// All real numbers within `radius` of `midpoint`. An infinite radius means that nothing is known.
@@ -248,10 +247,9 @@ impl Ball {
     }
 }
 
-impl Add for Ball {
-    type Output = Self;
-    #[inline]
-    fn add(self, other: Self) -> Self {
+operators! {
+    impl [] Ball, inline:
+    Add add(self, other) {
         if self.is_zero() {
             return other;
         }
@@ -261,28 +259,8 @@ impl Add for Ball {
         let m = self.midpoint + other.midpoint;
         Self::new(m, up(self.radius + other.radius + m.high().abs() * SUM_ERROR))
     }
-}
-
-impl Sub for Ball {
-    type Output = Self;
-    #[inline]
-    fn sub(self, other: Self) -> Self {
-        self + -other
-    }
-}
-
-impl Neg for Ball {
-    type Output = Self;
-    #[inline]
-    fn neg(self) -> Self {
-        Self { midpoint: -self.midpoint, radius: self.radius }
-    }
-}
-
-impl Mul for Ball {
-    type Output = Self;
-    #[inline]
-    fn mul(self, other: Self) -> Self {
+    Sub sub(self, other) { self + -other }
+    Mul mul(self, other) {
         if self.is_entire() || other.is_entire() {
             return Self::ENTIRE;
         }
@@ -295,11 +273,7 @@ impl Mul for Ball {
         let radius = a * other.radius + b * self.radius + self.radius * other.radius;
         Self::new(m, up(radius + m.high().abs() * PRODUCT_ERROR + f64::MIN_POSITIVE))
     }
-}
-
-impl Div for Ball {
-    type Output = Self;
-    fn div(self, other: Self) -> Self {
+    Div div(self, other) {
         let least = other.midpoint.high().abs().next_down() - up(other.radius);
         if self.is_entire() || least.is_nan() || least <= 0.0 {
             return Self::ENTIRE;
@@ -314,20 +288,7 @@ impl Div for Ball {
         let error = up(rest.size() + rest.radius + self.radius + q.size() * other.radius);
         Self::new(q.midpoint, up(error / least))
     }
-}
-
-impl AddAssign for Ball {
-    #[inline]
-    fn add_assign(&mut self, other: Self) {
-        *self = *self + other;
-    }
-}
-
-impl SubAssign for Ball {
-    #[inline]
-    fn sub_assign(&mut self, other: Self) {
-        *self = *self - other;
-    }
+    -(self) { Self { midpoint: -self.midpoint, radius: self.radius } }
 }
 
 impl Arithmetic for Ball {

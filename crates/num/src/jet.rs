@@ -7,8 +7,8 @@
 //! the equations themselves.
 
 use std::cmp::Ordering;
-use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
+use super::scalar::operators;
 use super::{Arithmetic, Elementary, Scalar};
 
 /// The series c_0 + c_1 sigma + ... + c_(K-1) sigma^(K-1), with everything from sigma^K on dropped.
@@ -33,6 +33,14 @@ impl<const K: usize> Jet<K> {
         let mut c = [0.0; K];
         c[0] = value;
         Self { c }
+    }
+
+    /// `f` of each pair of coefficients.
+    fn pairwise(mut self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
+        for (a, b) in self.c.iter_mut().zip(other.c) {
+            *a = f(*a, b);
+        }
+        self
     }
 
     /// The series f with w f' = a' and constant term `first`, a being `self`.
@@ -67,52 +75,18 @@ impl<const K: usize> PartialOrd for Jet<K> {
     }
 }
 
-impl<const K: usize> Add for Jet<K> {
-    type Output = Self;
-    fn add(mut self, other: Self) -> Self {
-        self += other;
-        self
-    }
-}
-
-impl<const K: usize> AddAssign for Jet<K> {
-    fn add_assign(&mut self, other: Self) {
-        for (a, b) in self.c.iter_mut().zip(other.c) {
-            *a += b;
-        }
-    }
-}
-
-impl<const K: usize> Sub for Jet<K> {
-    type Output = Self;
-    fn sub(mut self, other: Self) -> Self {
-        self -= other;
-        self
-    }
-}
-
-impl<const K: usize> SubAssign for Jet<K> {
-    fn sub_assign(&mut self, other: Self) {
-        for (a, b) in self.c.iter_mut().zip(other.c) {
-            *a -= b;
-        }
-    }
-}
-
-impl<const K: usize> Mul for Jet<K> {
-    type Output = Self;
-    fn mul(self, other: Self) -> Self {
+operators! {
+    impl [const K: usize] Jet<K>, inline:
+    Add add(self, other) { self.pairwise(other, |a, b| a + b) }
+    Sub sub(self, other) { self.pairwise(other, |a, b| a - b) }
+    Mul mul(self, other) {
         let mut c = [0.0; K];
         for (k, out) in c.iter_mut().enumerate() {
             *out = (0..=k).map(|j| self.c[j] * other.c[k - j]).sum();
         }
         Self { c }
     }
-}
-
-impl<const K: usize> Div for Jet<K> {
-    type Output = Self;
-    fn div(self, other: Self) -> Self {
+    Div div(self, other) {
         let mut c = [0.0; K];
         for k in 0..K {
             let known: f64 = (0..k).map(|j| c[j] * other.c[k - j]).sum();
@@ -120,13 +94,7 @@ impl<const K: usize> Div for Jet<K> {
         }
         Self { c }
     }
-}
-
-impl<const K: usize> Neg for Jet<K> {
-    type Output = Self;
-    fn neg(self) -> Self {
-        Self { c: self.c.map(|v| -v) }
-    }
+    -(self) { Self { c: self.c.map(|v| -v) } }
 }
 
 impl<const K: usize> Arithmetic for Jet<K> {

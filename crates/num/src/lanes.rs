@@ -4,10 +4,8 @@
 //! the machine has. Every operation rounds each lane as it rounds a number by itself, so a lane's
 //! result does not depend on the width or on its neighbours.
 
-use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
-
 use super::elementary::kernels::{self, Pointwise, TANH_IS_ONE};
-use super::scalar::{Arithmetic, Elementary};
+use super::scalar::{Arithmetic, Elementary, by_parts, operators};
 
 /// `W` numbers side by side.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,39 +31,13 @@ impl<const W: usize> Pointwise for Lanes<W> {
     }
 }
 
-macro_rules! lanewise {
-    ($($trait:ident, $function:ident, $operator:tt);*) => {$(
-        impl<const W: usize> $trait for Lanes<W> {
-            type Output = Self;
-            #[inline(always)]
-            fn $function(self, other: Self) -> Self {
-                self.map2(other, |a, b| a $operator b)
-            }
-        }
-    )*};
-}
-lanewise!(Add, add, +; Sub, sub, -; Mul, mul, *; Div, div, /);
-
-impl<const W: usize> Neg for Lanes<W> {
-    type Output = Self;
-    #[inline(always)]
-    fn neg(self) -> Self {
-        self.map(|a| -a)
-    }
-}
-
-impl<const W: usize> AddAssign for Lanes<W> {
-    #[inline(always)]
-    fn add_assign(&mut self, other: Self) {
-        *self = *self + other;
-    }
-}
-
-impl<const W: usize> SubAssign for Lanes<W> {
-    #[inline(always)]
-    fn sub_assign(&mut self, other: Self) {
-        *self = *self - other;
-    }
+operators! {
+    impl [const W: usize] Lanes<W>, inline(always):
+    Add add(self, other) { self.map2(other, |a, b| a + b) }
+    Sub sub(self, other) { self.map2(other, |a, b| a - b) }
+    Mul mul(self, other) { self.map2(other, |a, b| a * b) }
+    Div div(self, other) { self.map2(other, |a, b| a / b) }
+    -(self) { self.map(|a| -a) }
 }
 
 impl<const W: usize> Arithmetic for Lanes<W> {
@@ -89,38 +61,11 @@ impl<const W: usize> Elementary for Lanes<W> {
     fn exp(self) -> Self {
         kernels::exp(self)
     }
-    #[inline]
-    fn sin(self) -> Self {
-        self.map(Elementary::sin)
-    }
-    #[inline]
-    fn cos(self) -> Self {
-        self.map(Elementary::cos)
-    }
-    #[inline]
-    fn ln(self) -> Self {
-        self.map(Elementary::ln)
-    }
-    #[inline]
-    fn atan(self) -> Self {
-        self.map(Elementary::atan)
-    }
-    #[inline]
-    fn erf(self) -> Self {
-        self.map(Elementary::erf)
-    }
     #[inline(always)]
     fn pi() -> Self {
         Self::from_f64(f64::pi())
     }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        self.map(Elementary::sqrt)
-    }
-    #[inline(always)]
-    fn sign(self) -> Self {
-        self.map(Elementary::sign)
-    }
+    by_parts!(sin cos ln atan erf sqrt sign);
 }
 
 #[cfg(test)]

@@ -9,13 +9,11 @@
 // for the wrong instruction set.
 #![allow(clippy::needless_range_loop)]
 
-use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
-
 use pulp::Simd;
 use pulp::bytemuck::{Zeroable, cast_slice, cast_slice_mut};
 
 use super::elementary::kernels::{self, Pointwise, TANH_IS_ONE};
-use super::scalar::{Arithmetic, Elementary};
+use super::scalar::{Arithmetic, Elementary, by_parts, operators};
 
 /// The numbers in `K` registers of the instruction set `S`; with several registers the latency of
 /// one operation is hidden by the others.
@@ -254,40 +252,13 @@ impl<S: Simd, const K: usize> Pointwise for Registers<S, K> {
     }
 }
 
-macro_rules! lanewise {
-    ($($trait:ident, $function:ident, $many:ident, $operator:tt);*) => {$(
-        impl<S: Simd, const K: usize> $trait for Registers<S, K> {
-            type Output = Self;
-            #[inline(always)]
-            fn $function(self, other: Self) -> Self {
-                self.combine(other, |set, a, b| set.$many(a, b), |a, b| a $operator b)
-            }
-        }
-    )*};
-}
-lanewise!(Add, add, add_f64s, +; Sub, sub, sub_f64s, -; Mul, mul, mul_f64s, *; Div, div, div_f64s,
-    /);
-
-impl<S: Simd, const K: usize> Neg for Registers<S, K> {
-    type Output = Self;
-    #[inline(always)]
-    fn neg(self) -> Self {
-        self.each(|set, part| set.neg_f64s(part), |v| -v)
-    }
-}
-
-impl<S: Simd, const K: usize> AddAssign for Registers<S, K> {
-    #[inline(always)]
-    fn add_assign(&mut self, other: Self) {
-        *self = *self + other;
-    }
-}
-
-impl<S: Simd, const K: usize> SubAssign for Registers<S, K> {
-    #[inline(always)]
-    fn sub_assign(&mut self, other: Self) {
-        *self = *self - other;
-    }
+operators! {
+    impl [S: Simd, const K: usize] Registers<S, K>, inline(always):
+    Add add(self, other) { self.combine(other, |set, a, b| set.add_f64s(a, b), |a, b| a + b) }
+    Sub sub(self, other) { self.combine(other, |set, a, b| set.sub_f64s(a, b), |a, b| a - b) }
+    Mul mul(self, other) { self.combine(other, |set, a, b| set.mul_f64s(a, b), |a, b| a * b) }
+    Div div(self, other) { self.combine(other, |set, a, b| set.div_f64s(a, b), |a, b| a / b) }
+    -(self) { self.each(|set, part| set.neg_f64s(part), |v| -v) }
 }
 
 impl<S: Simd, const K: usize> Arithmetic for Registers<S, K> {
@@ -325,26 +296,7 @@ impl<S: Simd, const K: usize> Elementary for Registers<S, K> {
             kernels::exp(self)
         }
     }
-    #[inline(always)]
-    fn sin(self) -> Self {
-        self.map(Elementary::sin)
-    }
-    #[inline(always)]
-    fn cos(self) -> Self {
-        self.map(Elementary::cos)
-    }
-    #[inline(always)]
-    fn ln(self) -> Self {
-        self.map(Elementary::ln)
-    }
-    #[inline(always)]
-    fn atan(self) -> Self {
-        self.map(Elementary::atan)
-    }
-    #[inline(always)]
-    fn erf(self) -> Self {
-        self.map(Elementary::erf)
-    }
+    by_parts!(sin cos ln atan erf sign);
     #[inline(always)]
     fn pi() -> Self {
         Self::from_f64(f64::pi())
@@ -352,10 +304,6 @@ impl<S: Simd, const K: usize> Elementary for Registers<S, K> {
     #[inline(always)]
     fn sqrt(self) -> Self {
         self.each(|set, part| set.sqrt_f64s(part), Elementary::sqrt)
-    }
-    #[inline(always)]
-    fn sign(self) -> Self {
-        self.map(Elementary::sign)
     }
 }
 

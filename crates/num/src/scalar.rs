@@ -5,6 +5,54 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 use super::elementary;
 
+/// The operators of a number type: those written, and `+=` and `-=` by them.
+macro_rules! operators {
+    (
+        impl $generics:tt $type:ty, $inline:meta:
+        $($trait:ident $function:ident($this:ident, $other:ident) $body:block)*
+        -($that:ident) $negative:block
+    ) => {
+        $(crate::scalar::operators!(
+            @ $generics $type, $inline, $trait $function($this, $other: Self) $body);)*
+        crate::scalar::operators!(@ $generics $type, $inline, Neg neg($that) $negative);
+        crate::scalar::operators!(@ $generics $type, $inline, AddAssign add_assign +);
+        crate::scalar::operators!(@ $generics $type, $inline, SubAssign sub_assign -);
+    };
+    (
+        @ [$($generics:tt)*] $type:ty, $inline:meta,
+        $trait:ident $function:ident($($argument:tt)*) $body:block
+    ) => {
+        impl<$($generics)*> std::ops::$trait for $type {
+            type Output = Self;
+            #[$inline]
+            fn $function($($argument)*) -> Self $body
+        }
+    };
+    (
+        @ [$($generics:tt)*] $type:ty, $inline:meta,
+        $trait:ident $function:ident $operator:tt
+    ) => {
+        impl<$($generics)*> std::ops::$trait for $type {
+            #[$inline]
+            fn $function(&mut self, other: Self) {
+                *self = *self $operator other;
+            }
+        }
+    };
+}
+pub(crate) use operators;
+
+/// Functions of a number that are those of its parts.
+macro_rules! by_parts {
+    ($($function:ident)*) => {$(
+        #[inline(always)]
+        fn $function(self) -> Self {
+            self.map(Elementary::$function)
+        }
+    )*};
+}
+pub(crate) use by_parts;
+
 /// Sums, products and quotients: what a polynomial or rational equation needs.
 ///
 /// Equality is that of values (of all lanes, of both ends of an interval); an equation never asks
@@ -142,41 +190,24 @@ impl Arithmetic for f64 {
     }
 }
 
+macro_rules! of_elementary {
+    ($($function:ident)*) => {$(
+        #[inline]
+        fn $function(self) -> Self {
+            elementary::$function(self)
+        }
+    )*};
+}
+
 impl Elementary for f64 {
-    #[inline]
-    fn tanh(self) -> Self {
-        elementary::tanh(self)
-    }
-    #[inline]
-    fn exp(self) -> Self {
-        elementary::exp(self)
-    }
-    #[inline]
-    fn sin(self) -> Self {
-        elementary::sin(self)
-    }
-    #[inline]
-    fn cos(self) -> Self {
-        elementary::cos(self)
-    }
+    of_elementary!(tanh exp sin cos ln atan erf);
+
     /// Out of line: where an equation takes a root in one branch only, as a transition function
     /// does, the compiler would else compute it (and what is divided by it) at every evaluation and
     /// throw it away, which was a quarter of a multistep run's time.
     #[inline(never)]
     fn sqrt(self) -> Self {
         elementary::sqrt(self)
-    }
-    #[inline]
-    fn ln(self) -> Self {
-        elementary::ln(self)
-    }
-    #[inline]
-    fn atan(self) -> Self {
-        elementary::atan(self)
-    }
-    #[inline]
-    fn erf(self) -> Self {
-        elementary::erf(self)
     }
     #[inline]
     fn pi() -> Self {

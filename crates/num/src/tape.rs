@@ -38,9 +38,9 @@ mod side_by_side;
 
 use std::cell::RefCell;
 use std::collections::HashMap;
-use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 use super::decimal::{Decimal, FromDecimal};
+use super::scalar::operators;
 use super::{Arithmetic, Elementary};
 pub use program::Program;
 
@@ -374,51 +374,13 @@ impl Recorded {
     }
 }
 
-impl Add for Recorded {
-    type Output = Self;
-    fn add(self, other: Self) -> Self {
-        record(Operation::Add(self.node, other.node))
-    }
-}
-
-impl Sub for Recorded {
-    type Output = Self;
-    fn sub(self, other: Self) -> Self {
-        record(Operation::Sub(self.node, other.node))
-    }
-}
-
-impl Mul for Recorded {
-    type Output = Self;
-    fn mul(self, other: Self) -> Self {
-        record(Operation::Mul(self.node, other.node))
-    }
-}
-
-impl Div for Recorded {
-    type Output = Self;
-    fn div(self, other: Self) -> Self {
-        record(Operation::Div(self.node, other.node))
-    }
-}
-
-impl Neg for Recorded {
-    type Output = Self;
-    fn neg(self) -> Self {
-        record(Operation::Neg(self.node))
-    }
-}
-
-impl AddAssign for Recorded {
-    fn add_assign(&mut self, other: Self) {
-        *self = *self + other;
-    }
-}
-
-impl SubAssign for Recorded {
-    fn sub_assign(&mut self, other: Self) {
-        *self = *self - other;
-    }
+operators! {
+    impl [] Recorded, inline:
+    Add add(self, other) { record(Operation::Add(self.node, other.node)) }
+    Sub sub(self, other) { record(Operation::Sub(self.node, other.node)) }
+    Mul mul(self, other) { record(Operation::Mul(self.node, other.node)) }
+    Div div(self, other) { record(Operation::Div(self.node, other.node)) }
+    -(self) { record(Operation::Neg(self.node)) }
 }
 
 impl Arithmetic for Recorded {
@@ -427,36 +389,19 @@ impl Arithmetic for Recorded {
     }
 }
 
+macro_rules! recorded {
+    ($($function:ident $operation:ident),*) => {$(
+        fn $function(self) -> Self {
+            record(Operation::$operation(self.node))
+        }
+    )*};
+}
+
 impl Elementary for Recorded {
-    fn tanh(self) -> Self {
-        record(Operation::Tanh(self.node))
-    }
-    fn exp(self) -> Self {
-        record(Operation::Exp(self.node))
-    }
-    fn sin(self) -> Self {
-        record(Operation::Sin(self.node))
-    }
-    fn cos(self) -> Self {
-        record(Operation::Cos(self.node))
-    }
-    fn sqrt(self) -> Self {
-        record(Operation::Sqrt(self.node))
-    }
-    fn ln(self) -> Self {
-        record(Operation::Ln(self.node))
-    }
-    fn atan(self) -> Self {
-        record(Operation::Atan(self.node))
-    }
-    fn erf(self) -> Self {
-        record(Operation::Erf(self.node))
-    }
+    recorded!(tanh Tanh, exp Exp, sin Sin, cos Cos, sqrt Sqrt, ln Ln, atan Atan, erf Erf, sign Sign);
+
     fn pi() -> Self {
         record(Operation::Pi)
-    }
-    fn sign(self) -> Self {
-        record(Operation::Sign(self.node))
     }
 }
 

@@ -140,33 +140,50 @@ impl Program {
             let mut registers = [S::zero(); Self::FEW];
             registers[..x.len()].copy_from_slice(x);
             if const { wide::<S>() } {
-                self.run(registers.as_mut_slice(), out)
+                self.run_alone(registers.as_mut_slice(), out)
             } else {
-                self.run(&mut registers, out)
+                self.run_alone(&mut registers, out)
             }
         } else if self.registers <= Self::ON_STACK {
             let mut registers = [S::zero(); Self::ON_STACK];
             registers[..x.len()].copy_from_slice(x);
             if const { wide::<S>() } {
-                self.run(registers.as_mut_slice(), out)
+                self.run_alone(registers.as_mut_slice(), out)
             } else {
-                self.run(&mut registers, out)
+                self.run_alone(&mut registers, out)
             }
         } else {
             let mut registers = vec![S::zero(); self.registers];
             registers[..x.len()].copy_from_slice(x);
-            self.run(registers.as_mut_slice(), out);
+            self.run_alone(registers.as_mut_slice(), out);
         }
     }
 
     #[inline]
-    fn run<S: Elementary, R: Results<S> + ?Sized>(&self, r: &mut R, out: &mut [S]) {
-        for i in &self.code {
+    fn run_alone<S: Elementary, R: Results<S> + ?Sized>(&self, r: &mut R, out: &mut [S]) {
+        self.run(r, &Own, out);
+    }
+
+    /// Carries the program out on results `r` that begin with the variables. Always inlined, so
+    /// that it is compiled with the caller's instruction set.
+    #[inline(always)]
+    pub(super) fn run<S: Elementary, R: Results<S> + ?Sized>(
+        &self,
+        r: &mut R,
+        numbers: &impl Numbers<S>,
+        out: &mut [S],
+    ) {
+        for (place, i) in self.code.iter().enumerate() {
             let a = r.get(i.a);
             // Made where they are used, most instructions have none.
             macro_rules! f {
                 () => {
-                    S::from_f64(i.f)
+                    numbers.at(2 * place, i.f)
+                };
+            }
+            macro_rules! times_g {
+                ($a:expr) => {
+                    numbers.times($a, 2 * place + 1, i.g)
                 };
             }
             let value = match i.code {
@@ -177,7 +194,7 @@ impl Program {
                 Code::AddFixed => a + f!(),
                 Code::SubFixed => a - f!(),
                 Code::FixedSub => f!() - a,
-                Code::MulFixed => a.scale(i.f),
+                Code::MulFixed => numbers.times(a, 2 * place, i.f),
                 Code::DivFixed => a / f!(),
                 Code::FixedDiv => f!() / a,
                 Code::Neg => -a,
@@ -200,11 +217,11 @@ impl Program {
                 Code::TimesDifference => r.get(i.c) * (a - r.get(i.b)),
                 Code::FixedSubTimes => (f!() - a) * r.get(i.c),
                 Code::TimesFixedSub => r.get(i.c) * (f!() - a),
-                Code::ScaledPlus => a.scale(i.g) + f!(),
-                Code::MinusScaled => f!() - a.scale(i.g),
-                Code::SumScaled => (a + f!()).scale(i.g),
-                Code::LineTimes => (f!() - a.scale(i.g)) * r.get(i.c),
-                Code::TimesLine => r.get(i.c) * (f!() - a.scale(i.g)),
+                Code::ScaledPlus => times_g!(a) + f!(),
+                Code::MinusScaled => f!() - times_g!(a),
+                Code::SumScaled => times_g!(a + f!()),
+                Code::LineTimes => (f!() - times_g!(a)) * r.get(i.c),
+                Code::TimesLine => r.get(i.c) * (f!() - times_g!(a)),
                 Code::Squares => {
                     let b = r.get(i.b);
                     a * a + b * b
@@ -224,28 +241,53 @@ impl Program {
                     b + (f!() - b) * r.get(i.c)
                 }
                 Code::BlendOfSums => {
-                    let base = a + S::from_f64(i.g);
+                    let base = a + numbers.at(2 * place + 1, i.g);
                     base + ((a + f!()) - base) * r.get(i.c)
                 }
             };
             r.set(i.to, value);
         }
-        for (out, from) in out.iter_mut().zip(&self.outputs) {
-            *out = match *from {
-                Output::Register(i) => r.get(i),
-                Output::Fixed(value) => S::from_f64(value),
+        for (i, from) in self.outputs.iter().enumerate() {
+            out[i] = match *from {
+                Output::Register(at) => r.get(at),
+                Output::Fixed(value) => numbers.at(2 * self.code.len() + i, value),
             };
         }
     }
 }
 
-/// Intermediate results.
 /// Whether a number takes so long that how a register is found does not matter.
 const fn wide<S>() -> bool {
     size_of::<S>() > size_of::<f64>()
 }
 
-trait Results<S> {
+/// Source of a program's numbers.
+pub(super) trait Numbers<S: Elementary> {
+    /// The number in this place, which in the program itself is `own`.
+    fn at(&self, place: usize, own: f64) -> S;
+    /// The product of `a` with it.
+    #[inline(always)]
+    fn times(&self, a: S, place: usize, own: f64) -> S {
+        a * self.at(place, own)
+    }
+}
+
+/// The program's own.
+pub(super) struct Own;
+
+impl<S: Elementary> Numbers<S> for Own {
+    #[inline(always)]
+    fn at(&self, _: usize, own: f64) -> S {
+        S::from_f64(own)
+    }
+    #[inline(always)]
+    fn times(&self, a: S, _: usize, own: f64) -> S {
+        a.scale(own)
+    }
+}
+
+/// Intermediate results.
+pub(super) trait Results<S> {
     fn get(&self, i: u16) -> S;
     fn set(&mut self, i: u16, value: S);
 }

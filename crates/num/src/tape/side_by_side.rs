@@ -10,36 +10,44 @@
 use pulp::Simd;
 
 use super::super::registers::{Aligned, Registers};
-use super::super::scalar::Elementary;
-use super::choice::Code;
-use super::program::{Output, Program};
+use super::program::{Numbers, Own, Program, Results};
 
 /// Numbers in `K` registers.
 type Bundle<S, const K: usize> = [<S as Simd>::f64s; K];
 
-/// Source of a program's numbers.
-trait Numbers<S: Simd, const K: usize> {
-    /// The number in this place, which in the program itself is `own`.
-    fn at(&self, set: S, place: usize, own: f64) -> Bundle<S, K>;
-}
+/// The program's numbers, others in each lane.
+struct OfLanes<'a, S: Simd, const K: usize>(S, &'a [Aligned<Bundle<S, K>>]);
 
-/// The program's own, in every lane.
-struct Own;
-
-impl<S: Simd, const K: usize> Numbers<S, K> for Own {
+impl<S: Simd, const K: usize> Numbers<Registers<S, K>> for OfLanes<'_, S, K> {
     #[inline(always)]
-    fn at(&self, set: S, _: usize, own: f64) -> Bundle<S, K> {
-        [set.splat_f64s(own); K]
+    fn at(&self, place: usize, _: f64) -> Registers<S, K> {
+        Registers::new(self.0, self.1[place].0)
     }
 }
 
-/// Others in each lane.
-struct OfLanes<'a, S: Simd, const K: usize>(&'a [Aligned<Bundle<S, K>>]);
+/// Results in memory that the caller keeps.
+struct Scratch<'a, S: Simd, const K: usize> {
+    set: S,
+    results: &'a mut [Aligned<Bundle<S, K>>],
+    /// The last result and its place. Most instructions use it, and it is available sooner than it
+    /// could be stored and loaded.
+    last: (Bundle<S, K>, u16),
+}
 
-impl<S: Simd, const K: usize> Numbers<S, K> for OfLanes<'_, S, K> {
+impl<S: Simd, const K: usize> Results<Registers<S, K>> for Scratch<'_, S, K> {
     #[inline(always)]
-    fn at(&self, _: S, place: usize, _: f64) -> Bundle<S, K> {
-        self.0[place].0
+    fn get(&self, i: u16) -> Registers<S, K> {
+        let (last, written) = self.last;
+        // The mask changes nothing and spares the way to a panic.
+        let mask = self.results.len() - 1;
+        let parts = if i == written { last } else { self.results[usize::from(i) & mask].0 };
+        Registers::new(self.set, parts)
+    }
+    #[inline(always)]
+    fn set(&mut self, i: u16, value: Registers<S, K>) {
+        let (parts, mask) = (value.parts(), self.results.len() - 1);
+        self.results[usize::from(i) & mask] = Aligned(parts);
+        self.last = (parts, i);
     }
 }
 
@@ -63,7 +71,7 @@ impl Program {
         x: [Bundle<S, K>; N],
         scratch: &mut [Aligned<Bundle<S, K>>],
     ) -> [Bundle<S, K>; N] {
-        self.evaluate_with(set, x, Own, scratch)
+        self.evaluate_with(set, x, &Own, scratch)
     }
 
     /// The same with different numbers in each lane, in the order of [`Program::numbers`]: each
@@ -80,7 +88,7 @@ impl Program {
             numbers.len() == 2 * self.code.len() + N,
             "two numbers an instruction, one a value"
         );
-        self.evaluate_with(set, x, OfLanes::<S, K>(numbers), scratch)
+        self.evaluate_with(set, x, &OfLanes(set, numbers), scratch)
     }
 
     #[inline(always)]
@@ -88,7 +96,7 @@ impl Program {
         &self,
         set: S,
         x: [Bundle<S, K>; N],
-        numbers: impl Numbers<S, K>,
+        numbers: &impl Numbers<Registers<S, K>>,
         results: &mut [Aligned<Bundle<S, K>>],
     ) -> [Bundle<S, K>; N] {
         assert!(
@@ -96,202 +104,24 @@ impl Program {
             "one number a variable and a value"
         );
         assert!(results.len() == self.scratch_len(), "as much scratch as the program says");
-        // The mask changes nothing and spares the way to a panic.
-        let last = results.len() - 1;
+        let mask = results.len() - 1;
         for i in 0..N {
-            results[i & last] = Aligned(x[i]);
+            results[i & mask] = Aligned(x[i]);
         }
-        // Most instructions use the result of the one before, which is available sooner than it
-        // could be stored and loaded.
-        let (mut value, mut written) = (x[0], u16::MAX);
-        for (place, i) in self.code.iter().enumerate() {
-            let a = if i.a == written { value } else { results[usize::from(i.a) & last].0 };
-            let number = Registers::<S, K>::new(set, a);
-            macro_rules! each {
-                ($k:ident => $result:expr) => {
-                    for $k in 0..K {
-                        value[$k] = $result;
-                    }
-                };
-                // With the other operand, which is read only here.
-                (b, $k:ident, $b:ident => $result:expr) => {{
-                    let $b = if i.b == written { value } else {
-                        results[usize::from(i.b) & last].0 };
-                    each!($k => $result);
-                }};
-                // With three.
-                (b c, $k:ident, $b:ident, $c:ident => $result:expr) => {{
-                    let $b = if i.b == written { value } else {
-                        results[usize::from(i.b) & last].0 };
-                    let $c = if i.c == written { value } else {
-                        results[usize::from(i.c) & last].0 };
-                    each!($k => $result);
-                }};
-                // With the third.
-                (c, $k:ident, $c:ident => $result:expr) => {{
-                    let $c = if i.c == written { value } else {
-                        results[usize::from(i.c) & last].0 };
-                    each!($k => $result);
-                }};
-            }
-            // The instruction's numbers.
-            macro_rules! f {
-                () => {
-                    numbers.at(set, 2 * place, i.f)
-                };
-            }
-            macro_rules! g {
-                () => {
-                    numbers.at(set, 2 * place + 1, i.g)
-                };
-            }
-            match i.code {
-                Code::Add => each!(b, k, b => set.add_f64s(a[k], b[k])),
-                Code::Sub => each!(b, k, b => set.sub_f64s(a[k], b[k])),
-                Code::Mul => each!(b, k, b => set.mul_f64s(a[k], b[k])),
-                Code::Div => each!(b, k, b => set.div_f64s(a[k], b[k])),
-                Code::AddFixed => {
-                    let f = f!();
-                    each!(k => set.add_f64s(a[k], f[k]))
-                }
-                Code::SubFixed => {
-                    let f = f!();
-                    each!(k => set.sub_f64s(a[k], f[k]))
-                }
-                Code::FixedSub => {
-                    let f = f!();
-                    each!(k => set.sub_f64s(f[k], a[k]))
-                }
-                Code::MulFixed => {
-                    let f = f!();
-                    each!(k => set.mul_f64s(a[k], f[k]))
-                }
-                Code::DivFixed => {
-                    let f = f!();
-                    each!(k => set.div_f64s(a[k], f[k]))
-                }
-                Code::FixedDiv => {
-                    let f = f!();
-                    each!(k => set.div_f64s(f[k], a[k]))
-                }
-                Code::Neg => value = (-number).parts(),
-                Code::Tanh => value = number.tanh().parts(),
-                Code::Exp => value = number.exp().parts(),
-                Code::Ln => value = number.ln().parts(),
-                Code::Sin => value = number.sin().parts(),
-                Code::Cos => value = number.cos().parts(),
-                Code::Sqrt => value = number.sqrt().parts(),
-                Code::Atan => value = number.atan().parts(),
-                Code::Erf => value = number.erf().parts(),
-                Code::Sign => value = number.sign().parts(),
-                Code::ProductPlus => {
-                    each!(b c, k, b, c => set.add_f64s(set.mul_f64s(a[k], b[k]), c[k]))
-                }
-                Code::PlusProduct => {
-                    each!(b c, k, b, c => set.add_f64s(c[k], set.mul_f64s(a[k], b[k])))
-                }
-                Code::ProductMinus => {
-                    each!(b c, k, b, c => set.sub_f64s(set.mul_f64s(a[k], b[k]), c[k]))
-                }
-                Code::MinusProduct => {
-                    each!(b c, k, b, c => set.sub_f64s(c[k], set.mul_f64s(a[k], b[k])))
-                }
-                Code::SumTimes => {
-                    each!(b c, k, b, c => set.mul_f64s(set.add_f64s(a[k], b[k]), c[k]))
-                }
-                Code::TimesSum => {
-                    each!(b c, k, b, c => set.mul_f64s(c[k], set.add_f64s(a[k], b[k])))
-                }
-                Code::DifferenceTimes => {
-                    each!(b c, k, b, c => set.mul_f64s(set.sub_f64s(a[k], b[k]), c[k]))
-                }
-                Code::TimesDifference => {
-                    each!(b c, k, b, c => set.mul_f64s(c[k], set.sub_f64s(a[k], b[k])))
-                }
-                Code::FixedSubTimes => {
-                    let f = f!();
-                    each!(c, k, c => set.mul_f64s(set.sub_f64s(f[k], a[k]), c[k]))
-                }
-                Code::TimesFixedSub => {
-                    let f = f!();
-                    each!(c, k, c => set.mul_f64s(c[k], set.sub_f64s(f[k], a[k])))
-                }
-                Code::ScaledPlus => {
-                    let (f, g) = (f!(), g!());
-                    each!(k => set.add_f64s(set.mul_f64s(a[k], g[k]), f[k]))
-                }
-                Code::MinusScaled => {
-                    let (f, g) = (f!(), g!());
-                    each!(k => set.sub_f64s(f[k], set.mul_f64s(a[k], g[k])))
-                }
-                Code::SumScaled => {
-                    let (f, g) = (f!(), g!());
-                    each!(k => set.mul_f64s(set.add_f64s(a[k], f[k]), g[k]))
-                }
-                Code::LineTimes => {
-                    let (f, g) = (f!(), g!());
-                    each!(c, k, c => set.mul_f64s(set.sub_f64s(f[k], set.mul_f64s(a[k], g[k])),
-                        c[k]))
-                }
-                Code::TimesLine => {
-                    let (f, g) = (f!(), g!());
-                    each!(c, k, c => set.mul_f64s(c[k], set.sub_f64s(f[k], set.mul_f64s(a[k],
-                        g[k]))))
-                }
-                Code::Squares => {
-                    each!(b, k, b => set.add_f64s(set.mul_f64s(a[k], a[k]), set.mul_f64s(b[k],
-                        b[k])))
-                }
-                Code::ThreeSquares => each!(b c, k, b, c => {
-                    let two = set.add_f64s(set.mul_f64s(a[k], a[k]), set.mul_f64s(b[k], b[k]));
-                    set.add_f64s(two, set.mul_f64s(c[k], c[k]))
-                }),
-                Code::TanhOfQuotient => {
-                    let f = f!();
-                    each!(k => set.div_f64s(a[k], f[k]));
-                    value = Registers::<S, K>::new(set, value).tanh().parts();
-                }
-                Code::Blend => {
-                    each!(b c, k, b, c => set.add_f64s(b[k], set.mul_f64s(set.sub_f64s(a[k], b[k]),
-                        c[k])))
-                }
-                Code::BlendFromFixed => {
-                    let f = f!();
-                    each!(c, k, c => set.add_f64s(f[k], set.mul_f64s(set.sub_f64s(a[k], f[k]),
-                        c[k])))
-                }
-                Code::BlendToFixed => {
-                    let f = f!();
-                    each!(b c, k, b, c => set.add_f64s(b[k], set.mul_f64s(set.sub_f64s(f[k], b[k]),
-                        c[k])))
-                }
-                Code::BlendOfSums => {
-                    let (f, g) = (f!(), g!());
-                    each!(c, k, c => {
-                        let base = set.add_f64s(a[k], g[k]);
-                        let difference = set.sub_f64s(set.add_f64s(a[k], f[k]), base);
-                        set.add_f64s(base, set.mul_f64s(difference, c[k]))
-                    })
-                }
-            }
-            results[usize::from(i.to) & last] = Aligned(value);
-            written = i.to;
-        }
-        let mut out = [value; N];
+        let mut out = [Registers::splat(set, 0.0); N];
+        self.run(&mut Scratch { set, results, last: (x[0], u16::MAX) }, numbers, &mut out);
+        let mut parts = x;
         for i in 0..N {
-            out[i] = match self.outputs[i] {
-                Output::Register(at) => results[usize::from(at) & last].0,
-                Output::Fixed(value) => numbers.at(set, 2 * self.code.len() + i, value),
-            };
+            parts[i] = out[i].parts();
         }
-        out
+        parts
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Arithmetic, Tape};
+    use crate::{Arithmetic, Elementary, Tape};
     use pulp::bytemuck::cast_slice;
     use pulp::{Arch, Scalar, WithSimd};
 
