@@ -346,6 +346,10 @@ impl RunFlags {
     fn exit_begins(&self, word: &str) -> bool {
         self.filippov() && self.exit.as_deref().is_some_and(|e| e.split(':').next() == Some(word))
     }
+    /// Whether all futures of a set-valued point are followed.
+    fn follows_futures(&self, command: Use) -> bool {
+        self.exit_begins("all") && command.is_a_run()
+    }
     fn extended(&self) -> bool {
         self.method == Some(Method::TaylorExtended)
     }
@@ -374,24 +378,24 @@ const OF_KICKS: &str = "there are no kicks; leave it out, or give --kick-every";
 
 /// The table. Every flag of [`RunFlags`] but --spec stands in it once.
 const EFFECTS: [Effect; 43] = {
-    const fn always(flag: &'static str, given: fn(&RunFlags) -> bool) -> Effect {
-        Effect { flag, given, works: |_, _| true, why: "" }
+    // A flag that has an effect on these runs, and why it has none on others.
+    macro_rules! when {
+        ($flag:literal, $field:ident, $works:expr, $why:expr $(,)?) => {
+            Effect { flag: $flag, given: |f| f.$field.is_some(), works: $works, why: $why }
+        };
     }
-    const fn when(
-        flag: &'static str,
-        given: fn(&RunFlags) -> bool,
-        works: fn(&RunFlags, Use) -> bool,
-        why: &'static str,
-    ) -> Effect {
-        Effect { flag, given, works, why }
+    macro_rules! always {
+        ($flag:literal, $field:ident) => {
+            when!($flag, $field, |_, _| true, "")
+        };
     }
     [
-        always("--system", |f| f.system.is_some()),
-        always("--set", |f| !f.set.is_empty()),
-        always("--switch", |f| f.switch.is_some()),
-        when(
+        always!("--system", system),
+        Effect { flag: "--set", given: |f| !f.set.is_empty(), works: |_, _| true, why: "" },
+        always!("--switch", switch),
+        when!(
             "--reading",
-            |f| f.reading.is_some(),
+            reading,
             |f, _| {
                 !code::readings(f.system_name()).is_empty()
                     && !f.gives_what_readings_differ_in(&|_| false)
@@ -399,180 +403,115 @@ const EFFECTS: [Effect; 43] = {
             "a reading gives the caricature's alpha and beta; leave it out with other systems, or \
                 where those that readings differ in are given",
         ),
-        when(
-            "--alpha",
-            |f| f.alpha.is_some(),
-            |f, _| f.caricature() && !f.sets("alpha"),
-            OF_THE_CARICATURE,
-        ),
-        when(
-            "--beta",
-            |f| f.beta.is_some(),
-            |f, _| f.caricature() && !f.sets("beta"),
-            OF_THE_CARICATURE,
-        ),
-        when(
-            "--v-plus",
-            |f| f.v_plus.is_some(),
-            |f, _| f.caricature() && !f.sets("v_plus"),
-            OF_THE_CARICATURE,
-        ),
-        when(
-            "--v-minus",
-            |f| f.v_minus.is_some(),
-            |f, _| f.caricature() && !f.sets("v_minus"),
-            OF_THE_CARICATURE,
-        ),
-        when("--delay", |f| f.delay.is_some(), |f, _| f.switch() == Switch::Delayed, OF_DELAYS),
-        when("--history", |f| f.history.is_some(), |f, _| f.switch() == Switch::Delayed, OF_DELAYS),
-        when("--band", |f| f.band.is_some(), |f, _| f.switch() == Switch::Relay, OF_RELAYS),
-        when("--inside", |f| f.inside.is_some(), |f, _| f.switch() == Switch::Relay, OF_RELAYS),
-        when(
+        when!("--alpha", alpha, |f, _| f.caricature() && !f.sets("alpha"), OF_THE_CARICATURE),
+        when!("--beta", beta, |f, _| f.caricature() && !f.sets("beta"), OF_THE_CARICATURE),
+        when!("--v-plus", v_plus, |f, _| f.caricature() && !f.sets("v_plus"), OF_THE_CARICATURE),
+        when!("--v-minus", v_minus, |f, _| f.caricature() && !f.sets("v_minus"), OF_THE_CARICATURE),
+        when!("--delay", delay, |f, _| f.switch() == Switch::Delayed, OF_DELAYS),
+        when!("--history", history, |f, _| f.switch() == Switch::Delayed, OF_DELAYS),
+        when!("--band", band, |f, _| f.switch() == Switch::Relay, OF_RELAYS),
+        when!("--inside", inside, |f, _| f.switch() == Switch::Relay, OF_RELAYS),
+        when!(
             "--eps",
-            |f| f.eps.is_some(),
+            eps,
             |f, _| !matches!(f.switch(), Switch::Filippov | Switch::Relay),
             "the discontinuous system and the relay have no eps; leave it out, or choose another \
                 --switch",
         ),
-        when(
+        when!(
             "--transition",
-            |f| f.transition.is_some(),
+            transition,
             |f, _| f.has_transition(),
             "it shapes the smoothed switch; leave it out, or use --switch smoothed, or delayed \
                 with --eps",
         ),
-        when(
+        when!(
             "--sigma",
-            |f| f.sigma.is_some(),
+            sigma,
             |f, _| f.has_transition() && matches!(f.transition, None | Some(Transition::Tanh)),
             "it perturbs the smoothed switch's tanh; leave it out, or use --switch smoothed and \
                 --transition tanh",
         ),
-        when(
+        when!(
             "--eps-prime",
-            |f| f.eps_prime.is_some(),
+            eps_prime,
             |f, _| f.switch() == Switch::Hysteretic,
             "it is the relaxation time of the hysteretic switch; leave it out, or use --switch \
                 hysteretic",
         ),
-        when(
+        when!(
             "--hysteresis",
-            |f| f.hysteresis.is_some(),
+            hysteresis,
             |f, _| f.switch() == Switch::Hysteretic,
             "it is a reading of the hysteretic switch; leave it out, or use --switch hysteretic",
         ),
-        always("--start", |f| f.start.is_some()),
-        when(
+        always!("--start", start),
+        when!(
             "--t-start",
-            |f| f.t_start.is_some(),
+            t_start,
             |_, _| false,
             "equations with h, plus and minus do not see the time, and their runs begin at 0; \
                 leave it out (general systems take it)",
         ),
-        when(
+        when!(
             "--t-end",
-            |f| f.t_end.is_some(),
+            t_end,
             |_, c| c != Use::Orbit,
             "a closed orbit has its own period; leave it out, and see --settle",
         ),
-        when(
+        when!(
             "--method",
-            |f| f.method.is_some(),
+            method,
             |_, c| c.is_a_run(),
             "closed orbits and exponents are computed by Dormand-Prince, together with tangent \
                 vectors; leave it out",
         ),
-        always("--rtol", |f| f.rtol.is_some()),
-        always("--atol", |f| f.atol.is_some()),
-        when("--max-step", |f| f.max_step.is_some(), |_, c| c != Use::Orbit, OF_ORBITS),
-        when("--max-steps", |f| f.max_steps.is_some(), |_, c| c != Use::Orbit, OF_ORBITS),
-        when(
-            "--precision",
-            |f| f.precision.is_some(),
-            |f, c| f.extended() && c.is_a_run(),
-            OF_EXTENDED,
-        ),
-        when("--order", |f| f.order.is_some(), |f, c| f.extended() && c.is_a_run(), OF_EXTENDED),
-        when(
-            "--restart",
-            |f| f.restart.is_some(),
-            |f, c| !f.filippov() && c.is_a_run(),
-            NOT_FILIPPOV,
-        ),
-        when(
-            "--kick-every",
-            |f| f.kick_every.is_some(),
-            |f, c| !f.filippov() && c != Use::Orbit,
-            NOT_FILIPPOV,
-        ),
-        when(
-            "--kick-size",
-            |f| f.kick_size.is_some(),
-            |f, c| f.kicked() && c != Use::Orbit,
-            OF_KICKS,
-        ),
-        when(
-            "--kick-law",
-            |f| f.kick_law.is_some(),
-            |f, c| f.kicked() && c != Use::Orbit,
-            OF_KICKS,
-        ),
-        when(
+        always!("--rtol", rtol),
+        always!("--atol", atol),
+        when!("--max-step", max_step, |_, c| c != Use::Orbit, OF_ORBITS),
+        when!("--max-steps", max_steps, |_, c| c != Use::Orbit, OF_ORBITS),
+        when!("--precision", precision, |f, c| f.extended() && c.is_a_run(), OF_EXTENDED),
+        when!("--order", order, |f, c| f.extended() && c.is_a_run(), OF_EXTENDED),
+        when!("--restart", restart, |f, c| !f.filippov() && c.is_a_run(), NOT_FILIPPOV),
+        when!("--kick-every", kick_every, |f, c| !f.filippov() && c != Use::Orbit, NOT_FILIPPOV),
+        when!("--kick-size", kick_size, |f, c| f.kicked() && c != Use::Orbit, OF_KICKS),
+        when!("--kick-law", kick_law, |f, c| f.kicked() && c != Use::Orbit, OF_KICKS),
+        when!(
             "--exit",
-            |f| f.exit.is_some(),
+            exit,
             |f, c| f.filippov() && (c.is_a_run() || c == Use::Exponent),
             "it ends the repelling sliding of a run with --switch filippov; other motion leaves it \
                 by itself, and a closed orbit has none; leave it out",
         ),
-        when(
+        when!(
             "--intersection",
-            |f| f.intersection.is_some(),
+            intersection,
             |_, _| false,
             "at the intersection of h and the second h nothing is chosen; leave it out (general \
                 systems take it)",
         ),
-        when(
+        when!(
             "--plus-probability",
-            |f| f.plus_probability.is_some(),
+            plus_probability,
             |f, c| f.exit_begins("random") && c.is_a_run(),
             "it belongs to a random --exit; leave it out, or give one such as \
                 random:exponential:0.5",
         ),
-        when(
-            "--funnel-times",
-            |f| f.funnel_times.is_some(),
-            |f, c| f.exit_begins("all") && c.is_a_run(),
-            OF_FUNNELS,
-        ),
-        when(
-            "--funnel-shortest",
-            |f| f.funnel_shortest.is_some(),
-            |f, c| f.exit_begins("all") && c.is_a_run(),
-            OF_FUNNELS,
-        ),
-        when(
-            "--funnel-longest",
-            |f| f.funnel_longest.is_some(),
-            |f, c| f.exit_begins("all") && c.is_a_run(),
-            OF_FUNNELS,
-        ),
-        when(
-            "--funnel-horizon",
-            |f| f.funnel_horizon.is_some(),
-            |f, c| f.exit_begins("all") && c.is_a_run(),
-            OF_FUNNELS,
-        ),
-        when("--seed", |f| f.seed.is_some(), |f, c| f.random() && c != Use::Orbit, OF_RANDOM),
-        when("--stream", |f| f.stream.is_some(), |f, c| f.random() && c != Use::Orbit, OF_RANDOM),
-        when(
+        when!("--funnel-times", funnel_times, RunFlags::follows_futures, OF_FUNNELS),
+        when!("--funnel-shortest", funnel_shortest, RunFlags::follows_futures, OF_FUNNELS),
+        when!("--funnel-longest", funnel_longest, RunFlags::follows_futures, OF_FUNNELS),
+        when!("--funnel-horizon", funnel_horizon, RunFlags::follows_futures, OF_FUNNELS),
+        when!("--seed", seed, |f, c| f.random() && c != Use::Orbit, OF_RANDOM),
+        when!("--stream", stream, |f, c| f.random() && c != Use::Orbit, OF_RANDOM),
+        when!(
             "--section",
-            |f| f.section.is_some(),
+            section,
             |_, c| c != Use::Exponent,
             "an exponent is an average along the whole orbit; leave it out",
         ),
-        when(
+        when!(
             "--chord",
-            |f| f.chord.is_some(),
+            chord,
             |f, command| {
                 command.records_a_path()
                     && f.section.is_none()
@@ -582,9 +521,9 @@ const EFFECTS: [Effect; 43] = {
             "it belongs to a recorded path; crossings and --every have none, and futures of a \
                 funnel are recorded at fixed points of each step",
         ),
-        when(
+        when!(
             "--every",
-            |f| f.every.is_some(),
+            every,
             |f, command| command.records_a_path() && f.section.is_none() && !f.exit_begins("all"),
             "it belongs to a recorded path; the crossings of --section are not thinned, and \
                 futures of a funnel are recorded at fixed points of each step",

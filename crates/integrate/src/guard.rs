@@ -29,7 +29,7 @@ use super::step::{Failure, Interpolant, Statistics, Step, Stepper, Tolerance};
 use twofold_num::elementary::ln;
 use twofold_num::series::HIGH_POWER;
 use twofold_num::tape::{Node, Operation, Replay};
-use twofold_num::{Elementary, Tape};
+use twofold_num::{Decimal, Elementary, Tape};
 use twofold_system::VectorField;
 use twofold_system::singular::{Ends, written_sign};
 
@@ -499,20 +499,7 @@ impl Gates {
                 Operation::Constant(_) | Operation::Parameter(_) | Operation::Pi => {
                     self.fixed[*node]
                 }
-                Operation::Add(a, b) => v[a] + v[b],
-                Operation::Sub(a, b) => v[a] - v[b],
-                Operation::Mul(a, b) => v[a] * v[b],
-                Operation::Div(a, b) => v[a] / v[b],
-                Operation::Neg(a) => -v[a],
-                Operation::Tanh(a) => Elementary::tanh(v[a]),
-                Operation::Exp(a) => Elementary::exp(v[a]),
-                Operation::Ln(a) => Elementary::ln(v[a]),
-                Operation::Sin(a) => Elementary::sin(v[a]),
-                Operation::Cos(a) => Elementary::cos(v[a]),
-                Operation::Sqrt(a) => Elementary::sqrt(v[a]),
-                Operation::Atan(a) => Elementary::atan(v[a]),
-                Operation::Erf(a) => Elementary::erf(v[a]),
-                Operation::Sign(a) => Elementary::sign(v[a]),
+                other => self.tape.apply(other, Decimal::value, |node| v[node]),
             };
         }
     }

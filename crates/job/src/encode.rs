@@ -39,14 +39,20 @@ impl<'a> Reader<'a> {
         Ok(head)
     }
 
-    fn eight(&mut self) -> Result<[u8; 8], Malformed> {
-        self.take(8)?.try_into().or_else(|_| malformed("it ends too early"))
+    /// `n` numbers of `SIZE` bytes each.
+    fn numbers<T, const SIZE: usize>(
+        &mut self,
+        n: usize,
+        read: fn([u8; SIZE]) -> T,
+    ) -> Result<Vec<T>, Malformed> {
+        let (cells, _) = self.take(SIZE * n)?.as_chunks();
+        Ok(cells.iter().copied().map(read).collect())
     }
 
     /// A count of things that take at least `size` bytes each: one that the rest cannot hold is
     /// refused before memory is taken for it.
     fn count(&mut self, size: usize) -> Result<usize, Malformed> {
-        let n = u64::from_le_bytes(self.eight()?);
+        let n = self.numbers(1, u64::from_le_bytes)?[0];
         match usize::try_from(n).ok().and_then(|n| n.checked_mul(size)) {
             Some(needed) if needed <= self.0.len() => Ok(needed / size),
             _ => malformed(format!("it speaks of {n} items but holds {} bytes", self.0.len())),
@@ -74,31 +80,17 @@ pub fn from_bits(bytes: &[u8]) -> Result<Vec<Table>, Malformed> {
             let cells = match r.take(1)? {
                 b"n" => {
                     let n = r.count(8)?;
-                    let cells = r.take(8 * n)?.chunks_exact(8);
-                    Cells::Numbers(
-                        cells
-                            .map(|c| f64::from_le_bytes(c.try_into().unwrap_or_default()))
-                            .collect(),
-                    )
+                    Cells::Numbers(r.numbers(n, f64::from_le_bytes)?)
                 }
                 b"i" => {
                     let n = r.count(8)?;
-                    let cells = r.take(8 * n)?.chunks_exact(8);
-                    Cells::Integers(
-                        cells
-                            .map(|c| i64::from_le_bytes(c.try_into().unwrap_or_default()))
-                            .collect(),
-                    )
+                    Cells::Integers(r.numbers(n, i64::from_le_bytes)?)
                 }
                 b"w" => {
                     let n = r.count(4)?;
                     let vocabulary =
                         (0..r.count(8)?).map(|_| r.text()).collect::<Result<Vec<_>, _>>()?;
-                    let codes: Vec<u32> = r
-                        .take(4 * n)?
-                        .chunks_exact(4)
-                        .map(|c| u32::from_le_bytes(c.try_into().unwrap_or_default()))
-                        .collect();
+                    let codes = r.numbers(n, u32::from_le_bytes)?;
                     if codes.iter().any(|c| *c as usize >= vocabulary.len()) {
                         return malformed("a word is not in its vocabulary");
                     }

@@ -212,62 +212,27 @@ trait Recorder<const D: usize> {
     }
 }
 
-impl<const D: usize> Recorder<D> for PathRecorder<D> {
-    fn kept(&self) -> usize {
-        self.len()
-    }
-    fn take(&mut self) -> Data<D> {
-        Data::Path(PathRecorder::take(self))
-    }
-    fn extents(&self) -> Extents {
-        PathRecorder::extents(self)
-    }
+macro_rules! recorder {
+    ($type:ident, $data:ident, $kept:expr $(, $more:ident($($argument:ident: f64)?) -> $found:ty)?) => {
+        impl<const D: usize> Recorder<D> for $type<D> {
+            fn kept(&self) -> usize {
+                let kept: fn(&Self) -> usize = $kept;
+                kept(self)
+            }
+            fn take(&mut self) -> Data<D> {
+                Data::$data($type::take(self))
+            }
+            $(fn $more(&self, $($argument: f64)?) -> $found {
+                $type::$more(self, $($argument)?)
+            })?
+        }
+    };
 }
-
-impl<const D: usize> Recorder<D> for TimesRecorder<D> {
-    fn kept(&self) -> usize {
-        self.len()
-    }
-    fn take(&mut self) -> Data<D> {
-        Data::Path(TimesRecorder::take(self))
-    }
-    fn is_behind(&self, t: f64) -> bool {
-        TimesRecorder::is_behind(self, t)
-    }
-}
-
-impl<const D: usize> Recorder<D> for SectionRecorder<D> {
-    fn kept(&self) -> usize {
-        self.crossings().len()
-    }
-    fn take(&mut self) -> Data<D> {
-        Data::Section(SectionRecorder::take(self))
-    }
-}
-
-impl<const D: usize> Recorder<D> for MotionRecorder<D> {
-    fn kept(&self) -> usize {
-        MotionRecorder::kept(self)
-    }
-    fn take(&mut self) -> Data<D> {
-        Data::Motion(MotionRecorder::take(self))
-    }
-    fn extents(&self) -> Extents {
-        MotionRecorder::extents(self)
-    }
-}
-
-impl<const D: usize> Recorder<D> for TimedMotion<D> {
-    fn kept(&self) -> usize {
-        TimedMotion::kept(self)
-    }
-    fn take(&mut self) -> Data<D> {
-        Data::Motion(TimedMotion::take(self))
-    }
-    fn is_behind(&self, t: f64) -> bool {
-        TimedMotion::is_behind(self, t)
-    }
-}
+recorder!(PathRecorder, Path, PathRecorder::len, extents() -> Extents);
+recorder!(TimesRecorder, Path, TimesRecorder::len, is_behind(t: f64) -> bool);
+recorder!(SectionRecorder, Section, |recorder| recorder.crossings().len());
+recorder!(MotionRecorder, Motion, MotionRecorder::kept, extents() -> Extents);
+recorder!(TimedMotion, Motion, TimedMotion::kept, is_behind(t: f64) -> bool);
 
 /// A run whose path is recorded; again, finer, if a state turns out to be small among the first
 /// points, which are given away only then.

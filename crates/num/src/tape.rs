@@ -262,8 +262,9 @@ impl Tape {
         values
     }
 
-    /// One operation. Variables are looked up like any other argument.
-    fn apply<S: Elementary>(
+    /// The value of one operation: `number` reads constants and parameters, `at` gives the values
+    /// of arguments and variables.
+    pub fn apply<S: Elementary>(
         &self,
         operation: Operation,
         number: impl Fn(&Decimal) -> S,
