@@ -114,10 +114,8 @@ impl<const D: usize> MotionRecorder<D> {
     }
 
     /// The recorded motion.
-    pub fn into_motion(self) -> Motion<D> {
-        let pieces =
-            self.pieces.into_iter().map(|(mode, path)| (mode, path.into_samples())).collect();
-        Motion { pieces, events: self.events }
+    pub fn into_motion(mut self) -> Motion<D> {
+        self.take()
     }
 }
 

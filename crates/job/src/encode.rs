@@ -252,9 +252,9 @@ fn quoted(cells: &Cells) -> Vec<Vec<u8>> {
     words.vocabulary.iter().map(quote).collect()
 }
 
-/// The description of a run in its CSV file, written before the run has ended.
-pub fn about_run(run: &dyn Question) -> Value {
-    json!({ "kind": run.kind(), "question": run.json() })
+/// The description of a question in the file of its answer, such as a run that has not ended.
+pub fn about_run(question: &dyn Question) -> Value {
+    json!({ "kind": question.kind(), "question": question.json() })
 }
 
 /// The CSV file of a run, part by part. Its last line holds a digest of the rows and of what it

@@ -556,18 +556,6 @@ impl PlanePanel {
         self
     }
 
-    /// Adds a polyline.
-    pub fn line(mut self, points: Vec<[f64; 2]>, style: LineStyle) -> Self {
-        self.layers.push(PlaneLayer::Line { points, style, arrow: false });
-        self
-    }
-
-    /// Adds a polyline that ends in an arrow head.
-    pub fn arrow(mut self, points: Vec<[f64; 2]>, style: LineStyle) -> Self {
-        self.layers.push(PlaneLayer::Line { points, style, arrow: true });
-        self
-    }
-
     /// Adds a filled polygon with the standard opacity of regions.
     pub fn area(mut self, outline: Vec<[f64; 2]>, colour: Colour) -> Self {
         self.layers.push(PlaneLayer::Area { outline, colour, opacity: style::SURFACE_OPACITY });
@@ -577,30 +565,6 @@ impl PlanePanel {
     /// Adds an opaque filled polygon.
     pub fn solid(mut self, outline: Vec<[f64; 2]>, colour: Colour) -> Self {
         self.layers.push(PlaneLayer::Area { outline, colour, opacity: 100 });
-        self
-    }
-
-    /// Adds markers.
-    pub fn markers(mut self, points: Vec<[f64; 2]>, style: MarkerStyle) -> Self {
-        self.layers.push(PlaneLayer::Markers { points, style });
-        self
-    }
-
-    /// Adds a text.
-    pub fn note(mut self, at: [f64; 2], text: impl Into<String>, anchor: Anchor) -> Self {
-        self.layers.push(PlaneLayer::Note(Note::new(at, text, anchor)));
-        self
-    }
-
-    /// Adds a legend entry.
-    pub fn legend(mut self, key: LegendKey, text: impl Into<String>) -> Self {
-        self.legend.push(LegendEntry::new(key, text));
-        self
-    }
-
-    /// Sets the place of the legend.
-    pub fn legend_at(mut self, corner: Corner) -> Self {
-        self.legend_corner = corner;
         self
     }
 }
@@ -720,43 +684,57 @@ impl SpacePanel {
         self.layers.push(SpaceLayer::Surface { patches, opacity: style::SURFACE_OPACITY });
         self
     }
-
-    /// Adds a curve.
-    pub fn line(mut self, points: Vec<[f64; 3]>, style: LineStyle) -> Self {
-        self.layers.push(SpaceLayer::Line { points, style, arrow: false });
-        self
-    }
-
-    /// Adds a curve that ends in an arrow head.
-    pub fn arrow(mut self, points: Vec<[f64; 3]>, style: LineStyle) -> Self {
-        self.layers.push(SpaceLayer::Line { points, style, arrow: true });
-        self
-    }
-
-    /// Adds markers.
-    pub fn markers(mut self, points: Vec<[f64; 3]>, style: MarkerStyle) -> Self {
-        self.layers.push(SpaceLayer::Markers { points, style });
-        self
-    }
-
-    /// Adds a text.
-    pub fn note(mut self, at: [f64; 3], text: impl Into<String>, anchor: Anchor) -> Self {
-        self.layers.push(SpaceLayer::Note(Note::new(at, text, anchor)));
-        self
-    }
-
-    /// Adds a legend entry.
-    pub fn legend(mut self, key: LegendKey, text: impl Into<String>) -> Self {
-        self.legend.push(LegendEntry::new(key, text));
-        self
-    }
-
-    /// Sets the place of the legend.
-    pub fn legend_at(mut self, corner: Corner) -> Self {
-        self.legend_corner = corner;
-        self
-    }
 }
+
+/// What panels of either kind are made of.
+macro_rules! layers {
+    ($panel:ident, $layer:ident, $dimensions:literal) => {
+        impl $panel {
+            /// Adds a polyline.
+            pub fn line(mut self, points: Vec<[f64; $dimensions]>, style: LineStyle) -> Self {
+                self.layers.push($layer::Line { points, style, arrow: false });
+                self
+            }
+
+            /// Adds a polyline that ends in an arrow head.
+            pub fn arrow(mut self, points: Vec<[f64; $dimensions]>, style: LineStyle) -> Self {
+                self.layers.push($layer::Line { points, style, arrow: true });
+                self
+            }
+
+            /// Adds markers.
+            pub fn markers(mut self, points: Vec<[f64; $dimensions]>, style: MarkerStyle) -> Self {
+                self.layers.push($layer::Markers { points, style });
+                self
+            }
+
+            /// Adds a text.
+            pub fn note(
+                mut self,
+                at: [f64; $dimensions],
+                text: impl Into<String>,
+                anchor: Anchor,
+            ) -> Self {
+                self.layers.push($layer::Note(Note::new(at, text, anchor)));
+                self
+            }
+
+            /// Adds a legend entry.
+            pub fn legend(mut self, key: LegendKey, text: impl Into<String>) -> Self {
+                self.legend.push(LegendEntry::new(key, text));
+                self
+            }
+
+            /// Sets the place of the legend.
+            pub fn legend_at(mut self, corner: Corner) -> Self {
+                self.legend_corner = corner;
+                self
+            }
+        }
+    };
+}
+layers!(PlanePanel, PlaneLayer, 2);
+layers!(SpacePanel, SpaceLayer, 3);
 
 /// The patches of a surface given by a function on a grid of `nu` by `nv` cells over `u` and `v`,
 /// coloured by the cell's centre. `point(u, v)` gives the position, `colour(u, v)` the region.

@@ -2,8 +2,6 @@
 
 use std::sync::Arc;
 
-use serde_json::json;
-
 use crate::analyse::lyapunov::{Exponent, LyapunovOptions, Sign};
 use crate::cli::ending;
 use crate::cli::flags::{RunFlags, Use};
@@ -13,7 +11,7 @@ use crate::cli::speak::{Delivery, deliver, try_delivery, with_error};
 use crate::cli::{self, CliError};
 use crate::integrate::StepCap;
 use crate::job::general::{GeneralExponents, GeneralRun, MeanRate};
-use crate::job::{AnyQuestion, Executor, JobError, LargestExponent, Question, Stop, encode};
+use crate::job::{AnyQuestion, Executor, JobError, LargestExponent, Stop, encode};
 
 /// The largest Lyapunov exponent of the orbit from the start, with its 95 % interval: the mean rate
 /// at which a tangent vector grows. Of Filippov motion and of general systems all exponents.
@@ -165,9 +163,7 @@ pub fn run(arguments: &Arguments) -> Result<cli::Exit, CliError> {
     }
     let found: Exponent = answer.fact("exponent").map_err(JobError::from)?;
     let bytes = match format {
-        Format::Json => {
-            encode::json(&answer, &json!({ "kind": question.kind(), "question": question.json() }))
-        }
+        Format::Json => encode::json(&answer, &encode::about_run(&question)),
         Format::Text => {
             let half_width: f64 = answer.fact("half_width").map_err(JobError::from)?;
             let sign: Sign = answer.fact("sign").map_err(JobError::from)?;
@@ -215,9 +211,7 @@ fn of_general(arguments: &Arguments, question: &GeneralExponents) -> Result<cli:
     let (from, until): (f64, f64) =
         (answer.fact("from").map_err(fact)?, answer.fact("to").map_err(fact)?);
     let bytes = match format {
-        Format::Json => {
-            encode::json(&answer, &json!({ "kind": question.kind(), "question": question.json() }))
-        }
+        Format::Json => encode::json(&answer, &encode::about_run(question)),
         Format::Text => {
             let mut text = String::new();
             for (i, MeanRate { value, half_width }) in found.iter().enumerate() {

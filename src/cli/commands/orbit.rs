@@ -285,9 +285,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
                 "facts": answer.facts });
             encode::csv(answer.table("branch").unwrap_or(&answer.tables[0]), &about)
         }
-        Format::Json => {
-            encode::json(&answer, &json!({ "kind": question.kind(), "question": question.json() }))
-        }
+        Format::Json => encode::json(&answer, &encode::about_run(&question)),
     };
     if !matches!(format, Format::Text) {
         say_branch(question.along.as_ref(), &answer, &progress);
@@ -319,7 +317,7 @@ fn of_general(arguments: &Arguments, question: &GeneralOrbit) -> Result<Exit, Cl
     };
     let fact = |e| CliError::Job(JobError::Fact(e));
     let names = question.run.model.coordinates();
-    let about = json!({ "kind": question.kind(), "question": question.json() });
+    let about = encode::about_run(question);
     if answer.facts.contains_key("rest") {
         let bytes = match format {
             Format::Json => encode::json(&answer, &about),

@@ -1,6 +1,7 @@
 //! `twofold plot`: a picture of any run.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use clap::ValueEnum;
 
@@ -15,7 +16,7 @@ use crate::hybrid::motion::Record;
 use crate::job::general::GeneralRun;
 use crate::job::question::question_hash;
 use crate::job::spec::RunSpec;
-use crate::job::{Answer, Executor, JobError, Run, Stop, encode};
+use crate::job::{Answer, Executor, JobError, Stop, encode};
 use crate::paper::plots::Recorded;
 use crate::paper::wording;
 use crate::record;
@@ -177,28 +178,24 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
                 out",
         ));
     }
-    let recorded = match &arguments.from {
-        Some(file) => {
-            if let Some(flag) = arguments.flags.first_given() {
-                return Err(CliError::no_effect(
-                    flag,
-                    "--from gives a whole run that is computed already; leave one of the two out",
-                ));
-            }
-            Some(recorded(file)?)
+    let (run, answer) = if let Some(file) = &arguments.from {
+        if let Some(flag) = arguments.flags.first_given() {
+            return Err(CliError::no_effect(
+                flag,
+                "--from gives a whole run that is computed already; leave one of the two out",
+            ));
         }
-        None => None,
+        let (spec, answer) = recorded(file)?;
+        (Recorded::Surfaces(spec), Some(Arc::new(answer)))
+    } else if let Some(mut run) = general::run_of(&arguments.flags)? {
+        if let (None, Record::Path { chord }) = (arguments.flags.chord, &mut run.options.record) {
+            *chord = 1e-4;
+        }
+        (Recorded::General(run, arguments.flags.section.clone()), None)
+    } else {
+        (Recorded::Surfaces(arguments.flags.spec(Use::Picture)?), None)
     };
-    if arguments.from.is_none()
-        && let Some(run) = general::run_of(&arguments.flags)?
-    {
-        return draw_general(arguments, run, format);
-    }
-    let spec = match &recorded {
-        Some((spec, _)) => spec.clone(),
-        None => arguments.flags.spec(Use::Picture)?,
-    };
-    let frame = plot::Frame::from(&spec);
+    let (frame, question) = (run.frame(), run.question());
     let look = look(arguments, &frame)?;
     let unsuitable =
         |e: plot::PlotError| CliError::Usage(format!("--kind {}: {e}", look.kind.word()));
@@ -206,14 +203,20 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     plot::axes(&frame, look.kind, &look.axes).map_err(unsuitable)?;
     try_delivery(Some(&arguments.out))?;
     let progress = Progress::new(arguments.quiet);
-    if recorded.is_none() {
-        progress.say_default_switch(&arguments.flags, &[]);
-    }
-    let answer = match recorded {
-        Some((_, answer)) => answer,
-        None => (*Executor::new(None, &progress).ask(&Run(spec.clone()))?).clone(),
+    let answer = match answer {
+        Some(answer) => answer,
+        None => {
+            progress.say_default_switch(&arguments.flags, &[]);
+            Executor::new(None, &progress).ask(&*question)?
+        }
     };
-    let mut small_print = small_print(&spec);
+    let (method, mut small_print) = match &run {
+        Recorded::Surfaces(spec) => (spec.method.name.name(), small_print(spec)),
+        Recorded::General(run, _) => {
+            let end: f64 = answer.fact("t").map_err(JobError::from)?;
+            (run.options.method.name(), vec![general_small_print(run, end)])
+        }
+    };
     if answer.stop == Stop::Interrupted {
         small_print.push("an interrupted run: this is what was computed until then".into());
     }
@@ -222,51 +225,15 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
         .provenance("Software", concat!("twofold ", env!("CARGO_PKG_VERSION")))
         .provenance("Picture", format!("plot-{}", look.kind.word()))
         .provenance("Reading", "none")
-        .provenance("Method", spec.method.name.name())
-        .provenance("Spec-SHA256", question_hash(&Run(spec.clone())).as_str())
+        .provenance("Method", method)
+        .provenance("Spec-SHA256", question_hash(&*question).as_str())
         .provenance("Data-SHA256", record::Hash::of(&encode::bits(&answer.tables)).as_str());
     sheet.searchable_svg = arguments.searchable;
     write(&sheet, &arguments.out, format)?;
-    Ok(Exit::Fine)
-}
-
-/// Draws the run of a general system.
-fn draw_general(
-    arguments: &Arguments,
-    mut run: GeneralRun,
-    format: Format,
-) -> Result<Exit, CliError> {
-    if arguments.flags.chord.is_none()
-        && let Record::Path { chord } = &mut run.options.record
-    {
-        *chord = 1e-4;
-    }
-    let recorded = Recorded::General(run.clone(), arguments.flags.section.clone());
-    let frame = recorded.frame();
-    let look = look(arguments, &frame)?;
-    let unsuitable =
-        |e: plot::PlotError| CliError::Usage(format!("--kind {}: {e}", look.kind.word()));
-    plot::axes(&frame, look.kind, &look.axes).map_err(unsuitable)?;
-    try_delivery(Some(&arguments.out))?;
-    let progress = Progress::new(arguments.quiet);
-    progress.say_default_switch(&arguments.flags, &[]);
-    let answer = Executor::new(None, &progress).ask(&run)?;
-    let end: f64 = answer.fact("t").map_err(JobError::from)?;
-    let mut small_print = vec![general_small_print(&run, end)];
-    if answer.stop == Stop::Interrupted {
-        small_print.push("an interrupted run: this is what was computed until then".into());
-    }
-    let mut sheet = plot::sheet(&frame, &answer, &look, small_print)
-        .map_err(unsuitable)?
-        .provenance("Software", concat!("twofold ", env!("CARGO_PKG_VERSION")))
-        .provenance("Picture", format!("plot-{}", look.kind.word()))
-        .provenance("Reading", "none")
-        .provenance("Method", run.options.method.name())
-        .provenance("Spec-SHA256", record::Hash::of_json(&run.about()).as_str())
-        .provenance("Data-SHA256", record::Hash::of(&encode::bits(&answer.tables)).as_str());
-    sheet.searchable_svg = arguments.searchable;
-    write(&sheet, &arguments.out, format)?;
-    Ok(said_how_it_ended(&run, &answer))
+    Ok(match &run {
+        Recorded::General(run, _) => said_how_it_ended(run, &answer),
+        Recorded::Surfaces(_) => Exit::Fine,
+    })
 }
 
 /// The run of a general system up to the time `end` in words.

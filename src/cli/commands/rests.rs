@@ -1,12 +1,10 @@
 //! `twofold rests`: finds equilibria and pseudo-equilibria.
 
-use serde_json::json;
-
 use crate::cli::models;
 use crate::cli::speak::{Delivery, deliver, state_in_words, try_delivery};
 use crate::cli::{CliError, Exit, ending};
 use crate::job::general::{Family, GeneralRests, RestPlace, Resting};
-use crate::job::{Executor, JobError, Question, encode};
+use crate::job::{Executor, JobError, encode};
 
 /// Find the rests of a system in a box: equilibria of its fields and pseudo-equilibria on its
 /// switching surfaces, with eigenvalues and stability.
@@ -102,9 +100,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
             }
             format!("{}\n", lines.join("\n")).into_bytes()
         }
-        Format::Json => {
-            encode::json(&answer, &json!({ "kind": question.kind(), "question": question.json() }))
-        }
+        Format::Json => encode::json(&answer, &encode::about_run(&question)),
     };
     deliver(out, &bytes)?;
     Ok(Exit::Fine)

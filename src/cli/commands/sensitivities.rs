@@ -2,14 +2,12 @@
 
 use std::fmt::Write as _;
 
-use serde_json::json;
-
 use crate::cli::flags::RunFlags;
 use crate::cli::speak::{Delivery, deliver, try_delivery};
 use crate::cli::{CliError, Exit, ending, general};
 use crate::hybrid::motion::sensitivity::parameters;
 use crate::job::general::GeneralSensitivities;
-use crate::job::{Executor, JobError, Question, encode};
+use crate::job::{Executor, JobError, encode};
 
 /// Derivatives of the state at the end of a run by its start and its parameters, through every
 /// switch, slide and reset on the way.
@@ -83,7 +81,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
     try_delivery(out)?;
     let answer = Executor::quiet().ask(&question)?;
     let table = answer.table("sensitivities").ok_or(CliError::Job(JobError::Interrupted))?;
-    let about = json!({ "kind": question.kind(), "question": question.json() });
+    let about = encode::about_run(&question);
     let bytes = match format {
         Format::Json => encode::json(&answer, &about),
         Format::Csv => encode::csv(table, &about),
