@@ -3,7 +3,7 @@
 //! order 5 with its collocation polynomial (Hairer & Wanner 1996, sec. IV.8), and Taylor series.
 //! What the multistep method makes is made elsewhere ([`Multistep`]) and read as a series is.
 
-use twofold_num::linear::solve_any;
+use twofold_num::linear::{Blocks, solve_any};
 
 use crate::history::Multistep;
 
@@ -299,7 +299,7 @@ impl Step {
             }
             matrix
         };
-        let mut matrix = matrix_of([jacobian; 3]);
+        let mut matrix = Blocks::new(matrix_of([jacobian; 3]), m);
         let mut z = vec![0.0; m];
         let known: Vec<f64> = (0..n)
             .map(|i| self.x[i].abs().max((h * self.k[0][i]).abs()).max(LEAST_STATE))
@@ -355,7 +355,7 @@ impl Step {
                         slopes_beside(self.t + c[s] * h, &at, &f[s], jacobian, rhs)
                     })
                     .collect();
-                matrix = matrix_of([&slopes[0], &slopes[1], &slopes[2]]);
+                matrix = Blocks::new(matrix_of([&slopes[0], &slopes[1], &slopes[2]]), m);
                 at_end = slopes.into_iter().next_back();
             }
             let mut right = vec![0.0; m];
@@ -365,7 +365,8 @@ impl Step {
                     right[p * n + i] = h * sum - z[p * n + i];
                 }
             }
-            let Some(found) = solve_any(&matrix, &right, 0.0) else { return false };
+            let found = matrix.as_ref().and_then(|matrix| matrix.solve(&right));
+            let Some(found) = found else { return false };
             change = found;
             let moved: Vec<bool> = z.iter().map(|z| *z != 0.0).collect();
             z.iter_mut().zip(&change).for_each(|(z, d)| *z += d);
@@ -425,7 +426,8 @@ impl Step {
                     if i == j { 1.0 } else { 0.0 } - gamma * h * jacobian[i * n + j];
             }
         }
-        let Some(estimate) = solve_any(&system, &right, 0.0) else { return false };
+        let estimate = Blocks::new(system, n).and_then(|system| system.solve(&right));
+        let Some(estimate) = estimate else { return false };
         self.estimate = estimate;
         for s in 1..7 {
             self.k[s].copy_from_slice(&f[2]);

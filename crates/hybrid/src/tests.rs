@@ -6592,3 +6592,16 @@ fn a_table_of_previous_values_ends_with_its_last_row() {
         }
     }
 }
+
+#[test]
+fn a_state_that_stays_zero_takes_no_rounding_from_a_large_factor() {
+    // A flag that an event sets; rounding of T, over the factor, was its whole size.
+    let text = "states = ['T', 'q']\nstart = [1, 0]\nf = ['-0.3*T + 1e6*q', '0']\n\
+        [[event]]\nat = 10\nset = { q = '3e-7' }";
+    for method in Method::ALL {
+        let options = Options { t_end: 20.0, method, ..Options::default() };
+        let end = follow(&model(text), &options, &mut |_| true).unwrap();
+        near(end.x[0], 1.0 + (f64::exp(-3.0) - 1.0) * f64::exp(-3.0), 1e-8);
+        assert!(end.steps < 2_000, "{method:?}: {} steps", end.steps);
+    }
+}
