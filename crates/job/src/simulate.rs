@@ -213,7 +213,10 @@ trait Recorder<const D: usize> {
 }
 
 macro_rules! recorder {
-    ($type:ident, $data:ident, $kept:expr $(, $more:ident($($argument:ident: f64)?) -> $found:ty)?) => {
+    (
+        $type:ident, $data:ident, $kept:expr
+        $(, $more:ident($($argument:ident: f64)?) -> $found:ty)?
+    ) => {
         impl<const D: usize> Recorder<D> for $type<D> {
             fn kept(&self) -> usize {
                 let kept: fn(&Self) -> usize = $kept;

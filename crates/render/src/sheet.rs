@@ -686,7 +686,7 @@ impl SpacePanel {
     }
 }
 
-/// What panels of either kind are made of.
+/// Builders that panels of either kind have.
 macro_rules! layers {
     ($panel:ident, $layer:ident, $dimensions:literal) => {
         impl $panel {
