@@ -314,6 +314,17 @@ const MOST_JUMPS: usize = 32;
 /// Derivatives of watched values that are smaller parts of their terms than this are zero.
 const SMALLEST_SLOPE: f64 = 1e-11;
 
+/// By which numbers speeds are differentiated.
+#[derive(Clone, Copy)]
+enum By<'a> {
+    /// States and time along the field.
+    Field,
+    /// One variable.
+    Variable(usize),
+    /// States in a direction.
+    Direction(&'a [f64]),
+}
+
 /// A condition that a step is searched for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Sought {

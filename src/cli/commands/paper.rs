@@ -171,7 +171,7 @@ pub fn run(arguments: &Arguments) -> Result<Exit, CliError> {
                 print(&if same { format!("{score}; all the same as expected") } else { score })?;
                 let new = findings.iter().filter(|f| f.state == State::New).count();
                 if new > 0 {
-                    // What fails is not blessed, nor anything beside it.
+                    // Beside what fails nothing is blessed.
                     let fails = findings.iter().any(|f| matches!(f.state, State::Failed { .. }));
                     let keep = if fails { "once nothing fails keep them" } else { "keep them" };
                     print(&format!(

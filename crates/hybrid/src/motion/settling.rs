@@ -9,7 +9,6 @@ use twofold_system::expression::{Function, General};
 
 use super::locate::TANGENT;
 use super::meeting::DRIFT;
-use super::sliding::By;
 use super::*;
 use crate::cells;
 use crate::equation::{Gate, same_sign};

@@ -27,17 +27,6 @@ const LITTLE: f64 = 1e-9;
 /// the limit of weights by a line.
 const BACK: f64 = 1e-5;
 
-/// By which numbers speeds are differentiated.
-#[derive(Clone, Copy)]
-pub(super) enum By<'a> {
-    /// States and time along the field.
-    Field,
-    /// One variable.
-    Variable(usize),
-    /// States in a direction.
-    Direction(&'a [f64]),
-}
-
 impl Follower<'_> {
     pub(super) fn load(&self, config: &Configuration) -> Vec<f64> {
         let n = self.n;

@@ -159,7 +159,7 @@ impl Program {
         }
     }
 
-    #[inline]
+    #[inline(never)]
     fn run_alone<S: Elementary, R: Results<S> + ?Sized>(&self, r: &mut R, out: &mut [S]) {
         self.run(r, &Own, out);
     }
