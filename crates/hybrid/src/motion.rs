@@ -1187,7 +1187,7 @@ impl<'a> Follower<'a> {
             // Times at which something is known to happen.
             if clock.next().is_some_and(|time| time <= self.t) {
                 let met = self.met_here();
-                if let Some(ending) = self.on_time(&mut clock, &definition, &met, observe)? {
+                if let Some(ending) = self.on_time(&mut clock, definition, &met, observe)? {
                     return Ok(ending);
                 }
                 h = 0.0;
@@ -1261,7 +1261,7 @@ impl<'a> Follower<'a> {
             {
                 h = 0.0;
                 let before = self.before(&met)?;
-                if let Some(ending) = self.meet(&definition, &met, &[], observe)? {
+                if let Some(ending) = self.meet(definition, &met, &[], observe)? {
                     return Ok(ending);
                 }
                 self.after(before)?;
@@ -1519,7 +1519,7 @@ impl<'a> Follower<'a> {
                 Some(time) => {
                     self.t = time;
                     self.meet_here(&mut met);
-                    self.on_time(&mut clock, &definition, &met, observe)?
+                    self.on_time(&mut clock, definition, &met, observe)?
                 }
                 None => {
                     // Functions that are zero to rounding where sliding ends decide with it.
@@ -1527,7 +1527,7 @@ impl<'a> Follower<'a> {
                         self.meet_here(&mut met);
                     }
                     let before = self.before(&met)?;
-                    let ending = self.meet(&definition, &met, &[], observe)?;
+                    let ending = self.meet(definition, &met, &[], observe)?;
                     if ending.is_none() {
                         self.after(before)?;
                     }

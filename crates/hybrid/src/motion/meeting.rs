@@ -1002,8 +1002,8 @@ impl Follower<'_> {
     pub(super) fn rest_on_stops(&mut self) -> Result<(), HybridError> {
         let model = self.model;
         let definition = model.definition();
-        while let Some(event) = (0..self.watch_side.len()).find_map(|i| self.lies(&definition, i)) {
-            if !self.stick(&definition, &[event], self.t)? {
+        while let Some(event) = (0..self.watch_side.len()).find_map(|i| self.lies(definition, i)) {
+            if !self.stick(definition, &[event], self.t)? {
                 break;
             }
             self.hold_guards()?;
