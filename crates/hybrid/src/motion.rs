@@ -1181,7 +1181,7 @@ impl<'a> Follower<'a> {
                 self.next_record = ((self.t / every).floor() + 1.0) * every;
             }
         }
-        let (mut last_values, mut list) = (Vec::new(), Vec::new());
+        let (mut last_values, mut list, mut found) = (Vec::new(), Vec::new(), Vec::new());
         let mut room = vec![0.0; self.n];
         loop {
             // Times at which something is known to happen.
@@ -1408,7 +1408,7 @@ impl<'a> Follower<'a> {
                 Method::Taylor | Method::Lsoda => f64::INFINITY,
                 _ => wanted * factor,
             };
-            let found = self.find(&step, &list, &parts, &mut last_values);
+            self.find(&step, &list, &parts, &mut last_values, &mut found);
             let earliest = found.iter().map(|(theta, _)| *theta).fold(f64::INFINITY, f64::min);
             // The domain of what decides the field ends before anything is met: shorter steps come
             // nearer to its end.
@@ -1870,8 +1870,7 @@ impl<'a> Follower<'a> {
             direction.push(rates.direction(*place));
         }
         if !self.sliding.is_empty() {
-            let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; self.n]);
-            self.rhs(t, &x, &mut field);
+            let field = self.velocity();
             let along = Self::along(&self.compiled, &self.variables, &field);
             for ((_, place, _), direction) in near.iter().zip(&mut direction) {
                 if along[*place].abs() > SMALLEST_SLOPE * rates.terms[*place] {

@@ -167,31 +167,39 @@ impl Step {
             self.jacobian = Some(jacobian);
             return;
         }
-        for s in 1..7 {
-            let (done, open) = self.k.split_at_mut(s);
-            for i in 0..n {
-                let mut sum = 0.0;
-                for (a, k) in A[s].iter().zip(done.iter()) {
-                    sum += a * k[i];
-                }
-                self.stage[i] = self.x[i] + h * sum;
-            }
-            rhs(self.t + C[s] * h, &self.stage, &mut open[0]);
-        }
+        self.stage::<1>(h, rhs);
+        self.stage::<2>(h, rhs);
+        self.stage::<3>(h, rhs);
+        self.stage::<4>(h, rhs);
+        self.stage::<5>(h, rhs);
+        self.stage::<6>(h, rhs);
         // The last stage is at the end.
         std::mem::swap(&mut self.y, &mut self.stage);
+        let k: [&[f64]; 7] = std::array::from_fn(|s| &self.k[s][..n]);
+        let [a, b, c, d] = self.extension.each_mut().map(|e| &mut e[..n]);
+        let (x, y) = (&self.x[..n], &self.y[..n]);
         for i in 0..n {
-            let difference = self.y[i] - self.x[i];
-            let bend = h * self.k[0][i] - difference;
-            self.extension[0][i] = difference;
-            self.extension[1][i] = bend;
-            self.extension[2][i] = difference - h * self.k[6][i] - bend;
-            let mut sum = 0.0;
-            for (d, k) in D.iter().zip(&self.k) {
-                sum += d * k[i];
-            }
-            self.extension[3][i] = h * sum;
+            let difference = y[i] - x[i];
+            let bend = h * k[0][i] - difference;
+            a[i] = difference;
+            b[i] = bend;
+            c[i] = difference - h * k[6][i] - bend;
+            d[i] = h * D.iter().zip(k).fold(0.0, |sum, (d, k)| sum + d * k[i]);
         }
+    }
+
+    /// Stage `S`, counted from 0, of an explicit step. With the number of terms known, their sum is
+    /// no loop.
+    fn stage<const S: usize>(&mut self, h: f64, rhs: &mut RightHandSide<'_>) {
+        let n = self.x.len();
+        let (done, open) = self.k.split_at_mut(S);
+        let done: [&[f64]; S] = std::array::from_fn(|s| &done[s][..n]);
+        let (x, stage) = (&self.x[..n], &mut self.stage[..n]);
+        for i in 0..n {
+            let sum = (0..S).fold(0.0, |sum, s| sum + A[S][s] * done[s][i]);
+            stage[i] = x[i] + h * sum;
+        }
+        rhs(self.t + C[S] * h, &self.stage, &mut open[0]);
     }
 
     /// A step of the series, with a look at the field in its middle and at its end (the defect:

@@ -11,41 +11,32 @@ const MAY_HIDE: f64 = 1e3;
 pub(super) const TANGENT: f64 = 1e-3;
 
 impl Follower<'_> {
-    /// First condition met in a step, with its place and all others in the same part of the step;
-    /// `last` takes the values at the end of the search.
+    /// Finds the first condition met in a step, with its place and all others in the same part of
+    /// the step; `last` takes the values at the end of the search.
     pub(super) fn find(
         &mut self,
         step: &Step,
         list: &[(Sought, f64)],
         parts: &[(f64, f64)],
         last: &mut Vec<f64>,
-    ) -> Vec<(f64, Sought)> {
-        let mut found = Vec::new();
+        found: &mut Vec<(f64, Sought)>,
+    ) {
+        found.clear();
         self.leaves = None;
         if list.is_empty() {
-            return found;
+            return;
         }
-        let ends = match step.series {
-            Some(_) => self.find_in_series(step, list, parts.len() <= 1, &mut found),
-            None => self.find_in_polynomials(step, list, &mut found),
+        let open = match step.series {
+            Some(_) => self.find_in_series(step, list, parts.len() <= 1, last, found),
+            None if self.find_in_polynomials(step, list, last, found) => Vec::new(),
+            None => vec![true; list.len()],
         };
-        match ends.iter().copied().collect() {
-            Some(ends) => *last = ends,
-            None => {
-                let open: Vec<bool> = ends.iter().map(Option::is_none).collect();
-                let whole = [(0.0, 1.0)];
-                self.find_by_values(
-                    step,
-                    list,
-                    &open,
-                    if parts.is_empty() { &whole } else { parts },
-                    &mut found,
-                );
-                std::mem::swap(last, &mut self.samples[4]);
-            }
+        let parts = if parts.is_empty() { &[(0.0, 1.0)] } else { parts };
+        if open.contains(&true) {
+            self.find_by_values(step, list, &open, parts, found);
+            std::mem::swap(last, &mut self.samples[4]);
         }
-        self.tell_rounding(step, list, parts, &mut found);
-        found
+        self.tell_rounding(step, list, parts, found);
     }
 
     /// Passes over zeros, right at the beginning of a step, of functions that the conditions of
@@ -61,7 +52,7 @@ impl Follower<'_> {
         const EARLY: f64 = 1e-6;
         /// A zero that counts has one side beyond rounding at so many times its place, or before.
         const LATER: [f64; 4] = [0.5, 1.0, 2.0, 8.0];
-        let (mut at, mut value) = (vec![0.0; self.n], Vec::new());
+        let mut value = Vec::new();
         for (theta, sought) in found.iter_mut().filter(|(theta, _)| *theta < EARLY) {
             let Sought::Guard { guard, .. } = *sought else { continue };
             let Some((_, side)) = list.iter().find(|(one, _)| one == sought) else { continue };
@@ -70,7 +61,7 @@ impl Follower<'_> {
             }
             let expression = &self.equation.guards[guard].expression;
             let rounding = 64.0 * f64::EPSILON * self.magnitude(expression);
-            let one = [(*sought, *side)];
+            let (one, mut at) = ([(*sought, *side)], vec![0.0; self.n]);
             let mut f = |theta: f64| {
                 step.at(theta, &mut at);
                 self.measure(&one, step.t + theta * step.h, &at, &mut value);
@@ -79,9 +70,7 @@ impl Follower<'_> {
             if !LATER.iter().all(|later| f(later * *theta).abs() <= rounding) {
                 continue;
             }
-            let whole = [(0.0, 1.0)];
             let begin = LATER[3] * *theta;
-            let parts = if parts.is_empty() { &whole } else { parts };
             *theta = f64::INFINITY;
             // As far beyond zero as rounding may be.
             let mut f = |theta: f64| f(theta) + side * rounding;
@@ -97,29 +86,31 @@ impl Follower<'_> {
     }
 
     /// Adds the first zeros if all conditions are sums of states, which are polynomials in a step
-    /// and need no evaluation. Returns their values at the step's end, or `None` for each.
+    /// and need no evaluation, and sets their values at the step's end; else false.
     fn find_in_polynomials(
         &mut self,
         step: &Step,
         list: &[(Sought, f64)],
+        last: &mut Vec<f64>,
         found: &mut Vec<(f64, Sought)>,
-    ) -> Vec<Option<f64>> {
+    ) -> bool {
         let polynomial = |sought: Sought| {
             self.polynomial_of(step, sought).filter(|(b, _)| b.iter().all(|b| b.is_finite()))
         };
         let Some(all) =
             list.iter().map(|(sought, _)| polynomial(*sought)).collect::<Option<Vec<_>>>()
         else {
-            return vec![None; list.len()];
+            return false;
         };
-        let end = |((sought, side), (b, size)): (&(Sought, f64), ([f64; 5], f64))| {
+        last.clear();
+        for ((sought, side), (b, size)) in list.iter().zip(all) {
             let mut v = PLACES.map(|theta| at_fraction(&b, theta));
-            let end = v[4];
+            last.push(v[4]);
             let allowance = self.allowance(step, *sought, *side);
             if allowance != 0.0 {
                 v.iter_mut().for_each(|v| *v += allowance);
                 found.extend(first_of_polynomial(v, *side).map(|theta| (theta, *sought)));
-                return Some(end);
+                continue;
             }
             let change = self.begin_at_zero(*sought, *side, step.h, &mut v);
             let (slope, bend) = (4.0 * (b[1] - b[0]), 12.0 * (b[2] - 2.0 * b[1] + b[0]));
@@ -129,7 +120,7 @@ impl Follower<'_> {
                 && let Some(theta) = self.hidden(leaving, step.h)
             {
                 found.extend((theta <= 1.0).then_some((theta, *sought)));
-                return Some(end);
+                continue;
             }
             let first = match change {
                 None => first_of_polynomial(v, *side),
@@ -139,9 +130,8 @@ impl Follower<'_> {
                 }
             };
             found.extend(first.map(|theta| (theta, *sought)));
-            Some(end)
-        };
-        list.iter().zip(all).map(end).collect()
+        }
+        true
     }
 
     /// Puts the values, at [`PLACES`] of a time `h`, of a function that has just left zero, or that
@@ -250,21 +240,24 @@ impl Follower<'_> {
         values.iter().all(|v| v.abs() <= MOST * error)
     }
 
-    /// Adds the first zero of each function's Taylor series; returns the values at the step's end
-    /// where there is a series.
+    /// Adds the first zero of each function's Taylor series and sets the values at the step's end;
+    /// returns which functions have no series.
     fn find_in_series(
         &mut self,
         step: &Step,
         list: &[(Sought, f64)],
         is_whole: bool,
+        last: &mut Vec<f64>,
         found: &mut Vec<(f64, Sought)>,
-    ) -> Vec<Option<f64>> {
+    ) -> Vec<bool> {
         let fresh = list.iter().any(|(sought, _)| self.is_fresh(*sought));
         let terms = if fresh { self.rates(&self.config.clone()).1.terms } else { Vec::new() };
-        let (mut ends, mut at, mut value) = (Vec::new(), vec![0.0; self.n], Vec::new());
+        let (mut open, mut at, mut value) = (Vec::new(), vec![0.0; self.n], Vec::new());
+        last.clear();
         for (sought, side) in list {
             let series = self.series_of(step, *sought, is_whole);
-            ends.push(series.as_ref().map(|c| c.iter().rev().sum()));
+            open.push(series.is_none());
+            last.push(series.as_ref().map_or(f64::NAN, |c| c.iter().rev().sum()));
             let Some(mut c) = series else { continue };
             let allowance = self.allowance(step, *sought, *side);
             c[0] += allowance;
@@ -288,7 +281,7 @@ impl Follower<'_> {
             let first = first_of_series(&c, *side, begins, &mut f);
             found.extend(first.map(|theta| (theta, *sought)));
         }
-        ends
+        open
     }
 
     /// Adds the first zeros of the conditions that are `open`, from values at five places of each

@@ -492,9 +492,8 @@ impl Follower<'_> {
             return Err(HybridError::Stuck { t: self.t, x: old, why });
         }
         let changed = new != old || left_behind.iter().any(|x| *x != old);
-        let none = vec![false; self.watch_side.len()];
         self.x.copy_from_slice(&old);
-        let kept = if mode.is_some() { self.kept_at_zero() } else { none };
+        let kept = mode.map(|_| self.kept_at_zero());
         for i in (0..self.n).filter(|i| new[*i] != old[*i]) {
             self.lately[i] = new[i].abs();
             self.before[i] = new[i].abs();
@@ -553,7 +552,8 @@ impl Follower<'_> {
                 {
                     continue;
                 }
-                if kept[i] && self.is_asked(i) && now.abs() <= DRIFT * self.magnitude(e) {
+                let is_kept = kept.as_ref().is_some_and(|kept| kept[i]);
+                if is_kept && self.is_asked(i) && now.abs() <= DRIFT * self.magnitude(e) {
                     self.begin_watching_kept(i);
                 } else {
                     self.begin_watching(i, lies || watched.contains(&i), met);
@@ -950,8 +950,8 @@ impl Follower<'_> {
         let event = &self.model.definition().events()[event];
         let (watched, mut config) = (place - self.compiled.active.len(), self.config.clone());
         config.mode = event.mode.unwrap_or(config.mode);
-        let (old, mut field) = (self.x.clone(), vec![0.0; self.n]);
-        self.rhs(self.t, &old, &mut field);
+        let field = self.velocity();
+        let old = self.x.clone();
         let brief = self.brief(&field);
         let ahead: Vec<f64> = old.iter().zip(&field).map(|(x, f)| x + brief * f).collect();
         self.x.copy_from_slice(&ahead);
@@ -1026,8 +1026,7 @@ impl Follower<'_> {
             return None;
         }
         // Functions that are zero with it are so on neither side, or beside it.
-        let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; self.n]);
-        self.rhs(t, &x, &mut field);
+        let field = self.velocity();
         let along = self.direction_of_reset(event, i, &field).0;
         let active = self.compiled.active.iter().copied();
         let zero = active.filter(|g| !self.equation.guards[*g].whole && !self.slides[*g]);
@@ -1175,8 +1174,7 @@ impl Follower<'_> {
         if set.len() < 2 {
             return Ok(());
         }
-        let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; self.n]);
-        self.rhs(t, &x, &mut field);
+        let field = self.velocity();
         self.watched_values();
         if let (_, Some(state)) = self.direction_of_reset(event, watched, &field) {
             return Err(self.changes_at_rest(event, state));
@@ -1270,8 +1268,8 @@ impl Follower<'_> {
             self.leaves_rest_alone(*event)?;
         }
         // The remaining time of the infinitely many events.
-        let (now, x, mut rate) = (self.t, self.x.clone(), vec![0.0; self.n]);
-        self.rhs(now, &x, &mut rate);
+        let rate = self.velocity();
+        let now = self.t;
         for i in 0..self.n {
             self.x[i] += (t - now) * rate[i];
         }
@@ -1737,8 +1735,8 @@ impl Follower<'_> {
             return false;
         }
         let x = self.nearest_meeting(&near, &values);
-        let (here, mut field) = (self.x.clone(), vec![0.0; self.n]);
-        self.rhs(self.t, &here, &mut field);
+        let field = self.velocity();
+        let here = self.x.clone();
         let fastest = field.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
         let reach = FASTER * fastest * (limit - self.t);
         if x.iter().zip(&here).any(|(a, b)| !((a - b).abs() <= reach)) {

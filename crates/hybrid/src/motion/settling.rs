@@ -1640,8 +1640,8 @@ impl Follower<'_> {
         // A function that rests at zero is equal there.
         let open = |g: &usize| !self.sliding.contains(g) && !self.equation.rests(*g, &self.config);
         let open: Vec<usize> = zero.iter().copied().filter(open).collect();
-        let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; self.n]);
-        self.rhs(t, &x, &mut field);
+        let field = self.velocity();
+        let (t, x) = (self.t, self.x.clone());
         for guard in open {
             // On a kink both sides have one field, whatever rounding makes of it.
             if self.equation.guards[guard].kink {
@@ -1901,8 +1901,7 @@ impl Follower<'_> {
         if self.contacts.is_empty() {
             return Vec::new();
         }
-        let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; self.n]);
-        self.rhs(t, &x, &mut field);
+        let field = self.velocity();
         self.watched_values();
         let by: Vec<Vec<f64>> = (0..=self.n).map(|i| self.second_along(&field, Some(i))).collect();
         let rows = |contact: &Contact| {
@@ -2053,8 +2052,8 @@ impl Follower<'_> {
         }
         // Where the motion slides or rests its speed is not that of one field.
         if !self.sliding.is_empty() || !self.contacts.is_empty() {
-            let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; self.n]);
-            self.rhs(t, &x, &mut field);
+            let field = self.velocity();
+            let (t, x) = (self.t, self.x.clone());
             self.variables[..self.n].copy_from_slice(&x);
             self.variables[self.n] = t;
             let slope = Self::along(&self.compiled, &self.variables, &field)[place];
@@ -2125,8 +2124,7 @@ impl Follower<'_> {
             return false;
         }
         let place = self.compiled.active.len() + i;
-        let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; self.n]);
-        self.rhs(t, &x, &mut field);
+        let field = self.velocity();
         let speed = self.speed_along(place, &field);
         let small = 1e-13 * self.magnitude(&self.equation.watched[i]);
         if (speed * self.brief(&field)).abs() > small {
@@ -2142,8 +2140,7 @@ impl Follower<'_> {
     pub(super) fn turns(&mut self, i: usize) -> bool {
         let Some(event) = self.event_of[i] else { return false };
         let place = self.compiled.active.len() + i;
-        let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; self.n]);
-        self.rhs(t, &x, &mut field);
+        let field = self.velocity();
         self.watched_values();
         let changes_speed = |(state, _): &(usize, Expression)| {
             self.second_along(&field, Some(*state))[place] != 0.0
@@ -2166,8 +2163,8 @@ impl Follower<'_> {
 
     /// A watched value a brief time ahead, and twice that time.
     fn watched_ahead(&mut self, place: usize) -> [f64; 2] {
-        let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; self.n]);
-        self.rhs(t, &x, &mut field);
+        let field = self.velocity();
+        let (t, x) = (self.t, self.x.clone());
         let brief = self.brief(&field);
         [brief, 2.0 * brief].map(|h| {
             let mut rhs = |t: f64, x: &[f64]| {
@@ -2232,8 +2229,7 @@ impl Follower<'_> {
             if event_now.sticks || !self.is_asked(i) {
                 continue;
             }
-            let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; self.n]);
-            self.rhs(t, &x, &mut field);
+            let field = self.velocity();
             let place = self.compiled.active.len() + i;
             self.watched_values();
             let bend = self.second_along(&field, None)[place];
@@ -2292,8 +2288,8 @@ impl Follower<'_> {
         /// Roundings that may come together.
         const ROUNDINGS: f64 = 64.0;
         let n = self.n;
-        let (t, x, mut field) = (self.t, self.x.clone(), vec![0.0; n]);
-        self.rhs(t, &x, &mut field);
+        let field = self.velocity();
+        let (t, x) = (self.t, self.x.clone());
         let place = self.compiled.active.len() + i;
         let time = Range::new(t, f64::EPSILON * t.abs());
         let rest = self.variables[n + 1..].iter().map(|v| Range::from_f64(*v));

@@ -324,6 +324,13 @@ impl Follower<'_> {
         }
     }
 
+    /// The velocity at the present time and state.
+    pub(super) fn velocity(&mut self) -> Vec<f64> {
+        let (x, mut velocity) = (self.x.clone(), vec![0.0; self.n]);
+        self.rhs(self.t, &x, &mut velocity);
+        velocity
+    }
+
     /// The velocity without what contacts add to it.
     fn mixed(&mut self, t: f64, x: &[f64], out: &mut [f64]) {
         let n = self.n;
