@@ -168,6 +168,52 @@ fn readme_shows_what_commands_print() {
     assert_eq!(shown, 1);
 }
 
+/// The rows of a table of `make bench-work-precision`: a problem's ratios by error, and how many
+/// are at most 0.4.
+fn ratios(table: &str) -> Vec<(&str, Vec<f64>, &str)> {
+    let rows = table.lines().skip(2).take_while(|line| line.starts_with('|'));
+    rows.map(|line| {
+        let cells: Vec<&str> = line.trim_matches('|').split('|').map(str::trim).collect();
+        let (numbers, met) = (&cells[1..cells.len() - 1], cells[cells.len() - 1]);
+        (cells[0], numbers.iter().map(|c| c.parse().unwrap()).collect(), met)
+    })
+    .collect()
+}
+
+/// The speeds of README and docs/performance.md are those that the benchmark wrote.
+#[test]
+fn speeds_are_those_of_the_benchmark() {
+    let results = text("benches/work-precision/results.md");
+    let mut tables = results.split("\n| problem |").skip(1);
+    let [all, files] = [tables.next().unwrap(), tables.next().unwrap()].map(ratios);
+    let range = |rows: &[(&str, Vec<f64>, &str)], places: usize| {
+        let all = rows.iter().flat_map(|row| row.1.iter().copied());
+        let (low, high) =
+            all.fold((f64::INFINITY, 0.0_f64), |(a, b), ratio| (a.min(ratio), b.max(ratio)));
+        format!("{low:.places$}–{high:.places$}")
+    };
+    let smooth = "W1, set A, to t = 54; W1, set B, to t = 13; closed orbit, five periods";
+    assert_eq!([all[0].0, all[1].0, all[2].0].join("; "), smooth);
+    let said = format!(
+        "At equal errors smooth runs take {} of the best other solver's time (from files {}), \
+            Filippov's {} (",
+        range(&all[..3], 2),
+        range(&files[..3], 2),
+        range(&all[3..4], 0)
+    );
+    let readme = text("README.md").replace('\n', " ").replace("([measured]", "(");
+    assert!(readme.contains(&said), "README does not say: {said}");
+    let page = text("docs/performance.md").replace("[sliding](glossary.md#sliding)", "sliding");
+    for (problem, ratios, met) in all {
+        let cell = |i: usize| {
+            let places = if ratios[i] < 9.95 { 2 } else { 1 };
+            format!("{:.places$}", ratios[i])
+        };
+        let row = format!("| {problem} | {} | {met} |", [0, 2, 4, 6, 8].map(cell).join(" | "));
+        assert!(page.contains(&row), "docs/performance.md has no row: {row}");
+    }
+}
+
 #[test]
 fn the_commands_and_tests_behind_the_numbers_exist() {
     let help = |arguments: &[&str]| {
