@@ -62,19 +62,8 @@ impl Follower<'_> {
         }
         for (i, side) in self.watch_side.iter().enumerate() {
             let place = compiled.active.len() + i;
-            if self.held[i] || !self.is_asked(i) {
-                continue;
-            }
-            if *side != 0.0
-                && !self.fresh_watch[i]
-                && self.stays_away(step, &ranges, place, 0.0, *side)
-            {
-                continue;
-            }
-            if *side != 0.0
-                && !self.contacts.iter().any(|c| c.watched == i)
-                && !self.stands_still(step, place)
-            {
+            let away = || !self.fresh_watch[i] && self.stays_away(step, &ranges, place, 0.0, *side);
+            if self.is_sought(i) && !away() && !self.stands_still(step, place) {
                 list.push((Sought::Watched(i), *side));
             }
         }
@@ -93,6 +82,14 @@ impl Follower<'_> {
                 list.push((Sought::Beyond(at), beyond.side));
             }
         }
+    }
+
+    /// Whether a watched expression is one that steps are searched for.
+    pub(super) fn is_sought(&self, i: usize) -> bool {
+        self.watch_side[i] != 0.0
+            && !self.held[i]
+            && self.is_asked(i)
+            && !self.contacts.iter().any(|c| c.watched == i)
     }
 
     /// Whether the equations are continuous where this function is zero, and in the whole step it

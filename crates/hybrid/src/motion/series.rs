@@ -43,6 +43,8 @@ struct Key {
     sliding: Vec<usize>,
     /// Of each contact its watched expression and the bits of the direction that it keeps.
     contacts: Vec<(usize, Vec<u64>)>,
+    /// Whether each watched expression is sought.
+    sought: Vec<bool>,
     pivots: Vec<usize>,
 }
 
@@ -156,6 +158,7 @@ impl Follower<'_> {
             signs: signs.map(|(side, guard)| guard.whole || *side > 0.0).collect(),
             sliding: self.sliding.clone(),
             contacts: self.contacts.iter().map(direction_kept).collect(),
+            sought: (0..self.watch_side.len()).map(|i| self.is_sought(i)).collect(),
             pivots: orders,
         };
         if !self.expansions.known.contains_key(&key) {
@@ -259,7 +262,8 @@ impl Follower<'_> {
             let before = [p.saturating_sub(3).max(1), p.saturating_sub(2).max(1)];
             let places = if last.iter().any(|k| c[*k] != 0.0) { last } else { before };
             for k in places {
-                if c[k] == 0.0 {
+                // Of its first term alone nothing is known: [`Follower::is_followed`] looks.
+                if c[k] == 0.0 || !is_state && c[..k].iter().all(|c| *c == 0.0) {
                     continue;
                 }
                 // States below the least one count for nothing, as in the scale of a step.
@@ -279,7 +283,8 @@ impl Follower<'_> {
                 }
                 if !is_state || self.options.atol.is_none() {
                     // By what it moves, as in the scale of a step.
-                    for j in 1..k.min(4) {
+                    let most = if is_state { k.min(4) } else { k };
+                    for j in 1..most {
                         h = h
                             .max(rough_pow(0.1 * rtol * (c[j] / c[k]).abs(), 1.0 / (k - j) as f64));
                     }
@@ -518,9 +523,9 @@ impl Follower<'_> {
         let mut others = Vec::new();
         let places = (0..self.compiled.outputs).filter(|place| {
             let slides = self.compiled.active.get(*place).is_some_and(|guard| self.slides[*guard]);
-            let rests =
-                self.contacts.iter().any(|c| self.compiled.active.len() + c.watched == *place);
-            !slides && !rests && self.compiled.affine[*place].is_none()
+            let watched = place.checked_sub(self.compiled.active.len());
+            let sought = watched.is_none_or(|i| self.is_sought(i));
+            !slides && sought && self.compiled.affine[*place].is_none()
         });
         for place in places {
             followed.push(Followed::Value(place));

@@ -549,3 +549,27 @@ fn a_state_that_stays_zero_takes_no_rounding_from_a_large_factor() {
         assert!(end.steps < 2_000, "{method:?}: {} steps", end.steps);
     }
 }
+
+/// Series of what is asked alone, and of what begins like t^5: a ball that a table carries and
+/// throws up, whose gap is another mode's event and stays zero (parabolas and a sine); Bouc and
+/// Wen's hysteresis from rest (SciPy's DOP853 at 1e-13, from switch to switch).
+#[test]
+fn series_follow_what_is_sought_alone_and_what_begins_late() {
+    let table = "states = ['x', 'v']\nstart = [0, 7.78002]\n[let]\ns = '1.524*sin(5.105*t)'\n\
+        u = '7.78002*cos(5.105*t)'\na = '-39.7170021*sin(5.105*t)'\n\
+        [modes.contact]\nf = ['u', 'a']\n[modes.flight]\nf = ['v', '-9.81']\n\
+        [[event]]\nwhen = 'a + 9.81 < 0'\nfrom = 'contact'\nmode = 'flight'\n\
+        [[event]]\nwhen = 'x - s'\ndirection = 'down'\nfrom = 'flight'\nmode = 'contact'\n\
+        set = { x = 's', v = 'u' }";
+    let wen = "states = ['x', 'v', 'z']\nstart = [0, 0, 0]\n\
+        f = ['v', 'sin(t) - x - z', 'v*(1 - 0.5*sign(v*z)*z^2)']";
+    for method in Method::ALL {
+        let x = end_of(table, 2.123, method).unwrap_or_else(|e| panic!("{method:?}: {e}"));
+        near(x[0], -1.505_098_584_920_3, 2e-9);
+        near(x[1], -1.221_517_266_365_2, 2e-9);
+        let x = end_of(wen, 20.0, method).unwrap_or_else(|e| panic!("{method:?}: {e}"));
+        for (x, want) in x.iter().zip([0.76844161, 0.62990974, 0.78152524]) {
+            near(*x, want, 2e-8);
+        }
+    }
+}
