@@ -858,6 +858,16 @@ impl Follower<'_> {
         self.leaves.is_some_and(|(i, size)| sought == Sought::Watched(i) && value.abs() <= size)
     }
 
+    /// Whether a value is as small as the rounding of its expression's terms.
+    fn is_rounding_of(&self, sought: Sought, value: f64) -> bool {
+        let e = match sought {
+            Sought::Guard { guard, .. } => &self.equation.guards[guard].expression,
+            Sought::Watched(i) => &self.equation.watched[i],
+            _ => return false,
+        };
+        value.abs() <= 64.0 * f64::EPSILON * self.magnitude(e)
+    }
+
     /// A bound on the rounding of a watched expression's value: that of its terms, and of the time,
     /// by which they move at these speeds.
     pub(super) fn grain_of(&self, watched: usize, speeds: f64) -> f64 {
@@ -1463,7 +1473,10 @@ impl Follower<'_> {
             return;
         }
         for ((sought, side), value) in list.iter().zip(end) {
-            if value * side < 0.0 && self.is_within_error(*sought, &[*value]) {
+            // Nor has what is on its side by no more than rounding left zero yet.
+            if (value * side < 0.0 || self.is_rounding_of(*sought, *value))
+                && self.is_within_error(*sought, &[*value])
+            {
                 continue;
             }
             match *sought {

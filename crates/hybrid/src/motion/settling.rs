@@ -858,9 +858,18 @@ impl Follower<'_> {
                     .iter()
                     .zip(set.iter().map(|i| place[*i].map_or(0.0, |p| rates.direction(p))))
                     .map(|(i, direction)| {
-                        let whole = follower.equation.guards[zero[*i]].whole;
-                        if direction == 0.0 && !whole {
-                            follower.side_ahead_in(config, zero[*i])
+                        let guard = zero[*i];
+                        let turns = |p: usize| rates.first_or_zero(p) == 0.0;
+                        if follower.equation.guards[guard].whole {
+                            direction
+                        } else if direction == 0.0 {
+                            follower.side_ahead_in(config, guard)
+                        } else if let Some(place) = place[*i].filter(|p| turns(*p))
+                            && follower.equation.is_of_conditions(guard)
+                        {
+                            let time = 0.01 * follower.whole_time(&rates.field);
+                            let ahead = follower.values_ahead(config, &[], guard, [0.005, 0.01]);
+                            ahead.map_or(direction, |v| side_of(rates.second[place], time, v))
                         } else {
                             direction
                         }
@@ -1338,10 +1347,14 @@ impl Follower<'_> {
             self.fresh_guard[*guard] = true;
             self.tangent_guard[*guard] = false;
         }
-        if k > 1 || some_noise.get() || self.touching[zero[0]] {
+        // A condition that leaves zero to third order does so without a speed, too.
+        let of_conditions = |guard: &usize| self.equation.is_of_conditions(*guard);
+        if k > 1 || some_noise.get() || self.touching[zero[0]] || zero.iter().any(of_conditions) {
             let (_, place, rates, _) = vertex(self, &|i| ways[i] == Way::Plus);
             for (guard, place) in zero.iter().zip(&place) {
-                let tangent = |p: usize| rates.first_or_zero(p) == 0.0 && rates.direction(p) != 0.0;
+                let turns =
+                    |p: usize| rates.direction(p) != 0.0 || self.equation.is_of_conditions(*guard);
+                let tangent = |p: usize| rates.first_or_zero(p) == 0.0 && turns(p);
                 self.tangent_guard[*guard] = place.is_some_and(tangent);
             }
         }
@@ -2087,8 +2100,12 @@ impl Follower<'_> {
             rates.first[place] = 0.0;
         }
         self.tangent[i] = !met && rates.first_or_zero(place) == 0.0;
-        let direction = rates.direction(place);
-        self.watch_side[i] = if direction == 0.0 { self.side_ahead(place) } else { direction };
+        self.watch_side[i] = if rates.first_or_zero(place) == 0.0 {
+            let field = self.velocity();
+            side_of(bend, 2.0 * self.brief(&field), self.watched_ahead(place))
+        } else {
+            rates.direction(place)
+        };
     }
 
     /// The speed of a watched value along a field, at the state that the variables hold.
@@ -2113,8 +2130,7 @@ impl Follower<'_> {
     /// The side to which a watched value of third order or more leaves zero: it grows by more than
     /// a square. 0 if it stays.
     pub(super) fn side_ahead(&mut self, place: usize) -> f64 {
-        let [near, far] = self.watched_ahead(place);
-        if same_sign(near, far) && far.abs() > 5.0 * near.abs() { far.signum() } else { 0.0 }
+        side_of(0.0, 0.0, self.watched_ahead(place))
     }
 
     /// Whether a watched expression that is zero and whose event changes its speed stays there, as
@@ -2417,4 +2433,22 @@ pub(super) fn mixtures_differ(fields: &[Vec<f64>]) -> bool {
     };
     (0..fields.len())
         .any(|v| (0..n).any(|i| (fields[0][i] + added(v, i) - fields[v][i]).abs() > 1e-9 * size))
+}
+
+/// The side to which a function without a speed leaves zero: that of its second derivative, or, if
+/// this is zero or no more than an error beside the values after a time and half of it, the one to
+/// which it grows by more than a square; 0 if it stays.
+fn side_of(bend: f64, time: f64, [half, whole]: [f64; 2]) -> f64 {
+    /// Of the larger value.
+    const ERROR: f64 = 1e-6;
+    let bend = if bend.is_finite() { bend } else { 0.0 };
+    let grows = same_sign(half, whole) && whole.abs() > 5.0 * half.abs();
+    let square = 0.5 * bend.abs() * time * time;
+    if grows && square <= ERROR * whole.abs() {
+        whole.signum()
+    } else if bend != 0.0 {
+        bend.signum()
+    } else {
+        0.0
+    }
 }

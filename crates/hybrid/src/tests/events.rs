@@ -783,6 +783,56 @@ fn what_leaves_zero_to_third_order_is_not_met_at_once() {
     }
 }
 
+/// x = (t - 1)^3/3 from the start of a mode at t = 1, which rounding may put a little before: the
+/// second derivative there is rounding. x^3 v of x = t^3/6 leaves zero like t^11.
+#[test]
+fn rounding_does_not_decide_where_higher_orders_do() {
+    let cube = "states = ['x', 'n']\nstart = [-1, 0]\n[modes.a]\nf = ['1', '0']\n[modes.b]\n\
+        f = ['(t - 1)^2', '0']\n[[event]]\nwhen = 'x'\nfrom = 'a'\nmode = 'b'\n\
+        [[event]]\nwhen = 'x'\nfrom = 'b'\nset = { n = 'n + 1' }";
+    let product = "states = ['x', 'v', 'n']\nstart = [0, 0, 0]\nf = ['v', 't', '0']\n\
+        [[event]]\nwhen = 'x^3*v'\nset = { n = 'n + 1' }";
+    for method in Method::ALL {
+        let x = end_of(cube, 3.0, method).unwrap_or_else(|e| panic!("{method:?}: {e}"));
+        near(x[0], 8.0 / 3.0, 1e-9);
+        assert_eq!(x[1], 0.0, "{method:?}");
+        let x = end_of(product, 10.0, method).unwrap_or_else(|e| panic!("{method:?}: {e}"));
+        near(x[0], 1000.0 / 6.0, 1e-7);
+        assert_eq!(x[2], 0.0, "{method:?}");
+    }
+}
+
+/// A loop whose rail is left, and met again by a condition that leaves zero to third order: the
+/// flights are parabolas, and between them the pendulum's (SciPy's DOP853 at 1e-13).
+#[test]
+fn a_condition_that_leaves_zero_to_third_order_is_not_met_at_once() {
+    let text = |speed: f64, friction: f64| {
+        format!(
+            "states = ['th', 'om', 'x', 'y', 'vx', 'vy']\nstart = [0, {speed}, 0, 0, 0, 0]\n\
+            [modes.on]\nf = ['om', '-9.81*sin(th) - {friction}*om', '0', '0', '0', '0']\n\
+            [modes.fly]\nf = ['0', '0', 'vx', 'vy', '0', '-9.81']\n\
+            [[event]]\nwhen = 'om^2 + 9.81*cos(th)'\ndirection = 'down'\nfrom = 'on'\n\
+            mode = 'fly'\nset = {{ x = 'sin(th)', y = '-cos(th)', vx = 'om*cos(th)', \
+            vy = 'om*sin(th)' }}\n\
+            [[event]]\nwhen = 'x^2 + y^2 > 1'\nfrom = 'fly'\nmode = 'on'\n\
+            set = {{ th = 'atan2(x, -y)', om = '0.9*(vx*(-y) + vy*x)' }}"
+        )
+    };
+    for (speed, friction, want) in [
+        (4.715, 0.0, [-1.2968865, -2.33405868]),
+        (4.619, 0.156, [-1.16783838, 0.09786029]),
+        (4.809, 0.0, [-1.26391883, -2.46058763]),
+        (6.143, 0.18, [-0.22048716, 0.52770361]),
+    ] {
+        for method in Method::ALL {
+            let x = end_of(&text(speed, friction), 4.0, method)
+                .unwrap_or_else(|e| panic!("{method:?} {speed}: {e}"));
+            near(x[0], want[0], 2e-8);
+            near(x[1], want[1], 2e-8);
+        }
+    }
+}
+
 /// Anti-windup that compares the limited signal, which stays at its limit, is the one that compares
 /// the signal itself.
 #[test]
