@@ -104,16 +104,22 @@ impl Follower<'_> {
             return false;
         }
         let (n, rtol) = (self.n, self.options.rtol);
-        let expression = self.equation.guards[guard].expression.clone();
-        let small = ERRORS * rtol * self.magnitude(&expression);
+        let small = ERRORS * rtol * self.magnitude(&self.equation.guards[guard].expression);
         let places = [0.0, 0.5, 1.0].map(|theta| {
             let mut x = vec![0.0; n];
             step.at(theta, &mut x);
             (step.t + theta * step.h, x)
         });
-        let near =
-            |(t, x): &(f64, Vec<f64>)| self.equation.value(&expression, *t, x).abs() <= small;
-        if !places.iter().all(near) {
+        // With the other functions' sides and the tables' pieces as they are in the step.
+        let Some(place) = self.compiled.place(guard) else { return false };
+        let mut values = vec![0.0; self.compiled.outputs];
+        let mut near = |(t, x): &(f64, Vec<f64>)| {
+            self.variables[..n].copy_from_slice(x);
+            self.variables[n] = *t;
+            self.compiled.watched.evaluate(&self.variables, &mut values);
+            values[place].abs() <= small
+        };
+        if !places.iter().all(&mut near) {
             return false;
         }
         let mut other = self.config.clone();

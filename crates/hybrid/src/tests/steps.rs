@@ -550,6 +550,27 @@ fn a_state_that_stays_zero_takes_no_rounding_from_a_large_factor() {
     }
 }
 
+/// A dead zone that is dragged along comes to its edge like an exponential, and its input steps
+/// later: what step the input makes there says nothing about the edge before.
+#[test]
+fn an_edge_that_is_approached_does_not_see_later_steps() {
+    let by_if = "states = ['x']\nstart = [0]\n\
+        f = ['24.7*min(u - x + 0.224, 0) + 24.7*max(u - x - 0.224, 0)']\n\
+        [let]\nu = 'if(t >= 1.699, 0, -0.85)'";
+    let by_table = "states = ['x']\nstart = [0]\n\
+        f = ['max(20*(u - x - 0.2), 0) + min(20*(u - x + 0.2), 0)']\n\
+        [tables.u]\nfile = 'u.csv'\ntime = 't'\ncolumn = 'u'\ninterpolation = 'previous'";
+    for method in Method::ALL {
+        let x = end_of(by_if, 8.0, method).unwrap_or_else(|e| panic!("{method:?}: {e}"));
+        near(x[0], -0.224, 1e-10);
+        let table = model(by_table).with_table("u", "t,u\n0,0\n0.5,-1\n2,0\n7,-1\n8,0\n").unwrap();
+        let options = Options { t_end: 8.0, method, ..Options::default() };
+        let x =
+            follow(&table, &options, &mut |_| true).unwrap_or_else(|e| panic!("{method:?}: {e}")).x;
+        near(x[0], -0.8 + 0.6 * (-20.0_f64).exp(), 2e-11);
+    }
+}
+
 /// Series of what is asked alone, and of what begins like t^5: a ball that a table carries and
 /// throws up, whose gap is another mode's event and stays zero (parabolas and a sine); Bouc and
 /// Wen's hysteresis from rest (SciPy's DOP853 at 1e-13, from switch to switch).
