@@ -724,9 +724,12 @@ impl Follower<'_> {
         let place: Vec<Range> = place.into_iter().chain(rest).collect();
         let mut arguments = vec![Range::default(); compiled.gates.len()];
         compiled.gate_arguments.evaluate(&place, &mut arguments);
-        let is_zero = |(gate, d): (&Gate, &Range)| {
-            *gate == Gate::Divisor && !d.is_beyond(0.0, 1.0) && !d.is_beyond(0.0, -1.0)
+        // Of a root of zero among its terms rounding has no bound, and its value says it.
+        let may_vanish = |d: &Range| match d.radius().is_finite() {
+            true => !d.is_beyond(0.0, 1.0) && !d.is_beyond(0.0, -1.0),
+            false => !(d.middle().abs() > 0.0),
         };
+        let is_zero = |(gate, d): (&Gate, &Range)| *gate == Gate::Divisor && may_vanish(d);
         compiled.gates.iter().zip(&arguments).any(is_zero)
     }
 

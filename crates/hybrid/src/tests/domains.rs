@@ -847,3 +847,19 @@ fn an_empty_tank_is_refilled_where_a_table_passes_zero() {
         near(x[0], (2.875 * root).powi(2), 1e-10);
     }
 }
+
+/// A divisor with a root that is zero at the start, as that of friction in the plane from rest,
+/// is no pole: SciPy's DOP853 at 1e-13.
+#[test]
+fn a_root_of_zero_in_a_divisor_is_no_pole() {
+    let text = "states = ['x', 'y', 'vx', 'vy']\nstart = [1, 0.5, 0, 0]\n\
+        f = ['vx', 'vy', '-x - 0.5*vx/(s + 1e-3)', '-2*y - 0.5*vy/(s + 1e-3)']\n\
+        [let]\ns = 'sqrt(vx^2 + vy^2)'";
+    for method in Method::ALL {
+        let x = end_of(text, 1.0, method).unwrap_or_else(|e| panic!("{method:?}: {e}"));
+        for (x, want) in x.iter().zip([0.70306394513, 0.22356371197, -0.5374477367, -0.46053079016])
+        {
+            near(*x, want, 1e-8);
+        }
+    }
+}
