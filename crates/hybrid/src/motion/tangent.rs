@@ -12,6 +12,7 @@
 
 use super::{Ending, Follower, HybridError, Options, Record, Sought};
 use crate::Model;
+use crate::equation::Compiled;
 use crate::step::{A, C, E, Step};
 use twofold_num::elementary::{ln, rough_pow, sqrt};
 use twofold_num::fit::line;
@@ -42,7 +43,8 @@ const GAUSS_3: ([f64; 3], [[f64; 3]; 3]) = {
 };
 
 type D = Dual<f64, 1>;
-type DD = Dual<D, 1>;
+/// Directions in which derivatives are taken at once; many systems have fewer states.
+const WIDE: usize = 4;
 
 /// Tangent vectors, and the reset that an event has just made.
 #[derive(Clone, Debug, Default)]
@@ -169,25 +171,22 @@ impl Follower<'_> {
     pub(super) fn jacobian(&mut self, t: f64, x: &[f64]) -> Vec<f64> {
         let n = self.n;
         let mut matrix = vec![0.0; n * n];
-        for j in 0..n {
-            let mut unit = vec![0.0; n];
-            unit[j] = 1.0;
-            for (i, slope) in self.slope_along(t, x, &unit).into_iter().enumerate() {
-                matrix[i * n + j] = slope;
-            }
-        }
-        if !self.sliding.is_empty() {
-            // A mixture that holds a state has no slope there but rounding's.
-            let mut low = vec![D::constant(0.0); n];
-            for j in 0..n {
-                let mut v: Vec<D> = self.variables.iter().map(|v| D::constant(*v)).collect();
-                v[j].partials = [1.0];
+        let mut low = vec![Dual::<f64, WIDE>::constant(0.0); n];
+        for first in (0..n).step_by(WIDE) {
+            let unit = |j: usize| std::array::from_fn(|k| if j == first + k { 1.0 } else { 0.0 });
+            let slopes = self.slopes_in::<WIDE>(t, x, &unit);
+            if !self.sliding.is_empty() {
+                let constants = self.variables.iter().map(|v| Dual::constant(*v));
+                let mut v: Vec<Dual<f64, WIDE>> = constants.collect();
+                (0..n).for_each(|j| v[j].partials = unit(j));
                 self.compiled.field.evaluate(&v, &mut low);
-                for (i, of_side) in low.iter().enumerate() {
-                    let slope = &mut matrix[i * n + j];
-                    if slope.abs() <= 1e-13 * of_side.partials[0].abs() {
-                        *slope = 0.0;
-                    }
+            }
+            for (i, slopes) in slopes.iter().enumerate() {
+                for (j, slope) in (first..n).zip(slopes) {
+                    // A mixture that holds a state has no slope there but rounding's.
+                    let of_side = low[i].partials[j - first];
+                    let held = !self.sliding.is_empty() && slope.abs() <= 1e-13 * of_side.abs();
+                    matrix[i * n + j] = if held { 0.0 } else { *slope };
                 }
             }
         }
@@ -297,49 +296,71 @@ impl Follower<'_> {
 
     /// The derivative of the field in the direction `v`, sliding included.
     fn slope_along(&mut self, t: f64, x: &[f64], v: &[f64]) -> Vec<f64> {
+        self.slopes_in::<1>(t, x, &|i| [v[i]]).into_iter().flatten().collect()
+    }
+
+    /// The same in several directions, of which `along` has the components of a state.
+    fn slopes_in<const P: usize>(
+        &mut self,
+        t: f64,
+        x: &[f64],
+        along: &dyn Fn(usize) -> [f64; P],
+    ) -> Vec<[f64; P]> {
+        type D<const P: usize> = Dual<f64, P>;
         let n = self.n;
-        let load = |variables: &[f64]| -> Vec<D> {
-            let mut duals: Vec<D> = variables.iter().map(|v| D::constant(*v)).collect();
+        let load = |variables: &[f64]| -> Vec<D<P>> {
+            let mut duals: Vec<D<P>> = variables.iter().map(|v| D::constant(*v)).collect();
             for i in 0..n {
-                duals[i] = Dual { value: x[i], partials: [v[i]] };
+                duals[i] = Dual { value: x[i], partials: along(i) };
             }
             duals[n] = D::constant(t);
             duals
         };
-        let field = |compiled: &crate::equation::Compiled, variables: &[D]| {
+        let field = |compiled: &Compiled, variables: &[D<P>]| {
             let mut out = vec![D::constant(0.0); n];
             compiled.field.evaluate(variables, &mut out);
             out
         };
-        let along =
-            |compiled: &crate::equation::Compiled, variables: &[D], field: &[D]| -> Vec<D> {
-                let nested: Vec<DD> = variables
-                    .iter()
-                    .enumerate()
-                    .map(|(i, value)| {
-                        let partial = match i {
-                            i if i < n => field[i],
-                            i if i == n => D::constant(1.0),
-                            _ => D::constant(0.0),
-                        };
-                        Dual { value: *value, partials: [partial] }
-                    })
-                    .collect();
-                let mut out = vec![DD::constant(D::constant(0.0)); compiled.outputs];
-                compiled.watched.evaluate(&nested, &mut out);
-                out.iter().map(|d| d.partials[0]).collect()
+        let rates = |compiled: &Compiled, variables: &[D<P>], field: &[D<P>]| -> Vec<D<P>> {
+            let zero = D::constant(0.0);
+            let speed = |i: usize| match i {
+                i if i < n => field[i],
+                i if i == n => D::constant(1.0),
+                _ => zero,
             };
+            let nest = |(i, value): (usize, &D<P>)| Dual { value: *value, partials: [speed(i)] };
+            let nested: Vec<Dual<D<P>, 1>> = variables.iter().enumerate().map(nest).collect();
+            let mut out = vec![Dual::constant(zero); compiled.outputs];
+            compiled.watched.evaluate(&nested, &mut out);
+            out.iter().map(|d| d.partials[0]).collect()
+        };
         let variables = load(&self.variables);
         let low = field(&self.compiled, &variables);
         let k = self.sliding.len();
         if k == 0 {
-            return low.iter().map(|d| d.partials[0]).collect();
+            return low.iter().map(|d| d.partials).collect();
         }
-        let place = |compiled: &crate::equation::Compiled, guard: usize| {
+        let place = |compiled: &Compiled, guard: usize| {
             compiled.active.iter().position(|g| *g == guard).unwrap_or(0)
         };
-        let rates = along(&self.compiled, &variables, &low);
-        let a: Vec<D> = self.sliding.iter().map(|g| rates[place(&self.compiled, *g)]).collect();
+        let speeds = rates(&self.compiled, &variables, &low);
+        let a: Vec<D<P>> = self.sliding.iter().map(|g| speeds[place(&self.compiled, *g)]).collect();
+        if let Some(owners) = &self.separate {
+            let mut v = variables;
+            for guard in &self.sliding {
+                let up = if self.equation.guards[*guard].whole { 1.0 } else { 2.0 };
+                v[n + 1 + guard].value += up;
+            }
+            let high = field(&self.compiled, &v);
+            let all = rates(&self.compiled, &v, &high);
+            let speeds = self.sliding.iter().map(|g| all[place(&self.compiled, *g)]);
+            let weights: Vec<D<P>> = a.iter().zip(speeds).map(|(a, b)| -*a / (b - *a)).collect();
+            let mixed = low.iter().zip(&high).zip(owners).map(|((low, high), owner)| match owner {
+                Some(place) => *low + weights[*place] * (*high - *low),
+                None => *low,
+            });
+            return mixed.map(|d| d.partials).collect();
+        }
         let mut columns = Vec::with_capacity(k);
         for (column, guard) in self.sliding.iter().enumerate() {
             let (compiled, mut v) = match self.base.get(column) {
@@ -351,8 +372,9 @@ impl Follower<'_> {
                 v[n + 1 + guard].value += up;
             }
             let high = field(&compiled, &v);
-            let rates = along(&compiled, &v, &high);
-            let speeds: Vec<D> = self.sliding.iter().map(|g| rates[place(&compiled, *g)]).collect();
+            let all = rates(&compiled, &v, &high);
+            let speeds: Vec<D<P>> =
+                self.sliding.iter().map(|g| all[place(&compiled, *g)]).collect();
             columns.push((high, speeds));
         }
         let mut matrix = vec![D::constant(0.0); k * k];
@@ -368,7 +390,7 @@ impl Follower<'_> {
                 out[i] += *weight * (high[i] - low[i]);
             }
         }
-        out.iter().map(|d| d.partials[0]).collect()
+        out.iter().map(|d| d.partials).collect()
     }
 
     /// Begins to carry these vectors. Of a motion that begins in sliding they lose what is normal
@@ -763,7 +785,10 @@ fn has_inverse(matrix: &[f64], sizes: &[f64]) -> bool {
 const FLAT: f64 = 1e-12;
 
 /// Elimination with pivots on numbers that carry a derivative.
-fn solve_duals(mut a: Vec<D>, mut b: Vec<D>) -> Vec<D> {
+fn solve_duals<const P: usize>(
+    mut a: Vec<Dual<f64, P>>,
+    mut b: Vec<Dual<f64, P>>,
+) -> Vec<Dual<f64, P>> {
     let k = b.len();
     for c in 0..k {
         let size = |i: &usize| a[*i * k + c].value.abs();
