@@ -1918,6 +1918,11 @@ impl Writer<'_> {
                 None => Recorded::one(),
             },
             General::Floor => self.whole(&list[0]),
+            // Of constants it is a number, never beyond zero by the rounding of a product.
+            General::Mod if list.iter().all(|e| self.equation.constant(e).is_some()) => {
+                let value = self.equation.value(&Expression::Apply(f, list.to_vec()), 0.0, &[]);
+                Recorded::from_f64(value)
+            }
             General::Mod => {
                 let whole = self.whole(&quotient(list));
                 let (a, b) = (self.number(&list[0]), self.number(&list[1]));

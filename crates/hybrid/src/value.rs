@@ -46,7 +46,11 @@ pub fn evaluate<S: Scalar>(e: &Expression, name: &dyn Fn(&str) -> Option<S>) -> 
             General::Floor => number(at(&list[0]).to_f64().floor()),
             General::Mod => {
                 let (a, b) = (at(&list[0]), at(&list[1]));
-                a - b * number((a / b).to_f64().floor())
+                // The quotient may be a whole number by rounding alone.
+                match a - b * number((a / b).to_f64().floor()) {
+                    beyond if beyond.to_f64() * b.to_f64() < 0.0 => number(0.0),
+                    left => left,
+                }
             }
             General::Clip => {
                 let (x, low, high) = (at(&list[0]), at(&list[1]), at(&list[2]));

@@ -30,6 +30,7 @@ fn switching_functions_mean_what_they_say() {
         ("floor(t)", 5.0, 10.0),
         ("mod(t, 2)", 5.0, 4.5),
         ("mod(-t, 2)", 3.0, 3.5),
+        ("sqrt(mod(3.9, 1.3)) + sqrt(mod(1.7, 0.1))", 1.0, 0.0),
         ("if(abs(t - 5) < 1e-6, 1e6, 0)", 10.0, 2.0),
         ("if(t > 1 and not (t > 3) or t > 4, 1, 0)", 5.0, 3.0),
         ("max(t, 2, 4 - t)", 5.0, 6.0 + 10.5),
