@@ -840,7 +840,8 @@ impl Search<'_> {
             match guard.whole {
                 true => value.floor(),
                 false => {
-                    if value == 0.0 && self.constant[number] {
+                    // What jumps with other functions alone stays equal between their jumps.
+                    if value == 0.0 && (self.constant[number] || guard.fixed) {
                         0.0
                     } else if value < 0.0 {
                         -1.0

@@ -568,3 +568,24 @@ fn curves_of_rests_are_found_at_any_length() {
     let [rest] = found.as_slice() else { panic!("{found:?}") };
     assert!(rest.family.as_ref().unwrap().changes);
 }
+
+/// Comparisons of what jumps are equal in whole intervals: floor x is 1 from 1 to 2.
+#[test]
+fn rests_lie_where_a_comparison_is_equal_by_a_jump() {
+    for (f, want) in [
+        ("-x + if(floor(x) >= 1, 1.5, 0.4)", vec![0.4, 1.5]),
+        ("-x + if(floor(x) > 1, 2.5, 1.4)", vec![1.4, 2.5]),
+        ("-x + 1.4 + heaviside(floor(x) - 2)", vec![1.4, 2.4]),
+    ] {
+        let text = format!("states = ['x']\nf = ['{f}']");
+        let mut found: Vec<f64> = crate::rests::rests(&model(&text), &[(-5.0, 5.0)])
+            .unwrap()
+            .iter()
+            .filter(|r| r.on.is_empty())
+            .map(|r| r.x[0])
+            .collect();
+        found.sort_by(f64::total_cmp);
+        assert_eq!(found.len(), want.len(), "{f}: {found:?}");
+        found.iter().zip(&want).for_each(|(x, want)| near(*x, *want, 1e-12));
+    }
+}
