@@ -709,3 +709,20 @@ fn what_is_slid_upon_is_decided_anew_where_a_table_steps() {
         near(filled[0], 1.7, 1e-9);
     }
 }
+
+/// Motion that comes to a surface at the moment at which both fields are tangent to it, x = (1 -
+/// t)^2/2, and stays on it; a diode that is written by one function of both its sides is the one
+/// that is written by `if` (its number is that of `late_times_are_as_good_as_early_ones`).
+#[test]
+fn surfaces_are_met_where_both_fields_vanish() {
+    let tangent = "states = ['x']\nstart = [0.5]\nf = ['-sign(x)*abs(1 - t)']";
+    let diode = "states = ['i', 'v']\nstart = [0, 0]\n\
+        f = ['u*heaviside(max(i, u))/0.01', '(i - v/100)/1e-4']\n\
+        [let]\nu = 'abs(10*sin(100*pi*t)) - 1.4 - v - 0.5*i'";
+    for method in Method::ALL {
+        let x = end_of(tangent, 3.0, method).unwrap_or_else(|e| panic!("{method:?}: {e}"));
+        near(x[0], 0.0, 1e-12);
+        let x = end_of(diode, 0.06, method).unwrap_or_else(|e| panic!("{method:?}: {e}"));
+        near(x[1], 7.509_155_407_4, 3e-8);
+    }
+}
