@@ -134,8 +134,8 @@ const TABLE: &[(&str, &str, &[&str])] = &[
     ),
     (
         "",
-        "sweep --system impact-oscillator --over params.w=2,2.1 --t-end 5",
-        &["--period 2", "--section x=0.1"],
+        "sweep --system impact-oscillator --over params.r=0.7,0.8 --t-end 5",
+        &["--period 2.243994752564138", "--section x=0.1"],
     ),
     (
         "",
@@ -170,8 +170,9 @@ const TABLE: &[(&str, &str, &[&str])] = &[
     ),
     (
         "",
-        "scan --system impact-oscillator --period 1 --over params.w=2,2.1 --t-end 30",
-        &["--period 2", "--follow up"],
+        "scan --system impact-oscillator --period 2.243994752564138 --over params.r=0.7,0.8 --t-end \
+            60",
+        &["--period 4.487989505128276", "--follow up"],
     ),
     (
         "",

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use twofold_analyse::path::MOST_POINTS;
+use twofold_hybrid::equation::EquationError;
 use twofold_hybrid::motion::sensitivity::sensitivities;
 use twofold_hybrid::motion::tangent::exponents;
 use twofold_hybrid::motion::{Exit, Method, Record};
@@ -89,6 +90,33 @@ pub fn last_of_phase(options: &Options, period: f64) -> Option<(f64, bool)> {
     let last = options.t_start + periods * period;
     let near = ROUNDING * length.max(options.t_end.abs());
     (periods >= 1.0).then(|| (last, (options.t_end - last).abs() <= near))
+}
+
+/// The state at which a run begins.
+pub(crate) fn start_of(model: &Model, options: &Options) -> Result<Vec<f64>, HybridError> {
+    let own = model.start().map_err(EquationError::from)?;
+    Ok(options.start.clone().or(own).unwrap_or_default())
+}
+
+/// Refuses a period after which the equations are not the same, at times after `from`.
+pub(crate) fn has_period(
+    model: &Model,
+    options: &Options,
+    period: f64,
+    from: f64,
+) -> Result<(), HybridError> {
+    let equation = Equation::new(model, None)?;
+    let start = start_of(model, options)?;
+    let largest = start.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    let size = |x: &f64| if largest == 0.0 { 1.0 } else { x.abs().max(0.1 * largest) };
+    let sizes: Vec<f64> = start.iter().map(size).collect();
+    match equation.not_the_same_after(period, from, &sizes) {
+        Some(what) => Err(HybridError::Bad(format!(
+            "--period: {what} is not the same {period} later: give the period of what depends on \
+                the time, with all its digits, or a multiple of it"
+        ))),
+        None => Ok(()),
+    }
 }
 
 /// Rows are handed on in parts of so many.

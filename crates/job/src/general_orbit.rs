@@ -7,11 +7,11 @@ use twofold_hybrid::equation::EquationError;
 use twofold_hybrid::motion::tangent::{Return, closed_orbit, once_around};
 use twofold_hybrid::motion::{Outcome, Record, follow_to_rest, starts_on_an_event};
 use twofold_hybrid::rests::rests;
-use twofold_hybrid::{Ending, Equation, HybridError, Model, Options, follow};
+use twofold_hybrid::{Ending, HybridError, Model, Options, follow};
 use twofold_integrate::Monitor;
 
 use super::answer::{Answer, Stop};
-use super::general::GeneralRun;
+use super::general::{GeneralRun, has_period, start_of};
 use super::orbit::{Along, CLOSED, ITERATIONS, LEAST_CLOSED, ROUGHLY, at_rest, branch_tables};
 use super::question::{Ask, JobError, Question};
 use super::rest::{Rest, RestKind, Stability};
@@ -99,7 +99,7 @@ impl Question for GeneralOrbit {
             Return::Crossings(_) => self.settle,
         };
         if let Return::Period(period) = self.after {
-            self.has_period(&model, period)?;
+            has_period(&model, &options, period, options.t_start)?;
             if let Some(along) = &self.along {
                 self.keeps_period(along, period)?;
             }
@@ -248,29 +248,13 @@ impl Question for GeneralOrbit {
 }
 
 impl GeneralOrbit {
-    /// Refuses a period after which the equations are not the same.
-    fn has_period(&self, model: &Model, period: f64) -> Result<(), JobError> {
-        let equation = Equation::new(model, None).map_err(HybridError::from)?;
-        let start = start_of(model, &self.run.options)?;
-        let largest = start.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-        let size = |x: &f64| if largest == 0.0 { 1.0 } else { x.abs().max(0.1 * largest) };
-        let sizes: Vec<f64> = start.iter().map(size).collect();
-        match equation.not_the_same_after(period, self.run.options.t_start, &sizes) {
-            Some(what) => Err(HybridError::Bad(format!(
-                "--period: {what} is not the same {period} later: give the period of what depends \
-                    on the time, with all its digits, or with --returns a multiple of it"
-            ))
-            .into()),
-            None => Ok(()),
-        }
-    }
-
     /// Refuses a parameter that changes the period of what depends on the time.
     fn keeps_period(&self, along: &Along, period: f64) -> Result<(), JobError> {
         for part in [0.382, 1.0] {
             let value = along.from + part * (along.to - along.from);
             let model = at(&self.run.model, along, value)?;
-            if self.has_period(&model, period).is_err() {
+            let options = &self.run.options;
+            if has_period(&model, options, period, options.t_start).is_err() {
                 let name = &along.parameter;
                 return Err(HybridError::Bad(format!(
                     "--along {name}: at {name} = {value} the equations are not the same {period} \
@@ -344,12 +328,6 @@ fn units(bounds: &[[f64; 2]], before: &[f64]) -> Vec<f64> {
         unit
     };
     sizes.iter().map(unit).collect()
-}
-
-/// The state at which a run begins.
-fn start_of(model: &Model, options: &Options) -> Result<Vec<f64>, HybridError> {
-    let own = model.start().map_err(EquationError::from)?;
-    Ok(options.start.clone().or(own).unwrap_or_default())
 }
 
 /// A motion rests that moves no more than this part of its states' size for this part of its run

@@ -14,7 +14,7 @@ use crate::hybrid::Model;
 use crate::hybrid::motion::Record;
 use crate::job::scan::{Follow, Scan};
 use crate::job::spec::Observation;
-use crate::job::sweep::{Axis, Base, Sweep};
+use crate::job::sweep::{Axis, Base, Sweep, SweepError};
 use crate::job::table::{Entry, Table};
 use crate::job::{self, encode};
 use crate::record::Hash;
@@ -227,7 +227,10 @@ impl Arguments {
             );
         }
         let shown = self.shown(&base.states(), fixed)?;
-        let sweep = Sweep::new(base, self.over.clone(), None).map_err(|e| over(e.to_string()))?;
+        let sweep = Sweep::new(base, self.over.clone(), None).map_err(|e| match e {
+            SweepError::Period(why) => CliError::Usage(why),
+            other => over(other.to_string()),
+        })?;
         let mut drawn = Drawn { title, shown, footer: small_print, method, hash: sweep.hash() };
         let scan = Scan::new(sweep, follow, alike).map_err(over)?;
         if self.plot.is_some()

@@ -13,7 +13,9 @@ use crate::cli::rows::{Pending, compute, journal_of};
 use crate::cli::speak::{complain, deliver, is_standard_output, try_delivery};
 use crate::cli::{CliError, Exit};
 use crate::job::question;
-use crate::job::sweep::{Axis, Base, Coordinate, Draws, Row, Rows, Shard, Sweep, VERSION, Values};
+use crate::job::sweep::{
+    Axis, Base, Coordinate, Draws, Row, Rows, Shard, Sweep, SweepError, VERSION, Values,
+};
 use crate::job::table::Entry;
 use crate::record::Journal;
 use crate::record::files::read;
@@ -215,7 +217,8 @@ fn sweep(arguments: &Arguments) -> Result<Sweep, CliError> {
         .random
         .map(|count| Draws { count, seed: arguments.random_seed.unwrap_or(DRAW_SEED) });
     Sweep::new(base, over, random).map_err(|e| match e {
-        crate::job::sweep::SweepError::Spec(spec) => spec.into(),
+        SweepError::Spec(spec) => spec.into(),
+        SweepError::Period(why) => CliError::Usage(why),
         other => CliError::Usage(format!("--over: {other}")),
     })
 }

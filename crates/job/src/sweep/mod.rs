@@ -56,13 +56,14 @@ pub use rows::{Row, Rows, RowsError, VERSION};
 
 use super::classification::Classification;
 use super::executor::{Executor, Progress};
-use super::general::GeneralRun;
+use super::general::{GeneralRun, has_period};
 use super::question::{JobError, question_hash};
 use super::spec::{RunSpec, SpecError, SwitchSpec};
 use super::table::Column;
 use super::table::Entry;
 use crate::record::Hash;
 use twofold_analyse::attractor::Thresholds;
+use twofold_hybrid::motion::Record;
 use twofold_integrate::filippov::ExitRule;
 use twofold_num::random::RandomStream;
 
@@ -139,6 +140,19 @@ impl Base {
         }
     }
 
+    /// Refuses a run that is looked at after a time that is no period of its equations at the end.
+    fn has_period(&self) -> Result<(), String> {
+        let Base::General(run) = self else { return Ok(()) };
+        let GeneralRun { model, options } = &**run;
+        match options.record {
+            Record::Times { every } if every.is_finite() => {
+                let from = (options.t_end - 2.0 * every).max(options.t_start);
+                has_period(model, options, every, from).map_err(|e| e.to_string())
+            }
+            _ => Ok(()),
+        }
+    }
+
     fn apply(&mut self, coordinate: &Coordinate, value: &Entry) -> Result<(), String> {
         match self {
             Base::Surfaces(run) => coordinate.apply(run, value),
@@ -198,6 +212,9 @@ pub enum SweepError {
     /// The run that is varied is wrong.
     #[error(transparent)]
     Spec(#[from] SpecError),
+    /// The run is looked at after a time that is no period of its equations.
+    #[error("{0}")]
+    Period(String),
 }
 
 /// A part of a sweep's rows: every `n`th, counted from the `k`th.
@@ -263,7 +280,8 @@ impl Sweep {
     /// # Errors
     ///
     /// If an axis would have no effect or gives what another gives, if random axes and draws do not
-    /// come together, or there are too many rows. A cell whose numbers are wrong is no error here
+    /// come together, there are too many rows, or runs are looked at after a time that is no period
+    /// of the first one's equations. A cell whose numbers are wrong is no error here
     /// but a row.
     pub fn new(
         run: impl Into<Base>,
@@ -274,6 +292,7 @@ impl Sweep {
         if let Base::Surfaces(run) = &run {
             run.validate()?;
         }
+        let mut first = run.clone();
         for (i, axis) in over.iter().enumerate() {
             axis.validate()?;
             for other in &over[..i] {
@@ -292,7 +311,10 @@ impl Sweep {
             tried
                 .apply(&axis.coordinate, &axis.value(0, 0.5))
                 .map_err(|why| SweepError::NoEffect { axis: axis.coordinate.to_string(), why })?;
+            // Numbers that are wrong together are a row.
+            let _ = first.apply(&axis.coordinate, &axis.value(0, 0.5));
         }
+        first.has_period().map_err(SweepError::Period)?;
         match (over.iter().any(Axis::is_random), random) {
             (true, None) => {
                 return Err(SweepError::Draws(
@@ -404,6 +426,7 @@ impl Sweep {
         {
             base.apply(&axis.coordinate, value)?;
         }
+        base.has_period()?;
         Ok(base)
     }
 
@@ -480,6 +503,7 @@ mod tests {
     use super::*;
     use crate::spec::*;
     use proptest::prelude::*;
+    use twofold_hybrid::{Definition, Model, Options};
     use twofold_integrate::{Kick, KickLaw, Schedule};
     use twofold_system::Caricature;
 
@@ -497,6 +521,25 @@ mod tests {
 
     fn axes(texts: &[&str]) -> Vec<Axis> {
         texts.iter().map(|t| t.parse().unwrap()).collect()
+    }
+
+    /// Runs are looked at after a time that is a period of their equations, each of its own.
+    #[test]
+    fn a_period_is_one_of_the_equations() {
+        let sweep = |every: f64, axis: &str| {
+            let text = "states = ['x']\nstart = [1]\nf = ['-a*x + cos(2*pi*t/p)']\n\
+                [parameters]\na = 1\np = 1\n[[event]]\nat = 0.5\nset = { x = '2' }";
+            let model = Model::new(Definition::from_toml(text, "f").unwrap());
+            let record = Record::Times { every };
+            let options = Options { t_end: 20.0, record, ..Options::default() };
+            Sweep::new(GeneralRun { model, options }, axes(&[axis]), None)
+        };
+        let said = sweep(0.7, "params.a=1,2").unwrap_err().to_string();
+        assert!(said.contains("is not the same 0.7 later"), "{said}");
+        let of_rows = |sweep: Sweep| [0, 1].map(|row| sweep.run_of(row).is_ok());
+        assert_eq!(of_rows(sweep(2.0, "params.a=1,2").unwrap()), [true; 2]);
+        assert_eq!(of_rows(sweep(1.0, "params.p=1,2").unwrap()), [true, false]);
+        assert_eq!(of_rows(sweep(2.0, "params.p=1,2").unwrap()), [true; 2]);
     }
 
     #[test]
