@@ -307,11 +307,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
     }
 
     /// Sliding has come to a fold of the field of `side`.
-    fn leave_at_fold(
-        &mut self,
-        side: Side,
-        sliding: &Sliding,
-    ) -> Result<State<N>, FilippovError> {
+    fn leave_at_fold(&mut self, side: Side, sliding: &Sliding) -> Result<State<N>, FilippovError> {
         let l = self.lie(&self.x);
         let from = Some(sliding.mode());
         if l.p.abs() <= l.zero_p && l.q.abs() <= l.zero_q {
