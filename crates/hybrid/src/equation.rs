@@ -469,6 +469,11 @@ impl Equation {
         (core, sees_time)
     }
 
+    /// Whether a state's equation in a mode is zero, as of a counter.
+    pub(crate) fn stands_still(&self, state: usize, mode: usize) -> bool {
+        is_zero(&self.definition.modes[mode].field[state])
+    }
+
     /// Whether anything depends on the time, events of the clock included.
     pub fn is_driven(&self) -> bool {
         self.depends_on_time()

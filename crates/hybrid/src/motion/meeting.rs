@@ -1318,7 +1318,7 @@ impl Follower<'_> {
         }
         let places: Vec<(usize, usize)> =
             self.contacts.iter().map(|c| (active + c.watched, 0)).collect();
-        let rows = self.gradients_of(&places);
+        let rows = self.ways_to(&places);
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let gram: Vec<f64> = rows.iter().flat_map(|a| rows.iter().map(|b| dot(a, b))).collect();
         for (row, weight) in rows.iter().zip(solve_any(&gram, &off, 0.0).unwrap_or_default()) {
@@ -1379,7 +1379,7 @@ impl Follower<'_> {
         }
         // Gradients by states, as far as each surface depends on them.
         let gradients = self.compiled.gradients(&self.variables);
-        let rows: Vec<Vec<(usize, f64)>> = self
+        let all: Vec<Vec<(usize, f64)>> = self
             .sliding
             .iter()
             .map(|guard| {
@@ -1391,6 +1391,13 @@ impl Follower<'_> {
                 entries.filter(|(state, _)| *state < self.n).collect()
             })
             .collect();
+        let moves = |(state, slope): &(usize, f64)| {
+            *slope != 0.0 && !self.equation.stands_still(*state, self.config.mode)
+        };
+        let mut rows = all.clone();
+        for row in rows.iter_mut().filter(|row| row.iter().any(moves)) {
+            row.retain(moves);
+        }
         // Surfaces that depend on a state together are met together.
         let (mut owner, mut part): (Vec<Option<usize>>, Vec<usize>) =
             (vec![None; self.n], (0..k).collect());
@@ -1431,7 +1438,7 @@ impl Follower<'_> {
         onto(&mut self.x, &off);
         // Rounding carries tangent vectors off the surface, where nothing shrinks them.
         for y in self.tangents.iter_mut().flat_map(|t| &mut t.vectors) {
-            let off: Vec<f64> = rows.iter().map(|row| dot(row, y)).collect();
+            let off: Vec<f64> = all.iter().map(|row| dot(row, y)).collect();
             onto(y, &off);
         }
     }
@@ -1972,6 +1979,19 @@ impl Follower<'_> {
         near.iter().map(dense).collect()
     }
 
+    /// The gradients without the states that stand still, where others are left: a number that does
+    /// may be compared elsewhere.
+    fn ways_to(&self, near: &[(usize, usize)]) -> Vec<Vec<f64>> {
+        let mut rows = self.gradients_of(near);
+        let moves = |i: usize| !self.equation.stands_still(i, self.config.mode);
+        for row in &mut rows {
+            if (0..self.n).any(|i| row[i] != 0.0 && moves(i)) {
+                (0..self.n).filter(|i| !moves(*i)).for_each(|i| row[i] = 0.0);
+            }
+        }
+        rows
+    }
+
     /// Whether these functions cannot all stay zero while one of these states moves: their
     /// gradients span the states' directions.
     fn holds_still(&self, near: &[(usize, usize)], moves: &[usize]) -> bool {
@@ -2007,7 +2027,7 @@ impl Follower<'_> {
     /// The point where the functions in `near`, by place and guard, are zero, that is nearest to
     /// the state; the state itself where that is not to be had.
     pub(super) fn nearest_meeting(&mut self, near: &[(usize, usize)], values: &[f64]) -> Vec<f64> {
-        let rows = self.gradients_of(near);
+        let rows = self.ways_to(near);
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let gram: Vec<f64> =
             rows.iter().flat_map(|a| rows.iter().map(|b| dot(a, b)).collect::<Vec<_>>()).collect();

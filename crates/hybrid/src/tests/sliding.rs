@@ -726,3 +726,25 @@ fn surfaces_are_met_where_both_fields_vanish() {
         near(x[1], 7.509_155_407_4, 3e-8);
     }
 }
+
+/// A reference or a clock among the states is what it was, to its last bit where it stands still:
+/// conditions elsewhere compare it.
+#[test]
+fn what_no_side_moves_is_kept_while_motion_slides() {
+    let slides = "states = ['x', 'y', 'n', 'w']\nstart = [0.3, 0, 1, 0]\n\
+        f = ['-2*sign(x - n*sin(y))', '1', '0', 'if(n >= 1, 1, 0)']";
+    // A ball at rest on a table whose size is a state.
+    let lies = "states = ['x', 'v', 'n', 'w']\nstart = [1, 0, 0.1, 0]\n\
+        f = ['v', '-9.81 + 3*sin(t)', '0', 'if(n >= 0.1, 1, 0)']\n[[event]]\n\
+        when = 'x - n*(1 + 0.3*sin(t))'\ndirection = 'down'\nafter_zeno = 'stick'\n\
+        set = { v = '0.3*n*cos(t) - 0.5*(v - 0.3*n*cos(t))' }";
+    for method in Method::ALL {
+        for (text, n, x) in [(slides, 1.0, 5.0_f64.sin()), (lies, 0.1, 0.1 + 0.03 * 5.0_f64.sin())]
+        {
+            let end = end_of(text, 5.0, method).unwrap();
+            assert_eq!(end[2], n, "{method:?}: {text}");
+            near(end[3], 5.0, 1e-9);
+            near(end[0], x, 1e-9);
+        }
+    }
+}
