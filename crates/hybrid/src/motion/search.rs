@@ -3,7 +3,7 @@
 use twofold_num::random::RandomStream;
 use twofold_num::tape::Program;
 
-use super::sliding::least_determinant;
+use super::sliding::{LITTLE, determinants};
 use super::*;
 use crate::equation::{Gate, OVERFLOW, same_sign};
 use crate::range::Range;
@@ -391,6 +391,8 @@ impl Follower<'_> {
         // Weights of the positive sides, and of the negative ones where those are not what is left.
         let (mut weights, mut others) = (Vec::new(), Vec::new());
         let mut determinant = f64::NAN;
+        // What the weight of each surface that is slid upon is divided by.
+        let mut divisors = Vec::new();
         if !self.sliding.is_empty() {
             let mut field0 = vec![0.0; n];
             compiled.field.evaluate(&self.variables, &mut field0);
@@ -399,7 +401,8 @@ impl Follower<'_> {
                 (weights, jumps, _) = self.separate_weights(t, x, &field0);
                 self.complete(t, x, &mut weights);
                 // Each attracts by itself: the one that is nearest to doing so no more counts.
-                determinant = jumps.iter().map(|j| -j).fold(f64::INFINITY, f64::min);
+                divisors = jumps.iter().map(|j| -j).collect();
+                determinant = divisors.iter().copied().fold(f64::INFINITY, f64::min);
             } else if !self.corners.is_empty() {
                 let (found, fields, rates) = self.corner_mixture(t, x);
                 (weights, others) =
@@ -417,10 +420,10 @@ impl Follower<'_> {
                     false => f64::INFINITY,
                     true => attraction(&a, &matrix),
                 };
-                determinant = if self.dependent { holds } else { least_determinant(&matrix, k) };
-                if holds < determinant {
-                    determinant = holds;
+                if !self.dependent {
+                    divisors = determinants(&matrix, k);
                 }
+                determinant = divisors.iter().copied().fold(holds, f64::min);
             }
         }
         out.clear();
@@ -441,7 +444,11 @@ impl Follower<'_> {
                     } else {
                         weights[place]
                     };
-                    weight + self.rounding_along(place, plus)
+                    let weight = weight + self.rounding_along(place, plus);
+                    // Beyond its pole a weight that has passed 1 would come back from below 0.
+                    let passed = divisors.get(place).is_some_and(|d| *d < 0.0)
+                        && !(-LITTLE..=1.0 + LITTLE).contains(&weights[place]);
+                    if passed { -weight } else { weight }
                 }
                 Sought::Repelling => determinant,
                 Sought::Beyond(at) => self.value_beyond(self.beyond[at], t, x),

@@ -21,7 +21,7 @@ const TINY_STEP: f64 = 1e-9;
 const PASSES: usize = 3;
 /// Motion leaves surfaces that depend on each other so little later than it could stay: then it is
 /// no rounding which field leads away, and the state changes by the square of it.
-const LITTLE: f64 = 1e-9;
+pub(super) const LITTLE: f64 = 1e-9;
 
 /// So far back in a step that speeds which vanish at its end are no rounding, and two places give
 /// the limit of weights by a line.
@@ -1176,14 +1176,16 @@ fn sum(terms: impl Iterator<Item = f64>) -> f64 {
     if sum.abs() <= 4.0 * count * count * f64::EPSILON * size { 0.0 } else { sum }
 }
 
-/// The least determinant of -a among groups of functions that depend on each other: of several that
-/// vanish at one moment the product would vanish before.
-pub(super) fn least_determinant(a: &[f64], k: usize) -> f64 {
-    let of_group = |group: &Vec<usize>| {
+/// For each function the determinant of -a among the group of functions that depend on each other:
+/// of several that vanish at one moment the product would vanish before.
+pub(super) fn determinants(a: &[f64], k: usize) -> Vec<f64> {
+    let mut all = vec![0.0; k];
+    for group in groups(k, |i, j| a[i * k + j] != 0.0) {
         let row = |i: &usize| group.iter().map(|j| a[i * k + j]).collect::<Vec<_>>();
-        determinant_of_negative(group.iter().flat_map(row).collect(), group.len())
-    };
-    groups(k, |i, j| a[i * k + j] != 0.0).iter().map(of_group).fold(f64::INFINITY, f64::min)
+        let own = determinant_of_negative(group.iter().flat_map(row).collect(), group.len());
+        group.iter().for_each(|i| all[*i] = own);
+    }
+    all
 }
 
 /// The determinant of -a, of k rows, by elimination with pivots.

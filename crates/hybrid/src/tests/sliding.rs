@@ -748,3 +748,22 @@ fn what_no_side_moves_is_kept_while_motion_slides() {
         }
     }
 }
+
+/// Sliding ends where the first of the two sides leads away, though their speeds become equal
+/// within the same step.
+#[test]
+fn sliding_ends_before_its_sides_have_one_speed() {
+    for method in Method::ALL {
+        let x = end_of(
+            "states = ['x']\nstart = [0]\nf = ['if(x > 0, 0.3*(t - 1), 0.003)']",
+            4.0,
+            method,
+        );
+        near(x.unwrap()[0], 1.35, 1e-9);
+        let two = "states = ['x', 'y']\nstart = [0, 0]\n\
+            f = ['if(x > 0, -0.003, 1 - t)', 'if(y > 0, 2*sin(0.1*t - 0.17), 0.007)']";
+        let x = end_of(two, 4.0, method).unwrap();
+        near(x[0], -4.5, 1e-9);
+        near(x[1], 20.0 * (1.0 - 0.23_f64.cos()), 1e-9);
+    }
+}
