@@ -602,6 +602,9 @@ struct Follower<'a> {
     before_at: f64,
     /// The rounding error of each speed, where a state has become small; else zero.
     noise: Vec<f64>,
+    /// What the tolerance of other states leaves of the speed of each state that is no more than
+    /// their errors; else zero.
+    inherited: Vec<f64>,
     trains: Vec<Train>,
     switch_trains: Vec<Train>,
     signs: String,
@@ -888,6 +891,7 @@ fn scale_now(follower: &Follower, step: &Step, out: &mut Vec<f64>) {
                 let size = size.max(if put { follower.width(i) } else { 0.01 * known });
                 options.rtol * size.max(least)
                     + follower.noise_in(step.h, i).unwrap_or(0.0)
+                    + 4.0 * step.h * follower.inherited[i]
                     + follower.least_of(i)
             }
         }
@@ -1093,6 +1097,7 @@ impl<'a> Follower<'a> {
             before: x.iter().map(|v| v.abs()).collect(),
             before_at: options.t_start,
             noise: vec![0.0; n],
+            inherited: vec![0.0; n],
             trains: vec![Train::default(); events.len()],
             switch_trains: vec![Train::default(); guards],
             signs: String::new(),
@@ -1298,6 +1303,7 @@ impl<'a> Follower<'a> {
             self.rhs(step.t, &step.x, &mut room);
             step.k[0].copy_from_slice(&room);
             self.noise.fill(0.0);
+            self.inherited.fill(0.0);
             if !room.iter().all(|v| v.is_finite()) {
                 if self.put_beyond() || self.comes_to_rest(self.t, true) {
                     continue;
@@ -1673,9 +1679,9 @@ impl<'a> Follower<'a> {
             }
             let mut error = step.error(&|i| scale[i]);
             if error > 1.0 && !noted {
-                // Whether rounding errors of speeds are a part of it.
+                // Whether rounding errors of speeds, or errors of other states, are a part of it.
                 noted = true;
-                if self.note_noise(step) {
+                if self.note_noise(step) | self.note_inherited(step) {
                     scale_now(self, step, scale);
                     error = step.error(&|i| scale[i]);
                 }

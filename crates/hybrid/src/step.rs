@@ -273,6 +273,8 @@ impl Step {
         const MOST_FRESH: usize = 40;
         /// Part of a change that is tried instead of it.
         const LESS: f64 = 0.25;
+        /// Part of the terms of a speed below which it is their rounding, in units of [`SETTLED`].
+        const CANCELS: f64 = 4.0 * f64::EPSILON / SETTLED;
         /// Part of a state that is tried instead of one beyond zero.
         const NEARER: f64 = 0.1;
         let n = self.x.len();
@@ -312,6 +314,11 @@ impl Step {
         let known: Vec<f64> = (0..n)
             .map(|i| self.x[i].abs().max((h * self.k[0][i]).abs()).max(LEAST_STATE))
             .collect();
+        // Where what moves a state cancels, as the error of an observer that begins without one
+        // does, iterations leave the rounding of what cancels.
+        let terms = |i: usize| (0..n).map(|j| (jacobian[i * n + j] * self.x[j]).abs()).sum::<f64>();
+        let known: Vec<f64> =
+            known.iter().enumerate().map(|(i, known)| known.max(CANCELS * h * terms(i))).collect();
         let mut reach = known.clone();
         let (mut f, mut last, mut settled) = (vec![vec![0.0; n]; 3], f64::INFINITY, false);
         let mut change = vec![0.0; m];

@@ -100,7 +100,7 @@ impl Follower<'_> {
             scale[i] = match self.noise_in(h, i) {
                 Some(noise) => scale[i] + noise,
                 None => scale[i].max(0.01 * self.options.rtol * self.size[i]),
-            };
+            } + 4.0 * h * self.inherited[i];
         }
         self.noisy = h <= 1e8 * f64::EPSILON * step.t.abs();
         if self.noisy {
@@ -185,6 +185,7 @@ impl Follower<'_> {
                 step.h = length;
             }
             self.note_noise(step);
+            self.note_inherited(step);
             self.add_noise(step, step.h, &mut own.scale);
             let made = self.advance(step, &mut own, length);
             if made.is_err() {

@@ -393,28 +393,68 @@ impl Follower<'_> {
             self.compiled.field.evaluate(&self.variables, &mut low);
             self.noise_of_mixture(step.t, &step.x, &low)
         };
-        let mut out = vec![Range::default(); n];
         let mut noise = vec![0.0; n];
         // Iterations of an implicit step leave so much of each state.
         let left = if step.jacobian.is_some() { SETTLED } else { 0.0 };
         for _ in 0..PASSES {
-            let states: Vec<Range> = (0..n)
-                .map(|i| Range::new(step.x[i], left * step.x[i].abs() + step.h * noise[i]))
-                .collect();
+            let radius = |i: usize| left * step.x[i].abs() + step.h * noise[i];
+            let radii = self.radii_of_speeds(step, radius);
             noise.copy_from_slice(&mixture);
-            let one = (&self.compiled, &self.variables);
-            let others = self.base.iter().map(|(compiled, variables)| (compiled, variables));
-            let corners = self.corners.iter().map(|(compiled, variables)| (compiled, variables));
-            for (compiled, variables) in std::iter::once(one).chain(others).chain(corners) {
-                let time = Range::new(step.t, 0.0);
-                let rest = variables[n + 1..].iter().map(|v| Range::from_f64(*v));
-                let given: Vec<Range> = states.iter().copied().chain([time]).chain(rest).collect();
-                compiled.field.evaluate(&given, &mut out);
-                noise.iter_mut().zip(&out).for_each(|(noise, out)| *noise += out.radius());
-            }
+            noise.iter_mut().zip(radii).for_each(|(noise, radius)| *noise += radius);
         }
         self.noise = noise;
         true
+    }
+
+    /// By how much speeds, those on all sides of what is slid upon added up, may differ where
+    /// states do by these radii.
+    fn radii_of_speeds(&self, step: &Step, radius: impl Fn(usize) -> f64) -> Vec<f64> {
+        let n = self.n;
+        let states: Vec<Range> = (0..n).map(|i| Range::new(step.x[i], radius(i))).collect();
+        let (mut out, mut radii) = (vec![Range::default(); n], vec![0.0; n]);
+        let one = (&self.compiled, &self.variables);
+        let others = self.base.iter().map(|(compiled, variables)| (compiled, variables));
+        let corners = self.corners.iter().map(|(compiled, variables)| (compiled, variables));
+        for (compiled, variables) in std::iter::once(one).chain(others).chain(corners) {
+            let time = Range::new(step.t, 0.0);
+            let rest = variables[n + 1..].iter().map(|v| Range::from_f64(*v));
+            let given: Vec<Range> = states.iter().copied().chain([time]).chain(rest).collect();
+            compiled.field.evaluate(&given, &mut out);
+            radii.iter_mut().zip(&out).for_each(|(radius, out)| *radius += out.radius());
+        }
+        radii
+    }
+
+    /// Notes what the tolerance leaves of the speeds of states that are no more than errors of
+    /// others, as the integral of an observer's error is that begins without one. False if there
+    /// are none.
+    pub(super) fn note_inherited(&mut self, step: &Step) -> bool {
+        /// Only states that are so far below the largest one are looked at.
+        const FAR: f64 = 1e-6;
+        /// The errors of a run, in units of the tolerance.
+        const ERRORS: f64 = 100.0;
+        self.inherited.fill(0.0);
+        let largest = self.lately.iter().fold(0.0_f64, |most, s| most.max(*s));
+        let small: Vec<usize> = (0..self.n).filter(|i| self.lately[*i] < FAR * largest).collect();
+        if self.options.atol.is_some() || small.is_empty() {
+            return false;
+        }
+        let span = self.options.t_end - self.options.t_start;
+        let moved = |i: usize| step.x[i].abs() + (step.h * step.k[0][i]).abs();
+        for i in small {
+            let by_others = |j: usize| if i == j { 0.0 } else { self.options.rtol * moved(j) };
+            let inherited = self.radii_of_speeds(step, by_others)[i];
+            let most = ERRORS * span * inherited;
+            if !(most.is_finite() && self.lately[i] < most) {
+                continue;
+            }
+            // Errors of a state that decays do not grow for so long.
+            let own = self.radii_of_speeds(step, |j| if i == j { moved(i) } else { 0.0 })[i];
+            if self.lately[i] * (1.0 + span * own / moved(i)) < most {
+                self.inherited[i] = inherited;
+            }
+        }
+        self.inherited.iter().any(|by| *by > 0.0)
     }
 
     /// Rounding errors of speeds that are mixtures of fields which cancel, or of a contact.

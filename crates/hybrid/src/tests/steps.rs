@@ -594,3 +594,32 @@ fn series_follow_what_is_sought_alone_and_what_begins_late() {
         }
     }
 }
+
+/// What integrates errors of other states alone is measured by those: an observer's error that
+/// begins at zero, the error of a reference that is followed exactly, a clock beside the time.
+#[test]
+fn integrals_of_errors_do_not_stop_the_motion() {
+    let text =
+        |states: &str, start: &str, f: &str| format!("states = {states}\nstart = {start}\nf = {f}");
+    let clock = text("['c', 'w']", "[0, 0]", "['1', 'c - t']");
+    let driven = text("['x', 'w']", "[0, 0]", "['1 + 0.5*w', 't - x']");
+    let observer = "['-x + cos(t)', '-y + cos(t) + 3*(x - y)', 'x - y']";
+    let observer = text("['x', 'y', 'w']", "[1, 1, 0]", observer);
+    let follows = text("['x', 'w']", "[0, 0]", "['cos(t)', 'sin(t) - x']");
+    let x = 0.5 * (6.0_f64.cos() + 6.0_f64.sin() + (-6.0_f64).exp());
+    for method in Method::ALL {
+        for (text, want) in
+            [(&clock, 6.0), (&driven, 6.0), (&observer, x), (&follows, 6.0_f64.sin())]
+        {
+            let options = Options { t_end: 6.0, method, max_steps: 5_000, ..Options::default() };
+            let found = follow(&model(text), &options, &mut |_| true);
+            let found = found.unwrap_or_else(|e| panic!("{method:?}: {e}\n{text}")).x;
+            near(found[0], want, 1e-8);
+            near(*found.last().unwrap(), 0.0, 1e-8);
+        }
+        // Small differences that are none of errors keep their digits.
+        let small = text("['x', 'w']", "[1e-4, 0]", "['0', '1 - cos(x)']");
+        let found = end_of(&small, 6.0, method).unwrap()[1];
+        near(found, 6.0 * 2.0 * 5e-5_f64.sin().powi(2), 1e-15);
+    }
+}
