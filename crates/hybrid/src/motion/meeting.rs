@@ -1318,9 +1318,7 @@ impl Follower<'_> {
         }
         let places: Vec<(usize, usize)> =
             self.contacts.iter().map(|c| (active + c.watched, 0)).collect();
-        let rows = self.ways_to(&places);
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let gram: Vec<f64> = rows.iter().flat_map(|a| rows.iter().map(|b| dot(a, b))).collect();
+        let (rows, gram) = self.ways_to(&places);
         for (row, weight) in rows.iter().zip(solve_any(&gram, &off, 0.0).unwrap_or_default()) {
             self.x.iter_mut().zip(row).for_each(|(x, slope)| *x -= weight * slope);
         }
@@ -1395,9 +1393,7 @@ impl Follower<'_> {
             *slope != 0.0 && !self.equation.stands_still(*state, self.config.mode)
         };
         let mut rows = all.clone();
-        for row in rows.iter_mut().filter(|row| row.iter().any(moves)) {
-            row.retain(moves);
-        }
+        rows.iter_mut().for_each(|row| row.retain(moves));
         // Surfaces that depend on a state together are met together.
         let (mut owner, mut part): (Vec<Option<usize>>, Vec<usize>) =
             (vec![None; self.n], (0..k).collect());
@@ -1979,17 +1975,22 @@ impl Follower<'_> {
         near.iter().map(dense).collect()
     }
 
-    /// The gradients without the states that stand still, where others are left: a number that does
-    /// may be compared elsewhere.
-    fn ways_to(&self, near: &[(usize, usize)]) -> Vec<Vec<f64>> {
+    /// The gradients without the states that stand still, since such a number may be compared
+    /// elsewhere, and the products of these rows; 1 for the square of one in which nothing is left.
+    fn ways_to(&self, near: &[(usize, usize)]) -> (Vec<Vec<f64>>, Vec<f64>) {
         let mut rows = self.gradients_of(near);
-        let moves = |i: usize| !self.equation.stands_still(i, self.config.mode);
-        for row in &mut rows {
-            if (0..self.n).any(|i| row[i] != 0.0 && moves(i)) {
-                (0..self.n).filter(|i| !moves(*i)).for_each(|i| row[i] = 0.0);
+        let still = |i: &usize| self.equation.stands_still(*i, self.config.mode);
+        for i in (0..self.n).filter(still) {
+            rows.iter_mut().for_each(|row| row[i] = 0.0);
+        }
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let mut gram: Vec<f64> = rows.iter().flat_map(|a| rows.iter().map(|b| dot(a, b))).collect();
+        for (i, row) in rows.iter().enumerate() {
+            if row.iter().all(|slope| *slope == 0.0) {
+                gram[i * rows.len() + i] = 1.0;
             }
         }
-        rows
+        (rows, gram)
     }
 
     /// Whether these functions cannot all stay zero while one of these states moves: their
@@ -2027,10 +2028,7 @@ impl Follower<'_> {
     /// The point where the functions in `near`, by place and guard, are zero, that is nearest to
     /// the state; the state itself where that is not to be had.
     pub(super) fn nearest_meeting(&mut self, near: &[(usize, usize)], values: &[f64]) -> Vec<f64> {
-        let rows = self.ways_to(near);
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let gram: Vec<f64> =
-            rows.iter().flat_map(|a| rows.iter().map(|b| dot(a, b)).collect::<Vec<_>>()).collect();
+        let (rows, gram) = self.ways_to(near);
         let off: Vec<f64> = near.iter().map(|(place, _)| values[*place]).collect();
         let mut x = self.x.clone();
         for (row, weight) in rows.iter().zip(solve_any(&gram, &off, 0.0).unwrap_or_default()) {

@@ -747,6 +747,17 @@ fn what_no_side_moves_is_kept_while_motion_slides() {
             near(end[0], x, 1e-9);
         }
     }
+    // A counter that alone, beside the clock, decides a whole part.
+    let counts = "states = ['x', 'y', 'n']\nstart = [0.43, 0.8, 0]\n\
+        f = ['-1.228*x + floor(0.5*mod(t, 2.01) - 0.659*n)', \
+        '-0.94*y + abs(1.241*x - 0.901*sin(2.056*t)) + \
+        1.508*sign(1.032 - 0.873*x - 1.763*y)', '0']\n[[event]]\n\
+        when = 'mod(t, 2.07) - 0.035*sin(0.564*t) >= 0.156978'\nset = { n = 'mod(n + 1, 3)' }\n\
+        [[event]]\nwhen = 'sin(0.878*t) + 0.102*n > 0.699'\n\
+        set = { n = 'mod(n + 1, 3)', y = '0.5*y + 0.057' }";
+    for method in Method::ALL {
+        assert_eq!(end_of(counts, 10.0, method).unwrap()[2], 2.0, "{method:?}");
+    }
 }
 
 /// Sliding ends where the first of the two sides leads away, though their speeds become equal
