@@ -18,7 +18,7 @@ use twofold_system::Expression;
 use twofold_system::expression::{Function, General, MAX_EXPONENT};
 
 use crate::data::Table;
-use crate::definition::{Definition, When, asks};
+use crate::definition::{Definition, Direction, When, asks};
 use crate::model::{Model, ModelError};
 use crate::value::{evaluate, power, smooth};
 
@@ -503,7 +503,7 @@ impl Equation {
         let places: Vec<(f64, Vec<f64>)> = (0..TRIED)
             .map(|_| (from + period * drawn(1.0).abs(), sizes.iter().map(|s| drawn(*s)).collect()))
             .collect();
-        let differs = |e: &Expression| {
+        let differs_from = |e: &Expression, sign: f64| {
             if !self.sees_time(e) || self.sees(e, &ends) {
                 return false;
             }
@@ -513,8 +513,9 @@ impl Equation {
                 .filter(|pair| pair.iter().all(|v| v.is_finite()));
             let pairs: Vec<[f64; 2]> = pairs.collect();
             let size = pairs.iter().flatten().fold(0.0_f64, |most, v| most.max(v.abs()));
-            pairs.iter().any(|[now, later]| (now - later).abs() > SAME * size)
+            pairs.iter().any(|[now, later]| (now - sign * later).abs() > SAME * size)
         };
+        let differs = |e: &Expression| differs_from(e, 1.0);
         let fields = d.modes.iter().flat_map(|mode| d.states.iter().zip(&mode.field));
         if let Some((state, e)) = fields.into_iter().find(|(_, e)| differs(e)) {
             return Some(format!("{}' = {e}", state.name));
@@ -526,6 +527,8 @@ impl Equation {
         for event in &d.events {
             let start = &places[0].1;
             let clock = match &event.when {
+                // What is met in both directions has the same zeros with the other sign.
+                When::Zero(e, Direction::Both) if !differs_from(e, -1.0) => None,
                 When::Zero(e, _) | When::Becomes(e) => differs(e).then(|| format!("when {e}")),
                 When::At(times) => {
                     let within = |e: &&Expression| {

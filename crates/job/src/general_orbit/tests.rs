@@ -141,6 +141,9 @@ fn a_period_is_one_of_the_equations() {
     let field = "states = ['x']\nstart = [1]\nf = ['-x + cos(t)']";
     let clock = "states = ['x']\nstart = [0.3]\nf = ['0']\n[[event]]\nevery = 1\n\
         set = { x = '2.6*x*(1 - x)' }";
+    // Its event has the same zeros with the other sign.
+    let zeros = "states = ['x']\nstart = [0.3]\nf = ['-0.1*x']\n[[event]]\nwhen = 'cos(pi*t)'\n\
+        set = { x = '2.6*x*(1 - x)' }";
     let switch = "states = ['x']\nstart = [12]\nf = ['if(x > 20 + mod(t, 4), -x, 24 - x)']";
     for (text, wrong, right) in [
         (field, 3.0, 2.0 * std::f64::consts::PI),
@@ -148,6 +151,7 @@ fn a_period_is_one_of_the_equations() {
         (clock, 0.5, 2.0),
         (clock, 1.5, 1.0),
         (switch, 3.0, 4.0),
+        (zeros, 0.5, 1.0),
     ] {
         let said = orbit(text, 20.0, Return::Period(wrong)).unwrap_err().to_string();
         assert!(said.contains(&format!("is not the same {wrong} later")), "{said}");
