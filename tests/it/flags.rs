@@ -170,8 +170,8 @@ const TABLE: &[(&str, &str, &[&str])] = &[
     ),
     (
         "",
-        "scan --system impact-oscillator --period 2.243994752564138 --over params.r=0.7,0.8 --t-end \
-            60",
+        "scan --system impact-oscillator --period 2.243994752564138 --over params.r=0.7,0.8 \
+            --t-end 60",
         &["--period 4.487989505128276", "--follow up"],
     ),
     (

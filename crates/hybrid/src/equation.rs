@@ -527,7 +527,7 @@ impl Equation {
         for event in &d.events {
             let start = &places[0].1;
             let clock = match &event.when {
-                // What is met in both directions has the same zeros with the other sign.
+                // An event in both directions has the same zeros with the other sign.
                 When::Zero(e, Direction::Both) if !differs_from(e, -1.0) => None,
                 When::Zero(e, _) | When::Becomes(e) => differs(e).then(|| format!("when {e}")),
                 When::At(times) => {

@@ -602,8 +602,8 @@ struct Follower<'a> {
     before_at: f64,
     /// The rounding error of each speed, where a state has become small; else zero.
     noise: Vec<f64>,
-    /// What the tolerance of other states leaves of the speed of each state that is no more than
-    /// their errors; else zero.
+    /// The error that the tolerance of other states leaves of the speed of each state that is no
+    /// more than such errors; else zero.
     inherited: Vec<f64>,
     trains: Vec<Train>,
     switch_trains: Vec<Train>,

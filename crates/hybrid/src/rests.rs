@@ -840,7 +840,7 @@ impl Search<'_> {
             match guard.whole {
                 true => value.floor(),
                 false => {
-                    // What jumps with other functions alone stays equal between their jumps.
+                    // A function that jumps with others alone stays equal between their jumps.
                     if value == 0.0 && (self.constant[number] || guard.fixed) {
                         0.0
                     } else if value < 0.0 {

@@ -391,7 +391,7 @@ impl Follower<'_> {
         // Weights of the positive sides, and of the negative ones where those are not what is left.
         let (mut weights, mut others) = (Vec::new(), Vec::new());
         let mut determinant = f64::NAN;
-        // What the weight of each surface that is slid upon is divided by.
+        // The divisor of the weight of each surface that is slid upon.
         let mut divisors = Vec::new();
         if !self.sliding.is_empty() {
             let mut field0 = vec![0.0; n];

@@ -425,9 +425,9 @@ impl Follower<'_> {
         radii
     }
 
-    /// Notes what the tolerance leaves of the speeds of states that are no more than errors of
-    /// others, as the integral of an observer's error is that begins without one. False if there
-    /// are none.
+    /// Notes the errors that the tolerance leaves of the speeds of states that are no more than
+    /// errors of others, as the integral of an observer's error is that begins without one. False
+    /// if there are none.
     pub(super) fn note_inherited(&mut self, step: &Step) -> bool {
         /// Only states that are so far below the largest one are looked at.
         const FAR: f64 = 1e-6;

@@ -595,7 +595,7 @@ fn series_follow_what_is_sought_alone_and_what_begins_late() {
     }
 }
 
-/// What integrates errors of other states alone is measured by those: an observer's error that
+/// Integrals of errors of other states alone are measured by those: an observer's error that
 /// begins at zero, the error of a reference that is followed exactly, a clock beside the time.
 #[test]
 fn integrals_of_errors_do_not_stop_the_motion() {
