@@ -281,8 +281,7 @@ impl Sweep {
     ///
     /// If an axis would have no effect or gives what another gives, if random axes and draws do not
     /// come together, there are too many rows, or runs are looked at after a time that is no period
-    /// of the first one's equations. A cell whose numbers are wrong is no error here
-    /// but a row.
+    /// of the first one's equations. A cell whose numbers are wrong is no error here but a row.
     pub fn new(
         run: impl Into<Base>,
         over: Vec<Axis>,
