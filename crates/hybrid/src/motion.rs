@@ -6,6 +6,7 @@
 //! from the equations on both sides.
 
 mod clock;
+mod deciding;
 mod locate;
 mod meeting;
 mod multistep;
@@ -39,8 +40,8 @@ use crate::roots::{
 };
 use crate::selection::{
     Intersection, MOST_TOGETHER, Mixture, Way, attraction, complementary, groups, hold, leads_away,
-    mixture, near_solution, nearest_of_hull, position_hold, possibilities, turn, turn_of_position,
-    velocities_differ,
+    mixture, mixtures_differ, near_solution, nearest_of_hull, position_hold, possibilities, turn,
+    turn_of_position, velocities_differ,
 };
 use crate::step::{LEAST_FALLING, LEAST_STATE, Step, UNDERFLOW};
 

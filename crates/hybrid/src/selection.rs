@@ -468,6 +468,21 @@ pub(crate) fn top_direction(form: &[f64], k: usize) -> Vec<f64> {
     x
 }
 
+/// Whether mixtures of 2^k fields have more than one velocity on their surfaces: the fields are not
+/// sums of what each side adds.
+pub(crate) fn mixtures_differ(fields: &[Vec<f64>]) -> bool {
+    let n = fields[0].len();
+    let size = fields.iter().flatten().fold(0.0_f64, |most, v| most.max(v.abs()));
+    let added = |vertex: usize, i: usize| -> f64 {
+        (0..fields.len().ilog2())
+            .filter(|bit| vertex >> bit & 1 == 1)
+            .map(|bit| fields[1 << bit][i] - fields[0][i])
+            .sum()
+    };
+    (0..fields.len())
+        .any(|v| (0..n).any(|i| (fields[0][i] + added(v, i) - fields[v][i]).abs() > 1e-9 * size))
+}
+
 /// Whether mixtures of fields that stay on surfaces have more than one velocity: some component of
 /// the fields is no sum of a constant and multiples of the functions' rates.
 pub(crate) fn velocities_differ(fields: &[Vec<f64>], rates: &[Vec<f64>]) -> bool {

@@ -1583,7 +1583,7 @@ impl Follower<'_> {
         // If mixtures differ, only one that all surfaces hold is known to stay.
         // Nor are all mixtures there of functions with one zero, whose sides belong together.
         let all_there = || settling::independent(&self.gradients_of(near));
-        if (!all_there() || settling::mixtures_differ(&parts)) && !self.holds_still(near, &moves) {
+        if (!all_there() || mixtures_differ(&parts)) && !self.holds_still(near, &moves) {
             return false;
         }
         if !nearest_of_hull(&parts).iter().all(|v| v.abs() <= 1e-6) {

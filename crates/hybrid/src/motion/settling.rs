@@ -1,6 +1,5 @@
-//! Sides of switching functions, and where motion goes from points where they are zero.
+//! Sides of switching functions, and what is known where these are zero.
 
-use std::cell::Cell;
 use std::collections::HashMap;
 
 use twofold_num::random::RandomStream;
@@ -13,32 +12,15 @@ use super::*;
 use crate::cells;
 use crate::equation::{Gate, same_sign};
 
-/// Fields that move a state in a run by more than this part of its size apart are no rounding of
-/// one.
-const CLEAR_JUMP: f64 = 1e-3;
 /// Most surfaces on which a rule chooses a mixture.
 pub(super) const MOST_CORNERS: usize = 3;
-/// Functions that meet of which all sides are tried to see which depend on each other.
-const MOST_TRIED: usize = 4;
 
-/// Reasons why motion on several surfaces is not decided.
-const TURNS_AWAY: &str = "it may stay, or turn away by infinitely many switches at any time";
-const SEVERAL_VELOCITIES: &str =
+/// A reason why motion on several surfaces is not decided.
+pub(super) const SEVERAL_VELOCITIES: &str =
     "sliding on all of them, where mixtures of the fields have different velocities";
 
-/// Whether all of these fields move one of the functions the same way, as a clock: no mixture of
-/// them stays on it. `speeds` has a row a field.
-fn some_move_one_way(speeds: &[Vec<f64>]) -> bool {
-    let all = |i: usize, sign: f64| speeds.iter().all(|speeds| sign * speeds[i] > 0.0);
-    (0..speeds[0].len()).any(|i| all(i, 1.0) || all(i, -1.0))
-}
-
-/// A configuration, the places of the guards that are zero, what they do there, and which of them
-/// its equations ask.
-type Vertex = (Configuration, Vec<Option<usize>>, Rates, Vec<bool>);
-
 /// The guards that are not asked.
-fn others(guards: &[usize], asked: &[bool]) -> Vec<usize> {
+pub(super) fn others(guards: &[usize], asked: &[bool]) -> Vec<usize> {
     guards.iter().zip(asked).filter(|(_, asked)| !**asked).map(|(guard, _)| *guard).collect()
 }
 
@@ -352,7 +334,7 @@ impl Follower<'_> {
     }
 
     /// Adds the functions that are zero because others are: x - z where x - y and y - z are.
-    fn add_what_follows(&self, zero: &mut Vec<usize>) {
+    pub(super) fn add_what_follows(&self, zero: &mut Vec<usize>) {
         if zero.len() < 2 {
             return;
         }
@@ -417,7 +399,7 @@ impl Follower<'_> {
 
     /// Whether nothing moves a guard, at this place among the rates: no term, or of one that the
     /// conditions of events alone ask terms that cancel.
-    fn keeps_still(&self, guard: usize, rates: &Rates, place: usize) -> bool {
+    pub(super) fn keeps_still(&self, guard: usize, rates: &Rates, place: usize) -> bool {
         let cancels = || rates.first[place].abs() <= 1e-12 * rates.terms[place];
         rates.stands_still(place) || self.equation.is_of_conditions(guard) && cancels()
     }
@@ -426,7 +408,12 @@ impl Follower<'_> {
     /// and that nothing leads or presses there, the side of what rests at zero: max(x, 0) where x
     /// is negative, a counter that nothing counts.
     /// Whether there are any.
-    fn let_rest(&mut self, config: &mut Configuration, zero: &[usize], sliding: &[usize]) -> bool {
+    pub(super) fn let_rest(
+        &mut self,
+        config: &mut Configuration,
+        zero: &[usize],
+        sliding: &[usize],
+    ) -> bool {
         let mut some = false;
         let stays = |follower: &mut Self, config: &Configuration, guard: usize| {
             let (compiled, rates) = follower.rates_with(config, &[guard]);
@@ -487,7 +474,7 @@ impl Follower<'_> {
 
     /// The side to which a function of third order or more leaves zero in a configuration: it grows
     /// by more than a square. 0 if it stays.
-    fn side_ahead_in(&self, config: &Configuration, guard: usize) -> f64 {
+    pub(super) fn side_ahead_in(&self, config: &Configuration, guard: usize) -> f64 {
         match self.values_ahead(config, &[], guard, [0.005, 0.01]) {
             Some([near, far]) if same_sign(near, far) && far.abs() > 5.0 * near.abs() => {
                 far.signum()
@@ -499,7 +486,7 @@ impl Follower<'_> {
     /// The side to which a function of second order or more leaves zero where the motion slides on
     /// others: on the lower sides of those in `config`, on one other side in each of `flips`. 0 if
     /// it stays.
-    fn side_ahead_sliding(
+    pub(super) fn side_ahead_sliding(
         &mut self,
         config: &Configuration,
         flips: &[(usize, Configuration)],
@@ -515,7 +502,7 @@ impl Follower<'_> {
 
     /// The values of a function after these parts of the time that a state takes to move by its
     /// size in this configuration, sliding on the functions that `flips` have on their other sides.
-    fn values_ahead(
+    pub(super) fn values_ahead(
         &self,
         config: &Configuration,
         flips: &[(usize, Configuration)],
@@ -593,7 +580,7 @@ impl Follower<'_> {
     /// Puts the state, which is on these surfaces to rounding, where the fields of both sides have
     /// values: sqrt(x - 1) has none at x - 1 = -1e-16; and where a root is zero that is of what is
     /// zero there.
-    fn put_into_domain(&mut self, zero: &[usize]) {
+    pub(super) fn put_into_domain(&mut self, zero: &[usize]) {
         /// Numbers that are tried on either side.
         const TRIED: usize = 16;
         /// A state is no farther off by rounding, in units of its size.
@@ -675,747 +662,11 @@ impl Follower<'_> {
         }
     }
 
-    /// As [`Follower::settle`], where what is slid upon is decided, too, but for the guards in
-    /// `kept`.
-    pub(super) fn decide(&mut self, zero: &[usize], kept: &[bool]) -> Result<(), HybridError> {
-        self.rests = false;
-        // Only what the equations ask here; what they do not ask keeps its side until it is asked.
-        let mut zero: Vec<usize> =
-            zero.iter().copied().filter(|g| self.compiled.place(*g).is_some()).collect();
-        self.add_what_is_zero(&mut zero);
-        zero.retain(|guard| !self.guard_held[*guard]);
-        self.add_what_follows(&mut zero);
-        zero.retain(|guard| !self.left_out.contains(guard));
-        if self.decide_without_kinks(&zero, kept) {
-            return Ok(());
-        }
-        // Functions that only others' sides move follow those.
-        if !zero.iter().all(|guard| self.equation.guards[*guard].of_sides()) {
-            zero.retain(|guard| !self.equation.guards[*guard].of_sides());
-        }
-        if self.equation.has_domain_ends {
-            self.put_into_domain(&zero);
-        }
-        if zero.len() == 1 {
-            // A speed that is only rounding may be a function that is zero, too.
-            let config = self.config.clone();
-            let (compiled, mut rates) = self.rates(&config);
-            if self.drop_noise(&config, &compiled, &zero, &mut rates) {
-                let is_new = |guard: &usize| {
-                    !zero.contains(guard)
-                        && !self.slides[*guard]
-                        && !self.guard_held[*guard]
-                        && self.side_of(*guard).is_none()
-                };
-                let new: Vec<usize> = self.compiled.active.iter().copied().filter(is_new).collect();
-                zero.extend(new);
-            }
-        }
-        if zero.is_empty() {
-            let config = self.config.clone();
-            self.adopt(config, Vec::new());
-            return Ok(());
-        }
-        let values = self.watched_values();
-        let before: Vec<f64> =
-            zero.iter().map(|g| self.compiled.place(*g).map_or(f64::NAN, |p| values[p])).collect();
-        let lows: Vec<f64> = zero.iter().map(|g| self.low(*g)).collect();
-        let highs: Vec<f64> = zero.iter().map(|g| self.high(*g)).collect();
-        let [some_rest, some_noise] = [Cell::new(false), Cell::new(false)];
-        let vertex = |follower: &mut Self, plus: &dyn Fn(usize) -> bool| {
-            let mut config = follower.config.clone();
-            for (i, guard) in zero.iter().enumerate() {
-                config.sides[*guard] = if plus(i) { highs[i] } else { lows[i] };
-            }
-            if follower.equation.has_domain_ends {
-                // Roots of what is zero here have values on both sides, whatever rounding makes.
-                let new = others(
-                    &zero,
-                    &zero.iter().map(|g| config.slid.contains(g)).collect::<Vec<_>>(),
-                );
-                config.slid.extend(new);
-            }
-            follower.ask_new(&mut config);
-            follower.follow_sides(&mut config, &zero);
-            let rates_of = |follower: &mut Self, config: Configuration| {
-                let own = follower.equation.compiled(&config);
-                let asked: Vec<bool> = zero.iter().map(|g| own.place(*g).is_some()).collect();
-                let also = others(&zero, &asked);
-                let touching = zero.iter().any(|guard| follower.touching[*guard]);
-                let (compiled, mut rates) = follower.rates_to_order(&config, &also, touching);
-                let place: Vec<Option<usize>> = zero.iter().map(|g| compiled.place(*g)).collect();
-                if follower.drop_noise(&config, &compiled, &zero, &mut rates) {
-                    rates = follower.rates_to_order(&config, &also, true).1;
-                    follower.drop_noise(&config, &compiled, &zero, &mut rates);
-                    some_noise.set(true);
-                }
-                (config, place, rates, asked)
-            };
-            let made = rates_of(follower, config);
-            let (config, place, rates, _) = &made;
-            let still =
-                |i: usize| place[i].is_some_and(|p| follower.keeps_still(zero[i], rates, p));
-            if (0..zero.len()).any(|i| !plus(i) && still(i)) {
-                let mut resting = config.clone();
-                if follower.let_rest(&mut resting, &zero, &[]) {
-                    some_rest.set(true);
-                    return rates_of(follower, resting);
-                }
-            }
-            made
-        };
-        let k = zero.len();
-        // Sets of functions that depend on each other.
-        let sets = if k == 1 {
-            vec![vec![0]]
-        } else {
-            let (config, place0, _, asked) = vertex(self, &|_| false);
-            let compiled = self.equation.compiled_with(&config, &others(&zero, &asked));
-            // A side may act on a function on one side of a third one alone: all sides of a few
-            // functions are tried, of many those next to all low ones. Mostly none is.
-            let sides = || -> Vec<Vec<bool>> {
-                if k <= MOST_TRIED {
-                    (0..1_usize << k).map(|p| (0..k).map(|i| p >> i & 1 == 1).collect()).collect()
-                } else {
-                    (0..=k).map(|one| (0..k).map(|i| i + 1 == one).collect()).collect()
-                }
-            };
-            let mut patterns = Vec::new();
-            let mut known: HashMap<Vec<bool>, Vertex> = HashMap::new();
-            let mut coupled = vec![false; k * k];
-            for j in 0..k {
-                // Without a way from the side to a function nothing has to be computed.
-                let side = self.n + 1 + zero[j];
-                let acts = |place: &Option<usize>| {
-                    place.is_none_or(|p| {
-                        let through = |v: &usize| *v < self.n && compiled.depends(*v, side);
-                        compiled.depends(self.n + p, side)
-                            || compiled.touches[p].iter().any(through)
-                    })
-                };
-                let other = |i: usize| i != j && acts(&place0[i]);
-                if !self.equation.chooses(zero[j]) && !(0..k).any(other) {
-                    continue;
-                }
-                // A function that jumps with the side.
-                for i in (0..k).filter(|i| *i != j) {
-                    coupled[i * k + j] |=
-                        place0[i].is_some_and(|p| compiled.depends(self.n + p, side));
-                }
-                if patterns.is_empty() {
-                    patterns = sides();
-                }
-                for without in patterns.iter().filter(|pattern| !pattern[j]) {
-                    let mut with = without.clone();
-                    with[j] = true;
-                    for pattern in [without, &with] {
-                        if !known.contains_key(pattern) {
-                            known.insert(pattern.clone(), vertex(self, &|i| pattern[i]));
-                        }
-                    }
-                    let ((_, from, low, _), (_, to, high, _)) = (&known[without], &known[&with]);
-                    for i in (0..k).filter(|i| *i != j) {
-                        coupled[i * k + j] |= from[i].zip(to[i]).is_none_or(|(a, b)| {
-                            let scale = low.terms[a] + high.terms[b];
-                            let still = low.first_or_zero(a) == 0.0 && high.first_or_zero(b) == 0.0;
-                            (low.first[a] - high.first[b]).abs() > 1e-12 * scale
-                                || still && low.direction(a) != high.direction(b)
-                        });
-                    }
-                }
-            }
-            let mut sets = groups(k, |i, j| coupled[i * k + j]);
-            // Functions of the time alone are decided first: others may jump with them.
-            let by_time = |i: &usize| {
-                place0[*i].is_some_and(|p| compiled.touches[p].iter().all(|v| *v >= self.n))
-            };
-            sets.sort_by_key(|set| !set.iter().all(by_time));
-            sets
-        };
-        let mut ways = vec![Way::Plus; k];
-        // A rule chooses among velocities although the fields are sums of what each side adds.
-        let mut by_rule = false;
-        for (done, set) in sets.iter().enumerate() {
-            let mut decided = vec![false; k];
-            let before = sets[..done].iter().flatten();
-            before.for_each(|i| decided[*i] = ways[*i] == Way::Plus);
-            if set.iter().all(|i| kept[zero[*i]]) {
-                set.iter().for_each(|i| ways[*i] = Way::Stay);
-                continue;
-            }
-            let mut cache: HashMap<Vec<bool>, Vertex> = Default::default();
-            let mut at = |follower: &mut Self, plus: Vec<bool>| {
-                if !cache.contains_key(&plus) {
-                    let all = |i: usize| match set.iter().position(|s| *s == i) {
-                        Some(p) => plus[p],
-                        None => decided[i],
-                    };
-                    let made = vertex(follower, &all);
-                    cache.insert(plus.clone(), made);
-                }
-                let (config, place, rates, asked) = &cache[&plus];
-                let direction: Vec<f64> = set
-                    .iter()
-                    .zip(set.iter().map(|i| place[*i].map_or(0.0, |p| rates.direction(p))))
-                    .map(|(i, direction)| {
-                        let guard = zero[*i];
-                        let turns = |p: usize| rates.first_or_zero(p) == 0.0;
-                        if follower.equation.guards[guard].whole {
-                            direction
-                        } else if direction == 0.0 {
-                            follower.side_ahead_in(config, guard)
-                        } else if let Some(place) = place[*i].filter(|p| turns(*p))
-                            && follower.equation.is_of_conditions(guard)
-                        {
-                            let time = 0.01 * follower.whole_time(&rates.field);
-                            let ahead = follower.values_ahead(config, &[], guard, [0.005, 0.01]);
-                            ahead.map_or(direction, |v| side_of(rates.second[place], time, v))
-                        } else {
-                            direction
-                        }
-                    })
-                    .collect();
-                let rest = |i: &usize| {
-                    let guard = zero[*i];
-                    // A whole number that nothing moves is its own whole part.
-                    let whole = || {
-                        follower.equation.guards[guard].whole
-                            && config.sides[guard] == highs[*i]
-                            && place[*i].is_some_and(|p| rates.stands_still(p))
-                    };
-                    if whole() {
-                        follower.stays_a_little(config, guard)
-                    } else {
-                        follower.equation.rests(guard, config)
-                    }
-                };
-                let rests: Vec<bool> = set.iter().map(rest).collect();
-                let first: Vec<f64> =
-                    set.iter().map(|i| place[*i].map_or(f64::NAN, |p| rates.first[p])).collect();
-                let asked: Vec<bool> = set.iter().map(|i| asked[*i]).collect();
-                let first_or_zero: Vec<f64> = set
-                    .iter()
-                    .map(|i| place[*i].map_or(f64::NAN, |p| rates.first_or_zero(p)))
-                    .collect();
-                (rates.field.clone(), first, direction, asked, first_or_zero, rests)
-            };
-            if set.len() > MOST_TOGETHER {
-                let names: Vec<usize> = set.iter().map(|i| zero[*i]).collect();
-                let low = |i: usize| if decided[i] { highs[i] } else { lows[i] };
-                let plain = names.iter().all(|guard| !self.equation.guards[*guard].whole)
-                    && self.jumped(&zero, &low).iter().all(Option::is_none);
-                let found = plain.then(|| {
-                    complementary(set.len(), &mut |plus| {
-                        let (field, rates, _, asked, _, rests) = at(self, plus);
-                        let known = rates.iter().all(|rate| rate.is_finite());
-                        let all = asked.iter().all(|asked| *asked) && !rests.contains(&true);
-                        (known && all).then_some((field, rates))
-                    })
-                });
-                let Some(found) = found.flatten() else {
-                    let why = format!(
-                        "{} surfaces that depend on each other meet ({}); more than \
-                            {MOST_TOGETHER} are resolved only where the fields are sums of what \
-                            each side adds, and attract: start where fewer are zero at once \
-                            (--start), or smooth the switches",
-                        set.len(),
-                        self.names(&names)
-                    );
-                    return Err(HybridError::Stuck { t: self.t, x: self.x.clone(), why });
-                };
-                set.iter().zip(found).for_each(|(i, way)| ways[*i] = way);
-                continue;
-            }
-            // Fields that are the same on both sides decide nothing and need nothing decided.
-            if set.len() == 1 {
-                let (low, _, d0, ..) = at(self, vec![false]);
-                let (high, _, d1, ..) = at(self, vec![true]);
-                let free = d1[0] == 0.0 || self.equation.is_of_conditions(zero[set[0]]);
-                if at(self, vec![false]).5[0] && free {
-                    ways[set[0]] = Way::Minus;
-                    continue;
-                }
-                if at(self, vec![true]).5[0] {
-                    ways[set[0]] = Way::Plus;
-                    continue;
-                }
-                if same(&low, &high) {
-                    let side = if d1[0] != 0.0 { d1[0] } else { d0[0] };
-                    let present = self.config.sides[zero[set[0]]];
-                    let plus = if side != 0.0 { side > 0.0 } else { present == highs[set[0]] };
-                    ways[set[0]] = if plus { Way::Plus } else { Way::Minus };
-                    continue;
-                }
-                // At a kink the fields differ by rounding, and so do speeds that are nearly zero.
-                let span = self.options.t_end - self.options.t_start;
-                let jumps = (0..self.n)
-                    .any(|i| (low[i] - high[i]).abs() * span > CLEAR_JUMP * self.size[i]);
-                let rests = at(self, vec![false]).5[0];
-                let is_kink = |follower: &mut Self| {
-                    let guard = zero[set[0]];
-                    follower.equation.guards[guard].kink || !jumps && follower.is_kink(guard)
-                };
-                if !rests && is_kink(self) {
-                    let present = self.config.sides[zero[set[0]]] == highs[set[0]];
-                    let plus = if same_sign(d0[0], d1[0]) { d1[0] > 0.0 } else { present };
-                    ways[set[0]] = if plus { Way::Plus } else { Way::Minus };
-                    continue;
-                }
-            }
-            let (mut open, mut edges) = (None, Vec::new());
-            let cells = self.cells_of(&set.iter().map(|i| zero[*i]).collect::<Vec<_>>());
-            let found = possibilities(set.len(), |assignment| {
-                if cells.as_ref().is_some_and(|cells| !cells.has(assignment)) {
-                    return false;
-                }
-                let slides: Vec<usize> =
-                    (0..set.len()).filter(|i| assignment[*i] == Way::Stay).collect();
-                let plus: Vec<bool> = assignment.iter().map(|w| *w == Way::Plus).collect();
-                let on = |i: usize| set.iter().position(|s| *s == i).is_some_and(|p| plus[p]);
-                let high = |i: usize| on(i) || decided[i];
-                let jumped = self.jumped(&zero, &|i| if high(i) { highs[i] } else { lows[i] });
-                let misses = |p: usize| {
-                    let stays = assignment[p] == Way::Stay;
-                    jumped[set[p]].is_some_and(|up| stays || up != plus[p])
-                };
-                if (0..set.len()).any(misses) {
-                    return false;
-                }
-                let (_, base, direction, mut asked, _, rests) = at(self, plus.clone());
-                // A function that is zero all along on the side of another is no surface there.
-                if slides.iter().any(|s| rests[*s]) {
-                    return false;
-                }
-                if let Some(cells) = cells.as_ref().and_then(|cells| cells.part(&slides)) {
-                    let (mut fields, mut speeds) = (Vec::new(), Vec::new());
-                    for cell in &cells.patterns {
-                        let mut on = plus.clone();
-                        slides.iter().enumerate().for_each(|(i, s)| on[*s] = cell >> i & 1 == 1);
-                        let (field, rates, ..) = at(self, on);
-                        fields.push(field);
-                        speeds.push(rates);
-                    }
-                    let own: Vec<Vec<f64>> = speeds
-                        .iter()
-                        .map(|rates| slides.iter().map(|s| rates[*s]).collect())
-                        .collect();
-                    if some_move_one_way(&own) || !(cells.depth(&own) > 0.0) {
-                        return false;
-                    }
-                    if self.options.intersection == Intersection::Undecided {
-                        if velocities_differ(&fields, &own) {
-                            open = Some(SEVERAL_VELOCITIES);
-                            return false;
-                        }
-                        if !cells.attract(&own) {
-                            open = Some(TURNS_AWAY);
-                            return false;
-                        }
-                    }
-                    let Some(weights) = self.weights_in_cells(&fields, &own) else {
-                        return false;
-                    };
-                    let goes = |i: usize| {
-                        let rate: f64 = weights.iter().zip(&speeds).map(|(w, r)| w * r[i]).sum();
-                        match assignment[i] {
-                            Way::Plus => rate > 0.0,
-                            Way::Minus => rate < 0.0,
-                            Way::Stay => true,
-                        }
-                    };
-                    return (0..set.len()).all(goes);
-                }
-                let mut columns = Vec::new();
-                for s in &slides {
-                    let mut flipped = plus.clone();
-                    flipped[*s] = true;
-                    columns.push(at(self, flipped));
-                }
-                // One that stays a whole number on its upper side is none, either.
-                let whole = |s: &usize| self.equation.guards[zero[set[*s]]].whole;
-                if slides.iter().zip(&columns).any(|(s, column)| whole(s) && column.5[*s]) {
-                    return false;
-                }
-                for column in &columns {
-                    asked.iter_mut().zip(&column.3).for_each(|(asked, there)| *asked |= there);
-                }
-                let goes = |i: usize, d: f64| match assignment[i] {
-                    _ if jumped[set[i]].is_some() => true,
-                    Way::Plus => d > 0.0 || d == 0.0 && rests[i],
-                    // A function that is not asked there and stays zero changes nothing.
-                    Way::Minus => d < 0.0 || d == 0.0 && (!asked[i] || rests[i]),
-                    Way::Stay => true,
-                };
-                if slides.is_empty() {
-                    return (0..set.len()).all(|i| goes(i, direction[i]));
-                }
-                let m = slides.len();
-                let mut matrix = vec![0.0; m * m];
-                for (c, (_, rates, ..)) in columns.iter().enumerate() {
-                    for (r, s) in slides.iter().enumerate() {
-                        matrix[r * m + c] = rates[*s] - base[*s];
-                    }
-                }
-                let b: Vec<f64> = slides.iter().map(|s| -base[*s]).collect();
-                // Surfaces of which some stay at zero where the others do.
-                let nearest = (m > 1).then(|| near_solution(&matrix, &b, 0.5)).flatten();
-                let (weights, dependent) = match nearest {
-                    Some((weights, rank)) if rank < m => (Some(weights), true),
-                    _ => (solve_any(&matrix, &b, 0.0), false),
-                };
-                if m == 1 {
-                    // On both sides towards or away from the surface, to second order; or along it
-                    // on one side and towards it on the other.
-                    let (d0, d1) = (direction[slides[0]], columns[0].2[slides[0]]);
-                    let along_one = d0 == 0.0 && d1 < 0.0 || d1 == 0.0 && d0 > 0.0;
-                    if d0 * d1 >= 0.0 && !along_one {
-                        return false;
-                    }
-                } else {
-                    let rule = self.rule();
-                    let chosen = self.options.intersection != Intersection::Undecided;
-                    let (mut fields, mut speeds, mut clear) = (Vec::new(), Vec::new(), Vec::new());
-                    for vertex in 0..1_usize << m {
-                        let mut on = plus.clone();
-                        slides.iter().enumerate().for_each(|(i, s)| on[*s] = vertex >> i & 1 == 1);
-                        let (field, rates, .., first_or_zero, _) = at(self, on);
-                        fields.push(field);
-                        speeds.push(rates);
-                        clear.push(slides.iter().map(|s| first_or_zero[*s]).collect::<Vec<_>>());
-                    }
-                    let guards: Vec<usize> = slides.iter().map(|s| zero[set[*s]]).collect();
-                    let own: Vec<Vec<f64>> = speeds
-                        .iter()
-                        .map(|rates| slides.iter().map(|s| rates[*s]).collect())
-                        .collect();
-                    if some_move_one_way(&own) {
-                        return false;
-                    }
-                    let holds = match clear.as_slice() {
-                        _ if chosen => 1.0,
-                        [a, b, ..] if dependent && m == 2 => {
-                            let still = |i: &usize| clear.iter().all(|rates| rates[*i] == 0.0);
-                            let (Some(position), [a, b]) =
-                                ((0..2).find(still), [guards[0], guards[1]])
-                            else {
-                                return false;
-                            };
-                            let (base, t, x) = (vertex(self, &on).0, self.t, self.x.clone());
-                            let hold = self.position_hold(&base, (t, &x), [a, b], position);
-                            // A field may lead away where none turns.
-                            if hold <= 0.0 && !self.turns_away(&x, [a, b]) {
-                                return false;
-                            }
-                            hold
-                        }
-                        [a, b, c, d] => hold(&[a, b, c, d].map(|rates| [rates[0], rates[1]])),
-                        _ => attraction(
-                            &slides.iter().map(|s| base[*s]).collect::<Vec<_>>(),
-                            &matrix,
-                        ),
-                    };
-                    if !(holds > 0.0) {
-                        // Where fields turn around two surfaces a mixture stays on both.
-                        let stays = |w: &Vec<f64>| w.iter().all(|w| *w > 0.0 && *w < 1.0);
-                        if m == 2 || !dependent && weights.as_ref().is_some_and(stays) {
-                            open = Some(TURNS_AWAY);
-                        }
-                        return false;
-                    }
-                    let several = dependent && velocities_differ(&fields, &own);
-                    if several && !chosen {
-                        open = Some(SEVERAL_VELOCITIES);
-                        return false;
-                    }
-                    by_rule |= several;
-                    // If all mixtures have one velocity, there is nothing to choose.
-                    if several || mixtures_differ(&fields) {
-                        let order = self.order_of(&guards);
-                        let Some(found) = mixture(&rule, &order, &fields, &own) else {
-                            return false;
-                        };
-                        let rate = |i: usize| {
-                            found.weights.iter().zip(&speeds).map(|(w, r)| w * r[i]).sum::<f64>()
-                        };
-                        return found.margins.iter().flatten().all(|w| *w >= -1e-12)
-                            && found.weights.iter().all(|w| (0.0..=1.0).contains(w))
-                            && (0..set.len())
-                                .filter(|i| !slides.contains(i))
-                                .all(|i| goes(i, rate(i)));
-                    }
-                }
-                let Some(weights) = weights else { return false };
-                // Where the motion slides on the functions at these places, and not on others.
-                let ahead = |follower: &mut Self, on: &[bool], slides: &[usize], i: usize| {
-                    let mut config = |on: &[bool]| {
-                        let all = |i: usize| match set.iter().position(|s| *s == i) {
-                            Some(p) => on[p],
-                            None => decided[i],
-                        };
-                        vertex(follower, &all).0
-                    };
-                    let flip = |s: &usize| {
-                        let mut on = on.to_vec();
-                        on[*s] = true;
-                        (zero[set[*s]], config(&on))
-                    };
-                    let flips: Vec<_> = slides.iter().map(flip).collect();
-                    let base = config(on);
-                    follower.side_ahead_sliding(&base, &flips, zero[set[i]])
-                };
-                edges.clear();
-                for (s, w) in slides.iter().zip(&weights).filter(|_| m > 1) {
-                    let edge = if *w > 0.5 { 1.0 } else { -1.0 };
-                    if !(*w > -ALONG && *w < 1.0 + ALONG) {
-                        return false;
-                    }
-                    // Along the surface on one side, to second order, and towards it on the other.
-                    if !(*w > ALONG && *w < 1.0 - ALONG) {
-                        let others: Vec<usize> =
-                            slides.iter().copied().filter(|other| other != s).collect();
-                        let mut on = plus.clone();
-                        on[*s] = edge > 0.0;
-                        if ahead(self, &on, &others, *s) * edge > 0.0 {
-                            return false;
-                        }
-                        edges.push((zero[set[*s]], edge));
-                    }
-                }
-                (0..set.len()).filter(|i| !slides.contains(i)).all(|i| {
-                    let added =
-                        || columns.iter().zip(&weights).map(|((_, r, ..), w)| w * (r[i] - base[i]));
-                    let (rate, size) = (
-                        base[i] + added().sum::<f64>(),
-                        added().fold(base[i].abs(), |a, v| a + v.abs()),
-                    );
-                    // A rate that is zero to rounding counts as zero; where one field is followed
-                    // alone its second derivative is known.
-                    let alone = weights.iter().all(|w| *w == 0.0);
-                    let is_zero = rate.abs() <= 1e-13 * size;
-                    let rate = match (is_zero, alone) {
-                        (false, _) => rate,
-                        (true, true) => direction[i],
-                        (true, false) => ahead(self, &plus, &slides, i),
-                    };
-                    goes(i, rate)
-                })
-            });
-            if let Some(ways) = open {
-                let names: Vec<usize> = set.iter().map(|i| zero[*i]).collect();
-                return Err(self.undecided(&names, ways));
-            }
-            let chosen = match found.as_slice() {
-                [] if self.options.intersection == Intersection::Undecided
-                    && self.comes_to_rest(self.t, true) =>
-                {
-                    return Ok(());
-                }
-                [] if self.meets_more(&zero)? => return Ok(()),
-                [] if set.len() == 1 && self.slides_in_higher_order(zero[set[0]])? => {
-                    let mut rest = self.sliding.clone();
-                    rest.extend(zero.iter().filter(|guard| !self.slides[**guard]));
-                    return self.decide(&rest, &self.slides.clone());
-                }
-                [] => {
-                    let idle = self.idle_kinks(&zero);
-                    let rest: Vec<usize> =
-                        zero.iter().copied().filter(|guard| !idle.contains(guard)).collect();
-                    if rest.len() < zero.len() {
-                        let before = self.left_out.len();
-                        self.left_out.extend(idle);
-                        let decided = self.decide(&rest, kept);
-                        self.left_out.truncate(before);
-                        return decided;
-                    }
-                    let names: Vec<usize> = set.iter().map(|i| zero[*i]).collect();
-                    let here = self.rates(&self.config.clone()).1.field;
-                    if !here.iter().all(|f| f.is_finite()) {
-                        return Err(self.left_domain(self.t, &self.x.clone()));
-                    }
-                    return Err(match self.options.intersection {
-                        Intersection::Order(_) if names.len() > 1 => self.no_mixture(&names),
-                        _ => {
-                            self.undecided(&names, "no way is consistent to first and second order")
-                        }
-                    });
-                }
-                [one] => one.clone(),
-                several => {
-                    let wanted = match self.options.exit {
-                        Exit::Undecided => None,
-                        Exit::Plus => several.iter().find(|w| w.iter().all(|w| *w == Way::Plus)),
-                        Exit::Minus => several.iter().find(|w| w.iter().all(|w| *w == Way::Minus)),
-                    };
-                    match wanted {
-                        Some(chosen) => chosen.clone(),
-                        None => {
-                            let names: Vec<usize> = set.iter().map(|i| zero[*i]).collect();
-                            let words: Vec<String> = several
-                                .iter()
-                                .map(|w| w.iter().map(|w| w.sign()).collect())
-                                .collect();
-                            let all = format!("signs {}", words.join(" or "));
-                            return Err(self.undecided(&names, &all));
-                        }
-                    }
-                }
-            };
-            for (i, way) in set.iter().zip(&chosen) {
-                ways[*i] = *way;
-                if *way == Way::Stay {
-                    self.along[zero[*i]] = 0.0;
-                }
-            }
-            if found.len() == 1 {
-                edges.iter().for_each(|(guard, edge)| self.along[*guard] = *edge);
-            }
-            if let ([i], [Way::Stay]) = (set.as_slice(), chosen.as_slice()) {
-                let (low, high) = (at(self, vec![false]).2[0], at(self, vec![true]).2[0]);
-                self.along[zero[*i]] = if low == 0.0 {
-                    -1.0
-                } else if high == 0.0 {
-                    1.0
-                } else {
-                    0.0
-                };
-            }
-        }
-        // Surfaces that do not change each other's speeds may still act on other states together.
-        let stay: Vec<usize> = (0..k).filter(|i| ways[*i] == Way::Stay).collect();
-        let mut differ = false;
-        let on_one_state = |s: usize| {
-            let on = stay.iter().filter(|i| self.compiled.depends(s, self.n + 1 + zero[**i]));
-            on.count() > 1
-        };
-        let chooses = stay.iter().any(|i| self.equation.chooses(zero[*i]));
-        let guards: Vec<usize> = stay.iter().map(|i| zero[*i]).collect();
-        // Of cells the mixture is known.
-        if stay.len() > 1
-            && self.cells_of(&guards).is_none()
-            && (chooses || (0..self.n).any(on_one_state))
-        {
-            let fields = |follower: &mut Self, on: &dyn Fn(usize) -> bool| {
-                vertex(follower, &|i| ways[i] == Way::Plus || (ways[i] == Way::Stay && on(i)))
-                    .2
-                    .field
-            };
-            let base = fields(self, &|_| false);
-            let corner = fields(self, &|_| true);
-            let mut sum = base.clone();
-            for s in &stay {
-                let one = fields(self, &|i| i == *s);
-                sum.iter_mut()
-                    .zip(one.iter().zip(&base))
-                    .for_each(|(sum, (one, base))| *sum += one - base);
-            }
-            let size = corner.iter().chain(&base).fold(0.0_f64, |most, v| most.max(v.abs()));
-            differ = by_rule || sum.iter().zip(&corner).any(|(p, c)| (p - c).abs() > 1e-9 * size);
-            let undecided = self.options.intersection == Intersection::Undecided;
-            let mut several = || {
-                if stay.len() > MOST_CORNERS {
-                    return true;
-                }
-                let (mut fields, mut rates) = (Vec::new(), Vec::new());
-                for corner in 0..1_usize << stay.len() {
-                    let on = |i: usize| {
-                        stay.iter().position(|s| *s == i).is_some_and(|p| corner >> p & 1 == 1)
-                    };
-                    let (_, place, here, _) =
-                        vertex(self, &|i| ways[i] == Way::Plus || (ways[i] == Way::Stay && on(i)));
-                    let rate = |s: &usize| place[*s].map_or(f64::NAN, |p| here.first[p]);
-                    rates.push(stay.iter().map(rate).collect());
-                    fields.push(here.field);
-                }
-                velocities_differ(&fields, &rates)
-            };
-            if differ && undecided && several() {
-                let names: Vec<usize> = stay.iter().map(|i| zero[*i]).collect();
-                return Err(self.undecided(&names, SEVERAL_VELOCITIES));
-            }
-        }
-        let mut config = self.config.clone();
-        let mut sliding = Vec::new();
-        for (i, guard) in zero.iter().enumerate() {
-            match ways[i] {
-                Way::Plus => config.sides[*guard] = highs[i],
-                Way::Minus => config.sides[*guard] = lows[i],
-                Way::Stay => {
-                    config.sides[*guard] = lows[i];
-                    sliding.push(*guard);
-                }
-            }
-            self.fresh_guard[*guard] = true;
-            self.tangent_guard[*guard] = false;
-        }
-        // A condition that leaves zero to third order does so without a speed, too.
-        let of_conditions = |guard: &usize| self.equation.is_of_conditions(*guard);
-        if k > 1 || some_noise.get() || self.touching[zero[0]] || zero.iter().any(of_conditions) {
-            let (_, place, rates, _) = vertex(self, &|i| ways[i] == Way::Plus);
-            for (guard, place) in zero.iter().zip(&place) {
-                let turns =
-                    |p: usize| rates.direction(p) != 0.0 || self.equation.is_of_conditions(*guard);
-                let tangent = |p: usize| rates.first_or_zero(p) == 0.0 && turns(p);
-                self.tangent_guard[*guard] = place.is_some_and(tangent);
-            }
-        }
-        self.ask_new(&mut config);
-        self.follow_sides(&mut config, &zero);
-        if some_rest.get() {
-            self.let_rest(&mut config, &zero, &sliding);
-        }
-        sliding.sort_unstable();
-        self.adopt(config, sliding);
-        if self.cells.is_none() {
-            self.corners = Vec::new();
-        }
-        let left = self.leave_by_jump(&zero, &before);
-        if !left.is_empty() {
-            let (rest, none) = (
-                zero.into_iter().filter(|g| !left.contains(g)).collect::<Vec<_>>(),
-                vec![false; self.slides.len()],
-            );
-            self.decide(&rest, &none)?;
-            return self.follow_jumps(&rest);
-        }
-        if self.dependent && self.tangents.is_some() {
-            return Err(self.no_tangents(
-                "the motion slides on surfaces that depend on each other, where neighbours have \
-                    no common linear motion",
-            ));
-        }
-        if differ {
-            if self.sliding.len() > MOST_CORNERS {
-                let why = format!(
-                    "more than {MOST_CORNERS} surfaces meet, where mixtures of the fields have \
-                        different velocities"
-                );
-                return Err(HybridError::Stuck { t: self.t, x: self.x.clone(), why });
-            }
-            self.take_corners();
-            if self.tangents.is_some() {
-                return Err(self.no_tangents(
-                    "the motion follows a mixture of more fields than their surfaces decide",
-                ));
-            }
-            let (t, x) = (self.t, self.x.clone());
-            let (found, ..) = self.corner_mixture(t, &x);
-            let all = found.weights.iter().chain(found.margins.iter().flatten());
-            if !all.into_iter().all(|w| (-1e-9..=1.0 + 1e-9).contains(w)) {
-                return Err(self.no_mixture(&self.sliding));
-            }
-        }
-        if let Err(open) = self.no_side_is_left_open(&zero) {
-            let undecided = self.options.intersection == Intersection::Undecided;
-            return if undecided && self.comes_to_rest(self.t, true) { Ok(()) } else { Err(open) };
-        }
-        self.follow_jumps(&zero)
-    }
-
     /// Decides without those kinks among functions that are zero that follow from the others, as
     /// that of abs(x - y) where x and y are zero: as long as these are slid upon it stays at zero,
     /// and the fields of both its sides are one there. False, and nothing is changed, if there are
     /// none or the others do not stay.
-    fn decide_without_kinks(&mut self, zero: &[usize], kept: &[bool]) -> bool {
+    pub(super) fn decide_without_kinks(&mut self, zero: &[usize], kept: &[bool]) -> bool {
         if zero.len() < 3 || !self.left_out.is_empty() {
             return false;
         }
@@ -1461,7 +712,7 @@ impl Follower<'_> {
     /// Whether more functions are zero here, to the error of the integration, than those from which
     /// no way is known, as a position's speed where turns about it have come to their end, and the
     /// motion goes on from where all of them are.
-    fn meets_more(&mut self, zero: &[usize]) -> Result<bool, HybridError> {
+    pub(super) fn meets_more(&mut self, zero: &[usize]) -> Result<bool, HybridError> {
         let values = self.watched_values();
         let largest = self.size.iter().fold(0.0_f64, |most, s| most.max(*s));
         let error = 10.0 * self.options.rtol * largest;
@@ -1485,7 +736,7 @@ impl Follower<'_> {
 
     /// The kinks among functions that are zero whose sides change nothing until the run ends: both
     /// have one field here, as those of abs(v) where v has decayed to rounding.
-    fn idle_kinks(&mut self, zero: &[usize]) -> Vec<usize> {
+    pub(super) fn idle_kinks(&mut self, zero: &[usize]) -> Vec<usize> {
         /// Of a state's size.
         const NOTHING: f64 = 1e-8;
         let left = self.options.t_end - self.t;
@@ -1546,7 +797,11 @@ impl Follower<'_> {
 
     /// Of the functions in `zero`, those that with these sides of all of them are not zero, and
     /// whether they are above: so is if(x > 0, x, 2) on the lower side of x = 0.
-    fn jumped(&mut self, zero: &[usize], side: &dyn Fn(usize) -> f64) -> Vec<Option<bool>> {
+    pub(super) fn jumped(
+        &mut self,
+        zero: &[usize],
+        side: &dyn Fn(usize) -> f64,
+    ) -> Vec<Option<bool>> {
         if zero.len() == 1 {
             return vec![None];
         }
@@ -1646,7 +901,7 @@ impl Follower<'_> {
 
     /// A function that stays zero while the motion slides on another's zero has no side that the
     /// equations decide: so has x*z on x = 0. What its side changes nothing of may stay open.
-    fn no_side_is_left_open(&mut self, zero: &[usize]) -> Result<(), HybridError> {
+    pub(super) fn no_side_is_left_open(&mut self, zero: &[usize]) -> Result<(), HybridError> {
         if self.sliding.is_empty() {
             return Ok(());
         }
@@ -1695,7 +950,7 @@ impl Follower<'_> {
 
     /// Puts speeds of the functions in `zero` that are only rounding to zero: the state and the
     /// time are known to rounding alone. Whether there are any.
-    fn drop_noise(
+    pub(super) fn drop_noise(
         &self,
         config: &Configuration,
         compiled: &Compiled,
@@ -2171,7 +1426,7 @@ impl Follower<'_> {
     }
 
     /// A time in which states that move so change by their sizes; the time left, if less.
-    fn whole_time(&self, field: &[f64]) -> f64 {
+    pub(super) fn whole_time(&self, field: &[f64]) -> f64 {
         let moves = field.iter().zip(&self.size).filter(|(f, size)| **f != 0.0 && **size != 0.0);
         let left = self.options.t_end - self.t;
         moves.map(|(f, size)| size / f.abs()).fold(left, f64::min)
@@ -2420,25 +1675,10 @@ fn is_sum_of(others: &[Vec<f64>], mut row: Vec<f64>) -> bool {
     size > 0.0 && dot(&row, &row).sqrt() <= 1e-9 * size
 }
 
-/// Whether mixtures of 2^k fields have more than one velocity on their surfaces: the fields are not
-/// sums of what each side adds.
-pub(super) fn mixtures_differ(fields: &[Vec<f64>]) -> bool {
-    let n = fields[0].len();
-    let size = fields.iter().flatten().fold(0.0_f64, |most, v| most.max(v.abs()));
-    let added = |vertex: usize, i: usize| -> f64 {
-        (0..fields.len().ilog2())
-            .filter(|bit| vertex >> bit & 1 == 1)
-            .map(|bit| fields[1 << bit][i] - fields[0][i])
-            .sum()
-    };
-    (0..fields.len())
-        .any(|v| (0..n).any(|i| (fields[0][i] + added(v, i) - fields[v][i]).abs() > 1e-9 * size))
-}
-
 /// The side to which a function without a speed leaves zero: that of its second derivative, or, if
 /// this is zero or no more than an error beside the values after a time and half of it, the one to
 /// which it grows by more than a square; 0 if it stays.
-fn side_of(bend: f64, time: f64, [half, whole]: [f64; 2]) -> f64 {
+pub(super) fn side_of(bend: f64, time: f64, [half, whole]: [f64; 2]) -> f64 {
     /// Of the larger value.
     const ERROR: f64 = 1e-6;
     let bend = if bend.is_finite() { bend } else { 0.0 };
