@@ -701,9 +701,14 @@ impl Follower<'_> {
 
     /// Whether a condition holds at the very place of a state.
     fn holds_at(&mut self, e: &Expression, x: &[f64]) -> bool {
+        self.holds_but(e, x, &[])
+    }
+
+    /// The same, with these functions on the sides that they have.
+    fn holds_but(&mut self, e: &Expression, x: &[f64], kept: &[usize]) -> bool {
         let now = std::mem::replace(&mut self.x, x.to_vec());
         let mut at = self.config.clone();
-        for guard in 0..at.sides.len() {
+        for guard in (0..at.sides.len()).filter(|guard| !kept.contains(guard)) {
             match self.side_of(guard) {
                 Some(side) => at.sides[guard] = side,
                 None if !self.equation.guards[guard].whole => at.sides[guard] = 0.0,
@@ -771,21 +776,19 @@ impl Follower<'_> {
             }
             // Where it has fired itself only what it has led to counts.
             let states = if fired.contains(&i) { &states[states.len() - 2..] } else { states };
-            // A place that the events have not led to is only touched.
-            let asked = self.equation.of_events[i].clone();
-            let values = |follower: &Self, x: &[f64]| -> Vec<f64> {
-                let value = |guard: &usize| {
-                    follower.equation.value(
-                        &follower.equation.guards[*guard].expression,
-                        follower.t,
-                        x,
-                    )
-                };
-                asked.iter().map(value).collect()
+            // A place that the events have not led to is only touched: what they leave alone is on
+            // the side to which the motion goes, be it met at this moment.
+            let stays = |guard: &usize| {
+                let value = &self.equation.guards[*guard].expression;
+                let mut values = states.iter().map(|x| self.equation.value(value, self.t, x));
+                let first = values.next();
+                values.all(|value| Some(value) == first)
             };
-            let moves = states.windows(2).any(|two| values(self, &two[0]) != values(self, &two[1]));
+            let (mut kept, moved): (Vec<usize>, Vec<usize>) =
+                self.equation.of_events[i].iter().copied().partition(stays);
+            kept.retain(|guard| !self.sliding.contains(guard));
             let asked = if fired.contains(&i) { &states[1..] } else { states };
-            if moves && !asked.iter().all(|x| self.holds_at(e, x)) {
+            if !moved.is_empty() && !asked.iter().all(|x| self.holds_but(e, x, &kept)) {
                 found.push(i);
             }
         }

@@ -123,10 +123,34 @@ impl Follower<'_> {
         }
     }
 
+    /// A guard's value. Its whole parts that are at their jumps are on the sides that they have:
+    /// rounding may put the moment before the jump.
+    fn value_on_sides(&self, guard: usize) -> f64 {
+        let plain = |guard: usize| {
+            self.equation.value(&self.equation.guards[guard].expression, self.t, &self.x)
+        };
+        let jumps = |place: usize, other: usize| {
+            let side = self.config.sides[other];
+            let near = |value: f64| side == value.round() || side == value.round() - 1.0;
+            self.equation.guards[other].whole
+                && self.compiled.depends(self.n + place, self.n + 1 + other)
+                && self.side_of(other).is_none()
+                && near(plain(other))
+        };
+        let place = self.compiled.place(guard);
+        let Some(place) = place.filter(|p| self.compiled.active.iter().any(|o| jumps(*p, *o)))
+        else {
+            return plain(guard);
+        };
+        let mut values = vec![0.0; self.compiled.outputs];
+        self.compiled.watched.evaluate(&self.load(&self.config), &mut values);
+        values[place]
+    }
+
     /// Side that a guard's value is on; none if it is zero to rounding.
     pub(super) fn side_of(&self, guard: usize) -> Option<f64> {
         let g = &self.equation.guards[guard];
-        let value = self.equation.value(&g.expression, self.t, &self.x);
+        let value = self.value_on_sides(guard);
         if value.is_nan() {
             return Some(if g.whole { 0.0 } else { 1.0 });
         }

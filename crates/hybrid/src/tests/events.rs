@@ -1,6 +1,6 @@
 //! Events, conditions, clocks and modes.
 
-use super::{end, end_of, last, model, near, run, shipped};
+use super::{by_each_method, end, end_of, last, model, near, run, shipped};
 use crate::motion::{Method, Record, follow_to_rest, sensitivity};
 use crate::{Ending, Options, follow};
 
@@ -926,6 +926,44 @@ fn a_table_of_previous_values_ends_with_its_last_row() {
             let options = Options { t_end: 2.0, method, ..Options::default() };
             let x = follow(&model, &options, &mut |_| true).unwrap().x;
             assert_eq!(x[0], 2.0, "{event}: {method:?}");
+        }
+    }
+}
+
+/// The rows' jumps are at multiples of 0.379, each once, on whichever side rounding puts them.
+#[test]
+fn a_condition_with_a_whole_part_is_met_once_at_its_jump() {
+    for extra in ["and x > -50", "and y < 5"] {
+        let text = format!(
+            "states = ['x', 'y', 'n']\nstart = [0.3, 0, 0]\nf = ['1.5 - x', '1 - y', '0']\n\
+                [[event]]\nwhen = 'mod(t, 0.379) < 0.266 {extra}'\n\
+                set = {{ x = '0.5*x + 1', y = '0', n = 'n + 1' }}"
+        );
+        for outcome in by_each_method(&text, 20.01) {
+            near(*outcome.x.last().unwrap(), 52.0, 0.0);
+        }
+    }
+}
+
+/// Each becomes true when its first half does: the reset does not move that.
+#[test]
+fn a_reset_of_one_half_of_a_condition_does_not_make_it_true_again() {
+    let counts = [
+        ("t > 1.3 and y < 5", 1.0),
+        ("x < 0.4 and y < 5", 1.0),
+        ("x < 0.4 or y > 5", 1.0),
+        ("sin(3*t) > 0.5 and y < 5", 4.0),
+        ("abs(mod(t, 0.5) - 0.413) < 0.1 and y < 5", 16.0),
+        ("mod(floor(s/0.7), 2) > 0.5 and y < 5", 6.0),
+    ];
+    for (when, count) in counts {
+        let text = format!(
+            "states = ['x', 'y', 's', 'n']\nstart = [1, 0.3, 0, 0]\nf = ['-x', '1.5 - y', '1', \
+                '0']\n[[event]]\nwhen = '{when}'\nset = {{ y = '0.5*y + 0.3', n = 'n + 1' }}"
+        );
+        for outcome in by_each_method(&text, 8.0) {
+            assert_eq!(outcome.ending, Ending::Finished, "{when}");
+            near(*outcome.x.last().unwrap(), count, 0.0);
         }
     }
 }
