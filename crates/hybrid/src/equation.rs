@@ -36,14 +36,9 @@ pub struct Guard {
     pub kink: bool,
     /// Whether nothing moves it but the sides of others.
     pub(crate) fixed: bool,
-}
-
-impl Guard {
-    /// Whether it is a kink that only the sides of others move: that of clip(sign(x), 0, 1) is no
-    /// surface.
-    pub(crate) fn of_sides(&self) -> bool {
-        self.kink && self.fixed
-    }
+    /// Whether it is a kink or a whole part that only the sides of others move: that of
+    /// clip(sign(x), 0, 1) is no surface, nor is floor(floor(t)/2).
+    pub(crate) of_sides: bool,
 }
 
 /// The answers to all switching functions, the mode, and the pieces of tables that hold.
@@ -297,6 +292,11 @@ impl Equation {
         for e in &conditions {
             equation.find(e, true, true)?;
         }
+        let of_sides = |g: &Guard| {
+            if g.whole { equation.is_of_sides(&g.expression) } else { g.kink && g.fixed }
+        };
+        let of_sides: Vec<bool> = equation.guards.iter().map(of_sides).collect();
+        equation.guards.iter_mut().zip(of_sides).for_each(|(guard, of)| guard.of_sides = of);
         let asked = |event: &crate::definition::Event| match &event.when {
             When::Becomes(e) => equation.guards_of(e),
             _ => Vec::new(),
@@ -858,7 +858,7 @@ impl Equation {
             }
         }
         self.by_text.insert(key(&expression), (i, false));
-        self.guards.push(Guard { expression, whole, chooses, kink, fixed: false });
+        self.guards.push(Guard { expression, whole, chooses, kink, fixed: false, of_sides: false });
     }
 
     /// The guard of an expression, and whether it is the expression's negative.

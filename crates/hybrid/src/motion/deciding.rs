@@ -227,8 +227,8 @@ impl Follower<'_> {
     /// the speed of the only one is no more than that.
     fn take_in_noise(&mut self, zero: &mut Vec<usize>) {
         // Functions that only others' sides move follow those.
-        if !zero.iter().all(|guard| self.equation.guards[*guard].of_sides()) {
-            zero.retain(|guard| !self.equation.guards[*guard].of_sides());
+        if !zero.iter().all(|guard| self.equation.guards[*guard].of_sides) {
+            zero.retain(|guard| !self.equation.guards[*guard].of_sides);
         }
         if self.equation.has_domain_ends {
             self.put_into_domain(zero);

@@ -967,3 +967,21 @@ fn a_reset_of_one_half_of_a_condition_does_not_make_it_true_again() {
         }
     }
 }
+
+/// The whole part of a whole part moves with that alone, also at the very start.
+#[test]
+fn square_waves_by_whole_parts_begin_at_a_jump() {
+    let counts = [
+        ("mod(floor(-t/0.7), 2) > 0.5", 5.0),
+        ("not (mod(s, 0.5) >= 0.25) and mod(floor(t/1.6), 2) > 0.5", 7.0),
+    ];
+    for (when, count) in counts {
+        let text = format!(
+            "states = ['y', 's', 'n']\nstart = [0.3, 0, 0]\nf = ['1.5 - y', '1', '0']\n\
+                [[event]]\nwhen = '{when}'\nset = {{ y = '0.5*y + 0.3', n = 'n + 1' }}"
+        );
+        for outcome in by_each_method(&text, 7.9) {
+            near(*outcome.x.last().unwrap(), count, 0.0);
+        }
+    }
+}
