@@ -38,7 +38,7 @@ impl Definition {
     }
 }
 
-/// How much a file may define.
+/// Refuses a file that defines more than a system may.
 fn limits(d: &Document) -> Result<(), Problem> {
     let sound = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     if d.name.len() > 64 || !d.name.chars().all(sound) {
@@ -78,7 +78,7 @@ fn files_of_tables(d: &Document) -> Result<(), Problem> {
     Ok(())
 }
 
-/// What is known of a file while its expressions are read.
+/// A file whose expressions are being read, and its names.
 struct Reader<'a> {
     d: &'a Document,
     /// The names that expressions may use.

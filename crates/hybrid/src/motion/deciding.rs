@@ -45,7 +45,7 @@ struct Vertex {
     asked: Vec<bool>,
 }
 
-/// What the functions of a set do where each of them is on one side.
+/// The rates of the functions of a set where each of them is on one side.
 struct Corner {
     field: Vec<f64>,
     first: Vec<f64>,
@@ -132,7 +132,7 @@ impl Trial<'_> {
         on
     }
 
-    /// What a corner says about the functions that stay.
+    /// Of a corner's numbers those of the functions that stay.
     fn own(&self, rates: &[f64]) -> Vec<f64> {
         self.slides.iter().map(|s| rates[*s]).collect()
     }
@@ -366,7 +366,7 @@ impl Follower<'_> {
         sets
     }
 
-    /// What the functions of a set do with these on their upper sides.
+    /// The rates of the functions of a set with these on their upper sides.
     fn corner(&mut self, set: &mut Set, plus: &[bool]) -> Rc<Corner> {
         if let Some(known) = set.corners.get(plus) {
             return known.clone();
