@@ -4,7 +4,7 @@ use nalgebra::{SMatrix, SVector};
 
 use super::step::Step;
 use twofold_num::elementary::cos;
-use twofold_num::{Dual, Interval};
+use twofold_num::{Dual, Elementary, Interval};
 
 /// The zero of `f` in [a, b], f(a) and f(b) of opposite sign or one of them zero, to the last bits
 /// of the bracket.
@@ -386,12 +386,25 @@ pub fn first_zero_after(from: f64, f: &dyn Fn(f64) -> f64) -> Option<Zero> {
     })
 }
 
-/// A number on a piece of a step with its derivative by the fraction of the step, both enclosed.
-pub type Enclosed = Dual<Interval, 1>;
+/// A function of the state.
+pub trait OfState<const N: usize> {
+    /// Its value at `x`: in plain numbers, or over a set of states.
+    fn at<S: Elementary>(&self, x: &SVector<S, N>) -> S;
+}
 
-/// The first zero on (0, 1] of a function of the state along `step`, `f` at a fraction of the step
-/// and `enclosed` over a set of states. None is missed at which the function has structure that the
-/// interpolant in f64 can show, however close two of them are.
+/// A number on a piece of a step with its derivative by the fraction of the step (or without, if
+/// `K` is 0), both enclosed.
+type Enclosed<const K: usize> = Dual<Interval, K>;
+
+/// A function of the state over sets of states: by itself, and with its derivative. Both make the
+/// same enclosures of its values.
+struct Enclosures<'a, const N: usize> {
+    value: &'a dyn Fn(&SVector<Enclosed<0>, N>) -> Enclosed<0>,
+    with_slope: &'a dyn Fn(&SVector<Enclosed<1>, N>) -> Enclosed<1>,
+}
+
+/// The first zero on (0, 1] of a function of the state along `step`. None is missed at which the
+/// function has structure that the interpolant in f64 can show, however close two of them are.
 ///
 /// The dense output is enclosed on a piece of the step by its Bernstein coefficients, the function
 /// and its derivative along it by interval arithmetic; a piece is passed where the function is
@@ -400,8 +413,18 @@ pub type Enclosed = Dual<Interval, 1>;
 /// [`first_zero`] has the last word on its place if it finds the same one.
 pub fn first_zero_along<const N: usize>(
     step: &Step<'_, N>,
+    function: &impl OfState<N>,
+    start: Start,
+) -> Option<Zero> {
+    let enclosed = Enclosures { value: &|x| function.at(x), with_slope: &|x| function.at(x) };
+    first_zero_enclosed(step, &|theta| function.at(&step.at(theta)), &enclosed, start)
+}
+
+/// [`first_zero_along`] of a function that is `f` at a fraction of the step.
+fn first_zero_enclosed<const N: usize>(
+    step: &Step<'_, N>,
     f: &dyn Fn(f64) -> f64,
-    enclosed: &dyn Fn(&SVector<Enclosed, N>) -> Enclosed,
+    enclosed: &Enclosures<'_, N>,
     start: Start,
 ) -> Option<Zero> {
     let Some(coefficients) = step.interpolant.bernstein() else { return first_zero(f, start) };
@@ -500,8 +523,13 @@ impl<const N: usize> Piece<N> {
         [Self { b: middle, x, slope, ..*self }, Self { a: middle, x: x1, slope: slope1, ..*self }]
     }
 
-    /// The states on it with their derivatives; the rounding of the coefficients is included.
-    fn states(&self) -> SVector<Enclosed, N> {
+    /// The states on it; the rounding of the coefficients is included.
+    fn states(&self) -> SVector<Enclosed<0>, N> {
+        SVector::from_fn(|i, _| Dual::constant(hull(&self.x, i, self.rounding[0][i])))
+    }
+
+    /// The same with their derivatives.
+    fn states_with_slopes(&self) -> SVector<Enclosed<1>, N> {
         let [of_x, of_slope] = &self.rounding;
         SVector::from_fn(|i, _| Dual {
             value: hull(&self.x, i, of_x[i]),
@@ -510,13 +538,9 @@ impl<const N: usize> Piece<N> {
     }
 
     /// Whether the function is zero at the state `x` of the step as far as its rounding lets tell.
-    fn touches(
-        &self,
-        x: SVector<f64, N>,
-        enclosed: &dyn Fn(&SVector<Enclosed, N>) -> Enclosed,
-    ) -> bool {
+    fn touches(&self, x: SVector<f64, N>, enclosed: &Enclosures<'_, N>) -> bool {
         let [of_x, _] = &self.rounding;
-        enclosed(&SVector::from_fn(|i, _| Dual::constant(hull(&[x], i, of_x[i]))))
+        (enclosed.value)(&SVector::from_fn(|i, _| Dual::constant(hull(&[x], i, of_x[i]))))
             .value
             .contains(0.0)
     }
@@ -534,7 +558,7 @@ fn hull<const N: usize>(c: &[SVector<f64, N>], i: usize, rounding: f64) -> Inter
 fn scan<const N: usize>(
     whole: Piece<N>,
     f: &dyn Fn(f64) -> f64,
-    enclosed: &dyn Fn(&SVector<Enclosed, N>) -> Enclosed,
+    enclosed: &Enclosures<'_, N>,
     start: Start,
 ) -> Scan {
     let sign = match start {
@@ -556,10 +580,10 @@ fn scan<const N: usize>(
     for _ in 0..MOST_PIECES {
         let Some(piece) = waiting.pop() else { return Scan::Nothing };
         let (a, b) = (piece.a, piece.b);
-        let at = enclosed(&piece.states());
-        if !at.value.contains(0.0) {
+        let value = (enclosed.value)(&piece.states()).value;
+        if !value.contains(0.0) {
             // A piece that begins beyond zero, by rounding, has its crossing there.
-            if at.value.is_positive() != (sign > 0.0) {
+            if value.is_positive() != (sign > 0.0) {
                 return if a > 0.0 {
                     Scan::Crossing((a - NARROWEST).max(0.0), a)
                 } else {
@@ -568,7 +592,7 @@ fn scan<const N: usize>(
             }
             continue;
         }
-        let slope = at.partials[0];
+        let [slope] = (enclosed.with_slope)(&piece.states_with_slopes()).partials;
         if slope.is_positive() || slope.is_negative() {
             // Away from zero; or towards it, as far as its sign at the end says.
             if slope.is_positive() != (sign > 0.0) && changed(b) {
@@ -581,7 +605,7 @@ fn scan<const N: usize>(
             waiting.extend([right, left]);
         } else if changed(b) {
             return Scan::Crossing(a, b);
-        } else if at.value.is_bounded() && (a > 0.0 || start == Start::Away) {
+        } else if value.is_bounded() && (a > 0.0 || start == Start::Away) {
             return Scan::Touch(0.5 * (a + b));
         }
     }

@@ -38,6 +38,7 @@ mod side_by_side;
 
 use std::cell::RefCell;
 use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
 
 use super::decimal::{Decimal, FromDecimal};
 use super::scalar::operators;
@@ -143,7 +144,7 @@ impl Tape {
                 operations: (0..variables).map(Operation::Variable).collect(),
                 ..Tape::default()
             },
-            index: HashMap::new(),
+            index: HashMap::default(),
         };
         // A recording inside a recording gets a sheet of its own, and the outer one its sheet back.
         let outer = RECORDER.replace(recorder);
@@ -231,6 +232,27 @@ impl Tape {
         powers
     }
 
+    /// The degree of the function's values as polynomials of the variables, without regard to terms
+    /// that cancel; `None` if one of them is no polynomial.
+    pub fn degree(&self) -> Option<u32> {
+        let mut degrees: Vec<Option<u32>> = Vec::with_capacity(self.operations.len());
+        for operation in &self.operations {
+            let of = |a: Node| degrees[a];
+            let degree = match *operation {
+                Operation::Variable(_) => Some(1),
+                Operation::Add(a, b) | Operation::Sub(a, b) => {
+                    of(a).zip(of(b)).map(|(a, b)| a.max(b))
+                }
+                Operation::Mul(a, b) => of(a).zip(of(b)).map(|(a, b)| a.saturating_add(b)),
+                Operation::Div(a, b) if of(b) == Some(0) => of(a),
+                Operation::Neg(a) => of(a),
+                other => other.arguments().all(|a| of(a) == Some(0)).then_some(0),
+            };
+            degrees.push(degree);
+        }
+        self.outputs.iter().try_fold(0, |most, node| Some(degrees[*node]?.max(most)))
+    }
+
     /// The values of all operations at `x`, in double precision.
     ///
     /// # Panics
@@ -315,7 +337,30 @@ impl Tape {
 #[derive(Debug, Default)]
 struct Recorder {
     tape: Tape,
-    index: HashMap<Operation, Node>,
+    index: HashMap<Operation, Node, BuildHasherDefault<Mixer>>,
+}
+
+/// A hash of operations, which are a few small numbers: the multiplicative one of rustc.
+#[derive(Default)]
+struct Mixer(u64);
+
+impl Hasher for Mixer {
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|byte| self.write_u64(u64::from(*byte)));
+    }
+    fn write_u64(&mut self, number: u64) {
+        self.0 = (self.0.rotate_left(5) ^ number).wrapping_mul(0x517c_c1b7_2722_0a95);
+    }
+    fn write_usize(&mut self, number: usize) {
+        self.write_u64(number as u64);
+    }
+    fn write_isize(&mut self, number: isize) {
+        self.write_u64(number as u64);
+    }
+    fn finish(&self) -> u64 {
+        // A table's places are told by the lowest bits, which the product mixes least.
+        self.0.rotate_left(26)
+    }
 }
 
 impl Recorder {
@@ -626,6 +671,21 @@ mod tests {
     }
 
     #[test]
+    fn degrees_are_those_of_the_factors() {
+        let degree = |f: fn(Recorded, Recorded) -> Recorded| {
+            Tape::record(2, |v| vec![v[0], f(v[0], v[1])]).degree()
+        };
+        fn two() -> Recorded {
+            Recorded::from_f64(2.0)
+        }
+        assert_eq!(degree(|x, y| x * (y + x * x) / two().sqrt() - y), Some(3));
+        assert_eq!(degree(|x, _| (x - x) * x), Some(2));
+        assert_eq!(degree(|_, _| two()), Some(1));
+        assert_eq!(degree(|x, y| x / y), None);
+        assert_eq!(degree(|x, _| x + x.sign()), None);
+    }
+
+    #[test]
     fn programs_leave_out_what_is_not_asked_for() {
         let t = tape();
         assert!(Program::new(&t.select([0])).instructions() < Program::new(&t).instructions());
@@ -634,6 +694,8 @@ mod tests {
         let mut out = [0.0];
         constant.evaluate(&[1.0, 1.0], &mut out);
         assert_eq!(out, [2.5]);
+        let coordinates = Program::new(&Tape::record(2, |x| vec![x[1], Recorded::one(), x[0]]));
+        assert_eq!(program(&coordinates, 3.0, 5.0), [5.0, 1.0, 3.0]);
     }
 
     #[test]

@@ -240,7 +240,9 @@ pub fn normal_form_constants<P: PiecewiseSmooth<N>, const N: usize>(
     (v, w)
 }
 
-fn dot<S: Elementary, const N: usize>(a: &SVector<S, N>, b: &SVector<S, N>) -> S {
+/// The sum of the products of the components, in their order.
+#[doc(hidden)]
+pub fn dot<S: Elementary, const N: usize>(a: &SVector<S, N>, b: &SVector<S, N>) -> S {
     let mut sum = S::zero();
     for i in 0..N {
         sum += a[i] * b[i];

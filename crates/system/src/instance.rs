@@ -52,6 +52,8 @@ struct Functions {
     switching: Program,
     plus: Program,
     minus: Program,
+    /// [`PiecewiseSmooth::degrees`].
+    degrees: Option<[u32; 2]>,
 }
 
 /// A wrong parameter.
@@ -117,8 +119,10 @@ impl System {
         let names = definition.states().iter().map(|s| s.name.clone());
         let tape = definition.tape(&values).with_names(names);
         let n = definition.dimension();
+        let h = tape.select([0]);
         let functions = Functions {
-            switching: Program::new(&tape.select([0])),
+            degrees: h.degree().zip(tape.select(1..=2 * n).degree()).map(<[u32; 2]>::from),
+            switching: Program::new(&h),
             plus: Program::new(&tape.select(1..=n)),
             minus: Program::new(&tape.select(n + 1..=2 * n)),
             tape,
@@ -396,6 +400,9 @@ impl<const N: usize> PiecewiseSmooth<N> for Bound<N> {
     #[inline]
     fn minus<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N> {
         run(&self.functions.minus, x)
+    }
+    fn degrees(&self) -> Option<[u32; 2]> {
+        self.functions.degrees
     }
     fn names(&self) -> Vec<String> {
         (0..N).map(|i| self.functions.tape.name(i)).collect()

@@ -153,6 +153,12 @@ pub trait PiecewiseSmooth<const N: usize>: Sync {
     fn plus<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N>;
     /// The vector field f- that holds where h < 0; smooth and defined on both sides.
     fn minus<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N>;
+    /// Degrees of the polynomials that h and both fields are, as [`Tape::degree`] counts them;
+    /// `None` where they are not known to be polynomials.
+    #[doc(hidden)]
+    fn degrees(&self) -> Option<[u32; 2]> {
+        None
+    }
     /// The states' names, which messages use; empty if none were given.
     fn names(&self) -> Vec<String> {
         Vec::new()

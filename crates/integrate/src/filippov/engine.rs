@@ -4,6 +4,7 @@ mod flight;
 mod folds;
 mod slide;
 
+use std::cell::OnceCell;
 use std::sync::Arc;
 
 use nalgebra::SVector;
@@ -11,8 +12,8 @@ use nalgebra::SVector;
 use super::automatic::Automatic;
 use super::exit::{Chooser, ExitPlan};
 use super::flow::{
-    FreeFlow, InPhysicalTime, Sided, SlidingFlow, Straight, Truncated, desingularised, length,
-    lie_derivative, project,
+    FreeFlow, Height, InPhysicalTime, Sided, SlidingFlow, Straight, Truncated, desingularised,
+    length, lie_derivative, project,
 };
 use super::two_fold::{AlongCurve, FusedFolds, LARGEST_RADIUS, Linearised, SlidingAtTwoFold};
 use super::{
@@ -21,9 +22,10 @@ use super::{
 };
 use crate::driver::Monitor;
 use crate::guard::Gates;
-use crate::roots::{Enclosed, Start, Zero, brent, first_zero, first_zero_after, first_zero_along};
+use crate::roots::{OfState, Start, Zero, brent, first_zero, first_zero_after, first_zero_along};
 use crate::step::{Failure, Flow, Interpolant, Statistics, Step, StopReason, Tolerance, finite};
-use twofold_num::{Arithmetic, Dual, Interval, Tape};
+use twofold_num::series::HIGH_POWER;
+use twofold_num::{Dual, Elementary, Interval, Tape};
 use twofold_system::filippov::{TwoFold, gradient, lie_derivatives, two_fold};
 use twofold_system::singular::Ends;
 use twofold_system::{PiecewiseSmooth, VectorField, variables};
@@ -152,11 +154,8 @@ where
         stop: None,
         steps_until_watch: STEPS_BETWEEN_WATCHES,
         depth: None,
-        fields: SIDES.map(|side| {
-            let flow = FreeFlow { system: Sided { system, depth: None }, side };
-            let tape = Arc::new(Tape::clone(&flow.tape()).with_names(system.names()));
-            (tape.clone(), Ends::new(tape))
-        }),
+        is_simple: is_simple(system),
+        fields: Default::default(),
         gates: Default::default(),
     };
     let mut state = match departure {
@@ -195,6 +194,14 @@ where
             State::SetValued(mode) => return Ok(engine.summary(mode, StopReason::SetValued)),
         };
     }
+}
+
+/// Whether h and both fields are polynomials of so low degree that no field, nor the sliding flow,
+/// has [gates](Gates) or an [end of its domain](Ends): a factor of a product of fields and of the
+/// gradient of h is a power of at most the sum of their degrees.
+pub(super) fn is_simple<P: PiecewiseSmooth<N>, const N: usize>(system: &P) -> bool {
+    let of_sliding = |[h, field]: [u32; 2]| field.saturating_mul(2).saturating_add(h);
+    system.degrees().is_some_and(|degrees| of_sliding(degrees) < HIGH_POWER)
 }
 
 /// Whether h is zero at `x` as far as the rounding of `x` and of h's evaluation can tell: by
@@ -651,6 +658,31 @@ struct Lie {
     zero_q: f64,
 }
 
+impl Lie {
+    /// Whether the field of `side` is tangent to the surface.
+    fn is_tangent(&self, side: Side) -> bool {
+        match side {
+            Side::Plus => self.p.abs() <= self.zero_p,
+            Side::Minus => self.q.abs() <= self.zero_q,
+        }
+    }
+}
+
+/// A [margin](Sliding::margins) along the sliding flow, whose states begin with those of the
+/// motion.
+struct Margin<'a, P, const N: usize> {
+    system: Sided<'a, P>,
+    side: Side,
+    sign: f64,
+}
+
+impl<P: PiecewiseSmooth<N>, const N: usize, const M: usize> OfState<M> for Margin<'_, P, N> {
+    fn at<S: Elementary>(&self, z: &SVector<S, M>) -> S {
+        let x = SVector::<S, N>::from_fn(|i, _| z[i]);
+        lie_derivative(&self.system, &x, self.side).scale(self.sign)
+    }
+}
+
 struct Engine<'a, P, const N: usize> {
     system: &'a P,
     settings: &'a FilippovOptions,
@@ -676,8 +708,10 @@ struct Engine<'a, P, const N: usize> {
     /// Set where a field has no value beyond the surface: how near to it fields are asked (see
     /// [`Sided`]).
     depth: Option<f64>,
-    /// f+ and f-, with the ends of their domains.
-    fields: [(Arc<Tape>, Option<Ends>); 2],
+    /// [`is_simple`].
+    is_simple: bool,
+    /// f+ and f-, with the ends of their domains, once they have been asked for.
+    fields: [OnceCell<(Arc<Tape>, Option<Ends>)>; 2],
     /// The structure that steps of f+, f-, and of attracting and repelling sliding may jump over;
     /// `None` until it is asked for.
     gates: [Option<Option<Gates>>; 4],
@@ -787,8 +821,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
     /// The factor, a power of two, by which the clock of the sliding flow runs: it would run in
     /// units of the Lie derivatives, which are those of h over those of time. Where these are of
     /// order one it is 1.
-    fn sliding_clock(&self) -> f64 {
-        let l = self.lie(&self.x);
+    fn sliding_clock(l: &Lie) -> f64 {
         let rate = l.zero_p.max(l.zero_q) / LIMITS.lie;
         let mut clock = 1.0;
         if rate > 0.0 && rate.is_finite() && !(1.0 / CLOCK..=CLOCK).contains(&rate) {
@@ -1112,7 +1145,11 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
     }
 
     fn field(&self, side: Side) -> &(Arc<Tape>, Option<Ends>) {
-        &self.fields[usize::from(side == Side::Minus)]
+        self.fields[usize::from(side == Side::Minus)].get_or_init(|| {
+            let flow = FreeFlow { system: Sided { system: self.system, depth: None }, side };
+            let tape = Arc::new(Tape::clone(&flow.tape()).with_names(self.system.names()));
+            (tape.clone(), Ends::new(tape))
+        })
     }
 
     /// Why the motion does not go on from the present state on the surface, as far as a field shows
@@ -1145,6 +1182,9 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         sides: &[Side],
         state: &dyn Fn(f64) -> SVector<f64, N>,
     ) -> Option<(f64, String)> {
+        if self.is_simple {
+            return None;
+        }
         let sided = self.sided();
         let ends = sides.iter().filter_map(|side| {
             let path = |theta: f64| Failure::state(&sided.inside(&state(theta), *side));
@@ -1186,11 +1226,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
     }
 
     fn is_tangent(&self, x: &SVector<f64, N>, side: Side) -> bool {
-        let l = self.lie(x);
-        match side {
-            Side::Plus => l.p.abs() <= l.zero_p,
-            Side::Minus => l.q.abs() <= l.zero_q,
-        }
+        self.lie(x).is_tangent(side)
     }
 
     /// The field of `side` here.
@@ -1251,6 +1287,9 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
     /// A field of which the domain ends on the surface, where it grows without bound: it makes no
     /// sliding motion.
     fn without_limit(&self) -> Option<Failure> {
+        if self.is_simple {
+            return None;
+        }
         let normal = gradient(self.system, &self.x);
         let normal = normal / length(&normal) * self.reach();
         SIDES.into_iter().find_map(|side| {

@@ -3,10 +3,10 @@
 use nalgebra::SVector;
 
 use super::exit::Side;
-use crate::roots::brent;
+use crate::roots::{OfState, brent};
 use crate::step::Interpolant;
 use twofold_num::Elementary;
-use twofold_system::filippov::{gradient, lie_derivatives};
+use twofold_system::filippov::{dot, gradient};
 use twofold_system::{PiecewiseSmooth, VectorField};
 
 /// A system whose fields may be defined on their own sides only. With a `depth`, a field is asked
@@ -19,6 +19,7 @@ pub(super) struct Sided<'a, P> {
 }
 
 impl<P> Sided<'_, P> {
+    #[inline]
     pub fn inside<S: Elementary, const N: usize>(
         &self,
         x: &SVector<S, N>,
@@ -27,7 +28,22 @@ impl<P> Sided<'_, P> {
     where
         P: PiecewiseSmooth<N>,
     {
-        let Some(depth) = self.depth else { return *x };
+        match self.depth {
+            None => *x,
+            Some(depth) => self.moved_inside(x, side, depth),
+        }
+    }
+
+    #[inline(never)]
+    fn moved_inside<S: Elementary, const N: usize>(
+        &self,
+        x: &SVector<S, N>,
+        side: Side,
+        depth: f64,
+    ) -> SVector<S, N>
+    where
+        P: PiecewiseSmooth<N>,
+    {
         let mut y = *x;
         // Newton's method, with steps a little too long: from outside of a convex side it would
         // stay outside.
@@ -72,7 +88,20 @@ impl<P: PiecewiseSmooth<N>, const N: usize> VectorField<N> for FreeFlow<'_, P> {
     }
 }
 
-/// The Lie derivative of h along the field of `side`: one of the two of [`lie_derivatives`].
+/// h times a sign.
+pub(super) struct Height<'a, P> {
+    pub system: &'a P,
+    pub sign: f64,
+}
+
+impl<P: PiecewiseSmooth<N>, const N: usize> OfState<N> for Height<'_, P> {
+    fn at<S: Elementary>(&self, x: &SVector<S, N>) -> S {
+        self.system.switching(x).scale(self.sign)
+    }
+}
+
+/// The Lie derivative of h along the field of `side`: one of the two of
+/// [`lie_derivatives`](twofold_system::filippov::lie_derivatives).
 pub(super) fn lie_derivative<P: PiecewiseSmooth<N>, S: Elementary, const N: usize>(
     system: &P,
     x: &SVector<S, N>,
@@ -83,11 +112,7 @@ pub(super) fn lie_derivative<P: PiecewiseSmooth<N>, S: Elementary, const N: usiz
         Side::Plus => system.plus(x),
         Side::Minus => system.minus(x),
     };
-    let mut sum = S::zero();
-    for i in 0..N {
-        sum += slope[i] * field[i];
-    }
-    sum
+    dot(&slope, &field)
 }
 
 /// The desingularised sliding field F = L-h f+ - L+h f-: the sliding field multiplied by L-h - L+h.
@@ -98,8 +123,10 @@ pub(super) fn desingularised<P: PiecewiseSmooth<N>, S: Elementary, const N: usiz
     system: &P,
     x: &SVector<S, N>,
 ) -> (SVector<S, N>, S) {
-    let (p, q) = lie_derivatives(system, x);
-    let (plus, minus) = (system.plus(x), system.minus(x));
+    let slope = gradient(system, x);
+    let with_rate = |field: SVector<S, N>| (dot(&slope, &field), field);
+    let (p, plus) = with_rate(system.plus(x));
+    let (q, minus) = with_rate(system.minus(x));
     (SVector::from_fn(|i, _| q * plus[i] - p * minus[i]), q - p)
 }
 

@@ -14,7 +14,7 @@ use nalgebra::SVector;
 
 use super::engine::{Departure, FlightStart, Origin, near_surface, run_from, up_to};
 use super::exit::Chooser;
-use super::flow::{SlidingFlow, Truncated, project};
+use super::flow::{Height, SlidingFlow, Truncated, project};
 use super::intersection::{
     AlongIntersection, Continuation, Mixture, OnIntersection, UNDECIDING, continuations, deciding,
     resolution, side, turns,
@@ -27,9 +27,9 @@ use super::{
 use crate::dopri5::Dopri5;
 use crate::driver::Monitor;
 use crate::guard::Guarded;
-use crate::roots::{Enclosed, Start, first_zero, first_zero_along};
+use crate::roots::{OfState, Start, first_zero, first_zero_along};
 use crate::step::{Failure, Flow, Statistics, Step, Stepper, StopReason, finite};
-use twofold_num::{Arithmetic, Dual};
+use twofold_num::Dual;
 use twofold_system::filippov::{gradient, sliding_field};
 use twofold_system::{PiecewiseSmooth, VectorField, variables};
 
@@ -486,14 +486,12 @@ impl<P: PiecewiseSmooth<N>, const N: usize> FilippovObserver<N> for Guard<'_, P,
         if self.hit.is_some() {
             return Flow::Stop;
         }
-        let height = |theta: f64| self.sign * self.guarded.switching(&step.at(theta));
-        let enclosed = |x: &SVector<Enclosed, N>| self.guarded.switching(x).scale(self.sign);
-        let first =
-            |start| first_zero_along(step, &height, &enclosed, start).map(|zero| zero.theta());
+        let height = Height { system: self.guarded, sign: self.sign };
+        let first = |start| first_zero_along(step, &height, start).map(|zero| zero.theta());
         let zero = match self.left.take() {
             Some(start) => first(start.over(step.length())),
             // Rounding may have carried the step before over the surface.
-            None if height(0.0) <= 0.0 => Some(0.0),
+            None if height.at(&step.at(0.0)) <= 0.0 => Some(0.0),
             None => first(Start::Away),
         };
         let Some(end) = zero else { return self.observer.step(mode, step) };

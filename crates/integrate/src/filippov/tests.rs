@@ -4,14 +4,17 @@
 use nalgebra::{SVector, Vector2, Vector3};
 use std::ops::ControlFlow;
 
-use super::flow::desingularised;
+use super::engine::is_simple;
+use super::flow::{FreeFlow, Sided, desingularised};
 use super::two_fold::{AlongCurve, SlidingAtTwoFold};
 use super::*;
 use crate::Monitor;
+use crate::guard::Gates;
 use crate::step::Interpolant;
-use twofold_num::Elementary;
 use twofold_num::random::RandomStream;
-use twofold_system::{Bound, PiecewiseSmooth, System};
+use twofold_num::{Elementary, Tape};
+use twofold_system::singular::Ends;
+use twofold_system::{Bound, Definition, PiecewiseSmooth, System, VectorField};
 
 /// h becomes -h, f+ and f- change places: the same motion by other names.
 #[derive(Clone)]
@@ -26,6 +29,32 @@ impl<P: PiecewiseSmooth<N>, const N: usize> PiecewiseSmooth<N> for Mirrored<P> {
     }
     fn minus<S: Elementary>(&self, x: &SVector<S, N>) -> SVector<S, N> {
         self.0.plus(x)
+    }
+}
+
+#[test]
+fn simple_systems_have_neither_gates_nor_ends_of_domains() {
+    let power = |n: u32| {
+        let text = format!(
+            "states = ['x', 'y', 'z']\nh = 'x/3'\nplus = ['y', 'z', 'x^{n}']\nminus = ['z', '1', 'y']"
+        );
+        System::new(Definition::from_toml(&text, "power.toml").expect("a system"))
+    };
+    let builtin = |name| System::builtin(name).expect("built in");
+    let simple = ["caricature", "two-fold", "relay-third-order"].map(builtin);
+    for system in simple.into_iter().chain([power(7)]) {
+        let bound: Bound<3> = system.bind().expect("of three states");
+        assert!(is_simple(&bound), "{}", system.name());
+        let sided = || Sided { system: &bound, depth: None };
+        let h = Tape::record(3, |x| vec![bound.switching(&Vector3::from_column_slice(x))]);
+        for side in [Side::Plus, Side::Minus] {
+            let tape = FreeFlow { system: sided(), side }.tape();
+            assert!(Gates::of_side(tape.clone(), &h).is_none() && Ends::new(tape).is_none());
+        }
+        assert!(Gates::of_part(SlidingFlow { system: sided(), direction: 1.0 }.tape()).is_none());
+    }
+    for system in [power(8), power(16)] {
+        assert!(!is_simple(&system.bind::<3>().expect("of three states")));
     }
 }
 

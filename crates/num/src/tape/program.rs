@@ -134,6 +134,16 @@ impl Program {
             x.len() == self.variables && out.len() == self.outputs.len(),
             "one number a variable and a value"
         );
+        if self.code.is_empty() {
+            // Coordinates and numbers: no register is to be cleared for them.
+            for (out, from) in out.iter_mut().zip(&self.outputs) {
+                *out = match *from {
+                    Output::Register(at) => x[usize::from(at)],
+                    Output::Fixed(value) => S::from_f64(value),
+                };
+            }
+            return;
+        }
         // Wider numbers than `f64` take so long that how a register is found does not matter: one
         // loop is compiled for them, not three.
         if self.registers <= Self::FEW {

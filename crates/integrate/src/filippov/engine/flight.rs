@@ -10,9 +10,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         start: FlightStart,
     ) -> Result<State<N>, FilippovError> {
         let place = usize::from(side == Side::Minus);
-        let tape = &self.fields[place].0;
-        let h = || Tape::record(N, |x| vec![self.system.switching(&SVector::from_column_slice(x))]);
-        let gates = self.gates[place].take().unwrap_or_else(|| Gates::of_side(tape.clone(), &h()));
+        let gates = self.gates[place].take().unwrap_or_else(|| self.gates_of_side(side));
         let Tolerance { rtol, atol } = self.settings.tolerance;
         let tolerance = if self.tightened {
             Tolerance { rtol: (rtol * rtol).max(LIMITS.finest), atol: atol * atol }
@@ -23,6 +21,14 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         let next = self.fly_by(&mut method, side, start);
         self.gates[place] = Some(method.into_gates());
         next
+    }
+
+    fn gates_of_side(&self, side: Side) -> Option<Gates> {
+        if self.is_simple {
+            return None;
+        }
+        let h = Tape::record(N, |x| vec![self.system.switching(&SVector::from_column_slice(x))]);
+        Gates::of_side(self.field(side).0.clone(), &h)
     }
 
     fn fly_by(
@@ -67,7 +73,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                 }
                 Err(failure) => return Err(self.diagnosed(failure, side)),
             };
-            let height = |theta: f64| side.sign() * self.system.switching(&step.at(theta));
+            let above = Height { system, sign: side.sign() };
+            let height = |theta: f64| above.at(&step.at(theta));
             let length = step.length();
             let at_start = start.over(length);
             // After a tangency the first steps may rise by less than the rounding of h.
@@ -75,13 +82,12 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             leaving = leaving.filter(|second| 0.5 * second * gone * gone <= self.blur(&step.x1));
             start =
                 leaving.map_or(FlightStart::Away, |second| FlightStart::Transversal(second * gone));
-            let enclosed = |x: &SVector<Enclosed, N>| self.system.switching(x).scale(side.sign());
             let free = (free_until - step.t0) / length;
             let zero = match leaving {
                 Some(_) => None,
                 None if free >= 1.0 => None,
                 None if free > 0.0 => first_zero_after(free, &height),
-                None => first_zero_along(&step, &height, &enclosed, at_start),
+                None => first_zero_along(&step, &above, at_start),
             };
             // A field whose domain ends on the surface ends the flight there.
             let landing = zero.map_or(f64::INFINITY, |zero| zero.theta() - LIMITS.same_moment);

@@ -17,6 +17,9 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         let direction = sliding.direction();
         let place = if direction > 0.0 { 2 } else { 3 };
         let gates = self.gates[place].take().unwrap_or_else(|| {
+            if self.is_simple {
+                return None;
+            }
             let system = Sided { system: self.system, depth: None };
             let tape = VectorField::<M>::tape(&SlidingFlow { system, direction });
             Gates::of_part(Arc::new(Tape::clone(&tape).with_names(self.system.names())))
@@ -38,7 +41,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         let system = self.system;
         let mode = sliding.mode();
         let sided = Sided { system, depth: self.depth };
-        let clock = self.sliding_clock();
+        let here = self.lie(&self.x);
+        let clock = Self::sliding_clock(&here);
         let flow =
             SlidingFlow { system: Sided { ..sided }, direction: sliding.direction() * clock };
         let lift =
@@ -46,16 +50,14 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         // The clock of the flow starts at zero with each restart, so that short times keep their
         // digits.
         let mut t_base = self.t;
-        let mut fresh = true;
         let mut idle = 0;
         let mut came_from;
         let mut ahead = TwoFoldAhead::new();
         let mut along = SIDES.into_iter().find(|side| {
-            let touches = || self.tangency(&self.lie(&self.x), *side).presses();
-            !sliding.repelling
-                && self.is_tangent(&self.x, *side)
-                && (self.runs_along(*side) || touches())
+            let touches = || self.tangency(&here, *side).presses();
+            !sliding.repelling && here.is_tangent(*side) && (self.runs_along(*side) || touches())
         });
+        let mut fresh = Some(here);
         if let Err(failure) =
             method.restart(&flow, 0.0, lift(&self.x), f64::INFINITY, f64::INFINITY)
         {
@@ -84,8 +86,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                     return Err(self.cause_on_surface().unwrap_or_else(seen).into());
                 }
             };
-            let end = self.sliding_end(&step, &sliding, along, (t_base, clock), fresh);
-            fresh = false;
+            let end = self.sliding_end(&step, &sliding, along, (t_base, clock), fresh.take());
             let until = end.map_or(f64::INFINITY, |(theta, _)| theta);
             if let Some((theta, what)) =
                 self.domain_end(&SIDES, &|theta| without_clock(&step.at(theta)))
@@ -132,7 +133,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                 break Some(end);
             }
             if along.is_some_and(|side| !self.is_tangent(&self.x, side)) {
-                (along, fresh) = (None, true);
+                (along, fresh) = (None, Some(self.lie(&self.x)));
             }
             if idle >= LIMITS.idle_steps {
                 self.count(&method.statistics());
@@ -141,7 +142,9 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             if self.stop.is_some() || method.statistics().steps > self.settings.max_steps {
                 break Some(SlidingEnd::Time);
             }
-            ahead.look(system, &self.x, sliding.margins(&sided, &self.x));
+            if N >= 3 {
+                ahead.look(system, &self.x, sliding.margins(&sided, &self.x));
+            }
             // Nearer than the tolerances resolve there is nothing to integrate.
             let Tolerance { rtol, atol } = self.settings.tolerance;
             let blur = LIMITS.blur * (atol + rtol * self.x.amax());
@@ -192,7 +195,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
         sliding: &Sliding,
         along: Option<Side>,
         (t_base, clock): (f64, f64),
-        fresh: bool,
+        fresh: Option<Lie>,
     ) -> Option<(f64, SlidingEnd)> {
         let direction = sliding.direction();
         let mut first: Option<(f64, SlidingEnd)> = None;
@@ -215,8 +218,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
                 continue;
             }
             let mut start = Start::Away;
-            if fresh {
-                let l = self.lie(&self.x);
+            if let Some(l) = &fresh {
                 let (value, zero, rate) = match side {
                     Side::Plus => (-direction * l.p, l.zero_p, -(l.q * l.pp - l.p * l.pm)),
                     Side::Minus => (direction * l.q, l.zero_q, l.q * l.mp - l.p * l.mm),
@@ -232,16 +234,13 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             }
             let sided = self.sided();
             let sign = -side.sign() * direction;
-            let margin = |s| sign * lie_derivative(&sided, &without_clock(&step.at(s)), side);
-            let enclosed = |z: &SVector<Enclosed, M>| {
-                let x = SVector::<Enclosed, N>::from_fn(|j, _| z[j]);
-                lie_derivative(&sided, &x, side).scale(sign)
-            };
+            let along_flow = Margin::<P, N> { system: sided, side, sign };
+            let margin = |s| along_flow.at(&step.at(s));
             // A set of states about the surface reaches to where such a field has no value: nothing
             // encloses it.
             let mut zero = match self.depth {
                 Some(_) => first_zero(margin, start),
-                None => first_zero_along(step, &margin, &enclosed, start),
+                None => first_zero_along(step, &along_flow, start),
             };
             // Where a margin is zero and positive again behind, the motion goes on sliding.
             for _ in 0..MOST_TOUCHES {
