@@ -36,7 +36,8 @@ impl<P: PiecewiseSmooth<N>, const N: usize> PiecewiseSmooth<N> for Mirrored<P> {
 fn simple_systems_have_neither_gates_nor_ends_of_domains() {
     let power = |n: u32| {
         let text = format!(
-            "states = ['x', 'y', 'z']\nh = 'x/3'\nplus = ['y', 'z', 'x^{n}']\nminus = ['z', '1', 'y']"
+            "states = ['x', 'y', 'z']\nh = 'x/3'\nplus = ['y', 'z', 'x^{n}']\n\
+                minus = ['z', '1', 'y']"
         );
         System::new(Definition::from_toml(&text, "power.toml").expect("a system"))
     };
