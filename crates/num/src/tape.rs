@@ -38,7 +38,6 @@ mod side_by_side;
 
 use std::cell::RefCell;
 use std::collections::HashMap;
-use std::hash::{BuildHasherDefault, Hasher};
 
 use super::decimal::{Decimal, FromDecimal};
 use super::scalar::operators;
@@ -144,7 +143,7 @@ impl Tape {
                 operations: (0..variables).map(Operation::Variable).collect(),
                 ..Tape::default()
             },
-            index: HashMap::default(),
+            index: HashMap::new(),
         };
         // A recording inside a recording gets a sheet of its own, and the outer one its sheet back.
         let outer = RECORDER.replace(recorder);
@@ -337,30 +336,7 @@ impl Tape {
 #[derive(Debug, Default)]
 struct Recorder {
     tape: Tape,
-    index: HashMap<Operation, Node, BuildHasherDefault<Mixer>>,
-}
-
-/// A hash of operations, which are a few small numbers: the multiplicative one of rustc.
-#[derive(Default)]
-struct Mixer(u64);
-
-impl Hasher for Mixer {
-    fn write(&mut self, bytes: &[u8]) {
-        bytes.iter().for_each(|byte| self.write_u64(u64::from(*byte)));
-    }
-    fn write_u64(&mut self, number: u64) {
-        self.0 = (self.0.rotate_left(5) ^ number).wrapping_mul(0x517c_c1b7_2722_0a95);
-    }
-    fn write_usize(&mut self, number: usize) {
-        self.write_u64(number as u64);
-    }
-    fn write_isize(&mut self, number: isize) {
-        self.write_u64(number as u64);
-    }
-    fn finish(&self) -> u64 {
-        // A table's places are told by the lowest bits, which the product mixes least.
-        self.0.rotate_left(26)
-    }
+    index: HashMap<Operation, Node>,
 }
 
 impl Recorder {

@@ -50,7 +50,7 @@ struct Corner {
     field: Vec<f64>,
     first: Vec<f64>,
     first_or_zero: Vec<f64>,
-    /// The sign of the first derivative that is not zero.
+    /// The sign with which the function leaves zero; 0 if it stays.
     direction: Vec<f64>,
     asked: Vec<bool>,
     /// Whether the equations keep the function at zero on this side.
@@ -93,7 +93,7 @@ impl Set<'_> {
     }
 }
 
-/// One assignment of ways to the functions of a set, and what these do by it.
+/// One assignment of ways to the functions of a set, and their rates by it.
 struct Trial<'a> {
     ways: &'a [Way],
     /// The functions that stay at zero.
@@ -164,7 +164,7 @@ impl Follower<'_> {
         if self.decide_without_kinks(&zero, kept) {
             return Ok(());
         }
-        self.take_in_noise(&mut zero);
+        self.keep_own_ways(&mut zero);
         if zero.is_empty() {
             let config = self.config.clone();
             self.adopt(config, Vec::new());
@@ -223,9 +223,9 @@ impl Follower<'_> {
         self.follow_jumps(&zero)
     }
 
-    /// Leaves out the functions that follow others, and adds those that are zero to rounding where
-    /// the speed of the only one is no more than that.
-    fn take_in_noise(&mut self, zero: &mut Vec<usize>) {
+    /// Leaves out the functions that have no way of their own, as they follow others. Where the only
+    /// one left moves by rounding alone, those that are zero to rounding are decided with it.
+    fn keep_own_ways(&mut self, zero: &mut Vec<usize>) {
         // Functions that only others' sides move follow those.
         if !zero.iter().all(|guard| self.equation.guards[*guard].of_sides) {
             zero.retain(|guard| !self.equation.guards[*guard].of_sides);

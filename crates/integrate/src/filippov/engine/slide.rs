@@ -142,6 +142,7 @@ impl<P: PiecewiseSmooth<N>, const N: usize> Engine<'_, P, N> {
             if self.stop.is_some() || method.statistics().steps > self.settings.max_steps {
                 break Some(SlidingEnd::Time);
             }
+            // Fewer states have no two-fold to come near to, and need no margins.
             if N >= 3 {
                 ahead.look(system, &self.x, sliding.margins(&sided, &self.x));
             }
