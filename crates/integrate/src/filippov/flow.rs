@@ -34,6 +34,7 @@ impl<P> Sided<'_, P> {
         }
     }
 
+    // Out of line: mostly there is no depth, and every evaluation of a field asks.
     #[inline(never)]
     fn moved_inside<S: Elementary, const N: usize>(
         &self,
