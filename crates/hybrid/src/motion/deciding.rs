@@ -223,8 +223,8 @@ impl Follower<'_> {
         self.follow_jumps(&zero)
     }
 
-    /// Leaves out the functions that have no way of their own, as they follow others. Where the only
-    /// one left moves by rounding alone, those that are zero to rounding are decided with it.
+    /// Leaves out the functions that have no way of their own, as they follow others. Where the
+    /// only one left moves by rounding alone, those that are zero to rounding are decided with it.
     fn keep_own_ways(&mut self, zero: &mut Vec<usize>) {
         // Functions that only others' sides move follow those.
         if !zero.iter().all(|guard| self.equation.guards[*guard].of_sides) {
