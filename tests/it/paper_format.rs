@@ -22,7 +22,7 @@ const STRUCTS: [(&str, &str, &str); 8] = [
     ("A panel, `[[panel]]`", "PanelFile", "src/folder/mod.rs"),
     ("Points of the paper, `points`", "PointsFile", "src/folder/mod.rs"),
     ("A measure of measures.toml, `[NAME]`", "MeasureFile", "src/folder/mod.rs"),
-    ("A claim of claims.toml, `[[claim]]`", "ClaimFile", "src/folder/check.rs"),
+    ("A claim of claims.toml, `[[claim]]`", "ClaimFile", "src/folder/check/written.rs"),
     ("Odds of a claim, `odds`", "OddsFile", "src/folder/check.rs"),
 ];
 
@@ -37,7 +37,7 @@ fn of(name: &str) -> Vec<Key> {
 /// The kinds of checks with the keys that each needs and those that it may have, from the reader's
 /// table.
 fn checks() -> Vec<[Vec<String>; 3]> {
-    let text = source("src/folder/check.rs");
+    let text = source("src/folder/check/written.rs");
     let (_, body) = text.split_once("const KINDS:").unwrap();
     let (body, _) = body.split_once("\n];").unwrap();
     let quoted =
