@@ -30,7 +30,7 @@ use twofold_num::{Dual, Short};
 use twofold_system::Expression;
 
 use crate::cells::Cells;
-use crate::definition::{Direction, When};
+use crate::definition::{Direction, Event, When};
 use crate::equation::{Compiled, Configuration, Equation, EquationError};
 use crate::model::Model;
 use crate::range::Range;
@@ -873,7 +873,7 @@ fn scale_now(follower: &Follower, step: &Step, out: &mut Vec<f64>) {
         match options.atol {
             Some(atol) => atol + options.rtol * size,
             // By the state's own size; from zero on by what it moves in this step, or in a
-            // millionth of the run.
+            // millionth of the run if its speed lasts so long.
             None => {
                 let moved = (step.y[i] - step.x[i]).abs();
                 // A speed that is large at one place alone says little.
@@ -887,7 +887,12 @@ fn scale_now(follower: &Follower, step: &Step, out: &mut Vec<f64>) {
                 let grows = before > 0.0 && step.x[i].abs() > before.max(0.5 * follower.size[i]);
                 let ends = grows && resolves && step.h < AT_THE_END * step.t.abs();
                 let most = if ends { MOST_OF_SIZE * before } else { f64::INFINITY };
-                let least = (0.1 * moved).max((1e-6 * span * speed).min(most));
+                let [first, last] = [0, 6].map(|k: usize| step.k[k][i].abs());
+                let time = 1e-6 * span;
+                // Not until such a part of the run is over has it been seen to.
+                let begins = step.t - options.t_start < time && last < first;
+                let lasts = if begins { step.h * first / (first - last) } else { time };
+                let least = (0.1 * moved).max((lasts.min(time) * speed).min(most));
                 // A rounding error without a bound leaves the old size.
                 let size = size.max(if put { follower.width(i) } else { 0.01 * known });
                 options.rtol * size.max(least)

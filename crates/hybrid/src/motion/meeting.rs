@@ -415,7 +415,7 @@ impl Follower<'_> {
         }
         let quiet = matches!(self.options.record, Record::Section(_));
         let (mut stop, mut zeno, mut newly, mut through) = (None, None, Vec::new(), None);
-        let old = self.x.clone();
+        let (old, mode_before) = (self.x.clone(), self.config.mode);
         let mut new = self.x.clone();
         let mut mode = None;
         // Of several events, the states that each leaves behind.
@@ -606,6 +606,15 @@ impl Follower<'_> {
                 let blown = self.blown(definition, &old, &fired, &left_behind)?;
                 newly.extend(blown);
             }
+            // A condition that holds where its mode begins has not become true.
+            let began = mode.filter(|mode| *mode != mode_before);
+            let here = self.x.clone();
+            newly.retain(|i| match &definition.events()[*i] {
+                Event { when: When::Becomes(e), from, .. } if began.is_some() && *from == began => {
+                    !self.holds_at(e, &here)
+                }
+                _ => true,
+            });
             newly.sort_unstable();
             newly.dedup();
             // A state that may stick to a surface is not let through it without a word.

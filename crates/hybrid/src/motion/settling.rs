@@ -67,10 +67,17 @@ impl Follower<'_> {
                 let slope = function.apply(self.slope_at(a)).partials[0].abs();
                 self.magnitude_by(e, slope * of(a))
             }
-            Expression::Apply(General::Min | General::Max | General::Clip, list) => {
-                list.iter().map(of).fold(0.0, f64::max)
+            // Of the one that is chosen, and of those that rounding does not tell from it.
+            Expression::Apply(
+                chosen @ (General::Min | General::Max | General::Clip | General::If),
+                list,
+            ) => {
+                let own = self.equation.value(e, self.t, &self.x);
+                let first = usize::from(matches!(chosen, General::If));
+                let off = |e| (self.equation.value(e, self.t, &self.x) - own).abs();
+                let sizes = list[first..].iter().map(|e| (of(e), off(e)));
+                sizes.filter(|(size, off)| *off <= 1e-14 * size).map(|s| s.0).fold(0.0, f64::max)
             }
-            Expression::Apply(General::If, list) => list[1..].iter().map(of).fold(0.0, f64::max),
             other => self.equation.value(other, self.t, &self.x).abs(),
         }
     }

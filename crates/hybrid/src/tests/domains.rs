@@ -863,3 +863,19 @@ fn a_root_of_zero_in_a_divisor_is_no_pole() {
         }
     }
 }
+
+/// The rounding of the number that is not chosen is none of the one that is.
+#[test]
+fn least_numbers_that_are_tiny_keep_their_digits() {
+    for (condition, edge) in [
+        ("ln(max(x, 1e-30)) < -50", 0.0),
+        ("ln(if(x > 1e-30, x, 1e-30)) < -50", 0.0),
+        ("1/clip(x, 1e-20, 1) > 1e3", 1e-3),
+    ] {
+        let text =
+            format!("states = ['x', 'y']\nstart = [-1, 0]\nf = ['1', 'if({condition}, 1, 0)']");
+        for method in [Method::Dopri5, Method::Radau5, Method::Lsoda] {
+            near(end_of(&text, 2.0, method).unwrap()[1], 1.0 + edge, 1e-9);
+        }
+    }
+}

@@ -985,3 +985,19 @@ fn square_waves_by_whole_parts_begin_at_a_jump() {
         }
     }
 }
+
+/// A condition that holds where its mode begins has not become true, also if the event that begins
+/// the mode sets the state; one of both modes has.
+#[test]
+fn what_holds_where_its_mode_begins_is_no_event() {
+    for (from, want) in [("from = 'b'\n", 0.0), ("", 1.0)] {
+        let text = format!(
+            "states = ['x', 'n']\nstart = [0, 0]\n[modes.a]\nf = ['1', '0']\n[modes.b]\nf = \
+                ['1', '0']\n[[event]]\nwhen = 'x - 1'\nfrom = 'a'\nmode = 'b'\nset = {{ x = '2' \
+                }}\n[[event]]\nwhen = 'x > 1.5'\n{from}set = {{ n = 'n + 1' }}"
+        );
+        for outcome in by_each_method(&text, 2.0) {
+            assert_eq!(outcome.x[1], want, "{from}");
+        }
+    }
+}

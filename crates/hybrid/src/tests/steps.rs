@@ -31,6 +31,25 @@ fn what_is_thinner_than_a_step_is_seen() {
     }
 }
 
+/// From zero on a speed that falls at once says nothing of how large the state becomes.
+#[test]
+fn a_speed_that_falls_at_once_is_no_size() {
+    let methods = [Method::Dopri5, Method::Radau5, Method::Taylor];
+    let by_time = "states = ['x']\nstart = [0]\nf = ['1/(1e-12 + t)']";
+    for method in methods {
+        let want = 1e12_f64.ln_1p();
+        near(end_of(by_time, 1.0, method).unwrap()[0], want, 1e-8 * want);
+    }
+    for outcome in by_each_method("states = ['x']\nstart = [0]\nf = ['1/(1e-12 + x)']", 1.0) {
+        near(outcome.x[0], 2.0_f64.sqrt() - 1e-12, 1e-8);
+    }
+    // The layer is 1e-12 wide, and 1 + 1e-12 ln(1e12) is where it leads to.
+    let layer = "states = ['x']\nstart = [0]\nf = ['1e12*exp(-1e12*x) + 1']";
+    for method in methods {
+        near(end_of(layer, 1.0, method).unwrap()[0], 1.0 + 2.763e-11, 1e-10);
+    }
+}
+
 /// Systems in other units move the same way: states by any factor, switching functions by any
 /// positive number.
 #[test]
