@@ -35,25 +35,24 @@ papers: ## make and check every paper under papers/
 		$(RUN) --bin twofold -- paper report --quiet "$$(dirname "$$p")" && $(RUN) --bin twofold -- paper check --quiet "$$(dirname "$$p")" || exit 1; \
 	done
 
-# With the programs of `make figures`. Optimised, the tests themselves would take the compiler three minutes and not half of one.
-UNOPTIMISED := -C opt-level=0 -C codegen-units=16
+# With the programs and libraries of `make figures`; scripts/rustc-tests.sh compiles the tests themselves.
+CHECKED := RUSTC_WRAPPER="$(CURDIR)/scripts/rustc-tests.sh" $(CARGO) test --release --locked
 test: ## the tests of the whole program: figures and their hashes, commands, files, papers; some of them: make test TESTS=papers::
-	@it=$$($(CARGO) rustc --release --locked --test it --message-format json-render-diagnostics -- $(UNOPTIMISED) \
-	| sed -n 's|.*"executable":"\([^"]*/it-[^"]*\)".*|\1|p'); [ -n "$$it" ] && "$$it" $(TESTS)
+	@$(CHECKED) --test it -- $(TESTS)
 
-# In the debug profile, where an overflow is an error and every byte is the same.
-test-all: test ## also the tests of every crate by itself and of the documentation, and the figures' hashes, in the debug profile
-	@$(CARGO) test --locked --lib --bins --examples
-	@$(CARGO) test --locked --doc
-	@$(CARGO) test --locked --test it -- golden::
+test-all: test ## also the tests of every crate by itself and of the documentation
+	@$(CHECKED) --lib --bins
+	@$(CARGO) test --release --locked --doc
 
+# Tests that compute for minutes are compiled as all else is.
+OPTIMISED = $(CARGO) rustc --profile bench --locked --message-format json-render-diagnostics $(1) -- -C opt-level=3 | sed -n 's|.*"executable":"\([^"]*\)".*|\1|p'
 rigor-test: ## millions of interval operations against exact integer arithmetic (minutes)
-	@$(CARGO) test --release --locked --test it rigor_interval:: -- --ignored
+	@it=$$($(call OPTIMISED,--test it)); "$$it" rigor_interval:: --ignored
 
 # 2^24 points a function; make elementary SKIP= : tanh and exp at 2^30 points too (half an hour).
 SKIP := --skip 2_30
 elementary: ## elementary functions against double-double arithmetic, and their frozen bits: 2^24 points each (minutes)
-	@$(CARGO) test --release --locked --package twofold-num --lib elementary -- --include-ignored --nocapture $(SKIP)
+	@tests=$$($(call OPTIMISED,--package twofold-num --lib)); "$$tests" elementary --include-ignored --nocapture $(SKIP)
 
 include papers/jeffrey-2013/sweeps.mk
 
@@ -71,7 +70,7 @@ second-opinion: ## the first theorem proved by CAPD, another group's library: ma
 
 .PHONY: forge
 forge: ## forge every number of every certificate, alone and in groups, and write proofs/forgeries.md (some twenty minutes)
-	@$(CARGO) test --release --locked --test it verify:: -- --ignored --nocapture > target/forge.log || { cat target/forge.log; exit 1; }
+	@it=$$($(call OPTIMISED,--test it)); "$$it" verify:: --ignored --nocapture > target/forge.log || { cat target/forge.log; exit 1; }
 	@{ printf '# Forged certificates\n\nWritten by `make forge` (tests/it/verify.rs), %s. Numbers of forgeries; every one that is certainly false is refused.\n\n' "$$(date +%Y-%m-%d)"; \
 	grep '^|' target/forge.log; } > proofs/forgeries.md
 
@@ -225,8 +224,6 @@ rehearse: ## a job of a workflow, its own lines, in a fresh clone: make rehearse
 
 # What is built once needs no notes for the next time; they take more room on the disk than all the rest.
 ci: export CARGO_INCREMENTAL = 0
-# Places in backtraces take the compiler a seventh of its time in the debug profile; messages have theirs.
-ci: export CARGO_PROFILE_DEV_DEBUG = 0
 ci: lint test-all ## what CI runs; nothing in it rests on a store
 	@$(MAKE) --no-print-directory figures FIGURE_FLAGS=--fresh
 	@# Every layer of every picture against the reference, as `make check` does, which would compute all of them a second time.
