@@ -110,6 +110,9 @@ pub struct Equation {
     pub guards: Vec<Guard>,
     /// The first of the guards that the conditions of events alone ask.
     of_fields: usize,
+    /// For each event its condition as the guards are made from it: what parameters decide are
+    /// numbers. The definition's own asks for guards that there are none of.
+    pub(crate) conditions: Vec<Option<Rc<Expression>>>,
     /// For each event the guards that its condition asks.
     pub(crate) of_events: Vec<Vec<usize>>,
     /// Whether any equation has a root, a logarithm or a division.
@@ -260,6 +263,7 @@ impl Equation {
             values,
             guards: Vec::new(),
             of_fields: 0,
+            conditions: Vec::new(),
             of_events: Vec::new(),
             has_domain_ends: false,
             by_text: HashMap::new(),
@@ -297,11 +301,15 @@ impl Equation {
         };
         let of_sides: Vec<bool> = equation.guards.iter().map(of_sides).collect();
         equation.guards.iter_mut().zip(of_sides).for_each(|(guard, of)| guard.of_sides = of);
-        let asked = |event: &crate::definition::Event| match &event.when {
-            When::Becomes(e) => equation.guards_of(e),
-            _ => Vec::new(),
+        let condition = |event: &crate::definition::Event| match &event.when {
+            When::Becomes(e) => Some(Rc::new(e.clone())),
+            _ => None,
         };
-        equation.of_events = equation.definition.events.iter().map(asked).collect();
+        equation.conditions = equation.definition.events.iter().map(condition).collect();
+        let asked = |condition: &Option<Rc<Expression>>| {
+            condition.as_ref().map_or_else(Vec::new, |e| equation.guards_of(e))
+        };
+        equation.of_events = equation.conditions.iter().map(asked).collect();
         let sets = equation.definition.events.iter().flat_map(|event| &event.set);
         for e in
             fields.iter().chain(&terms).chain(&watched).chain(&conditions).chain(sets.map(|s| &s.1))

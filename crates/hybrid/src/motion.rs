@@ -1150,8 +1150,8 @@ impl<'a> Follower<'a> {
         // An expression that is zero at the start fires when it is next met.
         follower.touches.fill(false);
         follower.rest_on_stops()?;
-        follower.new_conditions(model.definition());
-        follower.at_start = follower.true_right_after(model.definition());
+        follower.new_conditions();
+        follower.at_start = follower.true_right_after();
         Ok(follower)
     }
 

@@ -232,7 +232,7 @@ impl Follower<'_> {
             }
         }
         let held = self.holds.clone();
-        fired.extend(self.new_conditions(definition));
+        fired.extend(self.new_conditions());
         self.unmade = (0..held.len()).filter(|i| held[*i] && !self.holds[*i]).collect();
         // Switches that come ever faster with events, such as speeds that turn between impacts, end
         // where these do.
@@ -426,9 +426,9 @@ impl Follower<'_> {
             let event = &definition.events()[*i];
             self.x.copy_from_slice(&new);
             // An earlier event of this moment may have kept a condition from becoming true.
-            if let When::Becomes(e) = &event.when
+            if let Some(e) = self.equation.conditions[*i].clone()
                 && (new != old || mode.is_some())
-                && !self.becomes_true(e, mode, &old)
+                && !self.becomes_true(&e, mode, &old)
             {
                 continue;
             }
@@ -586,17 +586,17 @@ impl Follower<'_> {
                 zeno = Some((all[0], self.t, time + 4.0 * f64::EPSILON * self.t.abs()));
                 with = all[1..].to_vec();
             }
-            newly = self.new_conditions(definition);
+            newly = self.new_conditions();
             // A condition that a switch of this moment would have made false is true anew if it is
             // false here.
-            newly.retain(|i| match &definition.events()[*i].when {
-                When::Becomes(e) if unmade.contains(i) => !self.holds_at(e, &old),
+            newly.retain(|i| match self.equation.conditions[*i].clone() {
+                Some(e) if unmade.contains(i) => !self.holds_at(&e, &old),
                 _ => true,
             });
             newly.extend(struck);
             if self.equation.of_events.iter().any(|asked| !asked.is_empty()) {
                 let ends = [vec![old.clone()], left_behind.clone(), vec![self.x.clone()]];
-                newly.extend(self.true_again(definition, &fired, &ends.concat()));
+                newly.extend(self.true_again(&fired, &ends.concat()));
             }
             if let Some(event) = self.endless(definition, &fired) {
                 zeno = Some((event, self.t, 4.0 * f64::EPSILON * self.t.abs()));
@@ -666,7 +666,7 @@ impl Follower<'_> {
             let sticks = event.sticks && self.stick(definition, &[&[i], &with[..]].concat(), t)?;
             if sticks {
                 self.hold_guards()?;
-                newly.extend(self.new_conditions(definition));
+                newly.extend(self.new_conditions());
             }
             if !sticks {
                 if !quiet {
@@ -745,10 +745,10 @@ impl Follower<'_> {
     fn endless(&mut self, definition: &crate::Definition, fired: &[usize]) -> Option<usize> {
         fired.iter().copied().find(|i| {
             let event = &definition.events()[*i];
-            let When::Becomes(e) = &event.when else { return false };
+            let Some(e) = self.equation.conditions[*i].clone() else { return false };
             let goes_on = self.holds[*i] && event.mode.is_none() && !event.set.is_empty();
             let x = self.x.clone();
-            if !goes_on || self.holds_at(e, &x) {
+            if !goes_on || self.holds_at(&e, &x) {
                 return false;
             }
             let mut field = vec![0.0; self.n];
@@ -765,21 +765,16 @@ impl Follower<'_> {
             for (state, value) in &event.set {
                 after[*state] = self.equation.value(value, self.t, &ahead);
             }
-            self.holds_at(e, &ahead) && !self.holds_at(e, &after)
+            self.holds_at(&e, &ahead) && !self.holds_at(&e, &after)
         })
     }
 
     /// Conditions that hold once events have led from one state to the next, and did not hold at
     /// one of these on the way, or at the last; of an event that is among them, at the last.
-    fn true_again(
-        &mut self,
-        definition: &crate::Definition,
-        fired: &[usize],
-        states: &[Vec<f64>],
-    ) -> Vec<usize> {
+    fn true_again(&mut self, fired: &[usize], states: &[Vec<f64>]) -> Vec<usize> {
         let mut found = Vec::new();
-        for (i, event) in definition.events().iter().enumerate() {
-            let When::Becomes(e) = &event.when else { continue };
+        for i in 0..self.equation.conditions.len() {
+            let Some(e) = self.equation.conditions[i].clone() else { continue };
             if !self.holds[i] {
                 continue;
             }
@@ -797,7 +792,7 @@ impl Follower<'_> {
                 self.equation.of_events[i].iter().copied().partition(stays);
             kept.retain(|guard| !self.sliding.contains(guard));
             let asked = if fired.contains(&i) { &states[1..] } else { states };
-            if !moved.is_empty() && !asked.iter().all(|x| self.holds_but(e, x, &kept)) {
+            if !moved.is_empty() && !asked.iter().all(|x| self.holds_but(&e, x, &kept)) {
                 found.push(i);
             }
         }

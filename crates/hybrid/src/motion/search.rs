@@ -1,5 +1,7 @@
 //! Conditions that a step is searched for, and those that it may have jumped over.
 
+use std::rc::Rc;
+
 use twofold_num::random::RandomStream;
 use twofold_num::tape::Program;
 
@@ -166,11 +168,9 @@ impl Follower<'_> {
         other.sides[guard] = -other.sides[guard];
         self.ask_new(&mut other);
         self.follow_sides(&mut other, &[guard]);
-        let tells = |event: &crate::definition::Event| match &event.when {
-            When::Becomes(e) => self.equation.holds(e, &own) != self.equation.holds(e, &other),
-            _ => false,
-        };
-        if self.model.definition().events().iter().any(tells) {
+        let tells =
+            |e: &Rc<Expression>| self.equation.holds(e, &own) != self.equation.holds(e, &other);
+        if self.equation.conditions.iter().flatten().any(tells) {
             return false;
         }
         let sides = [own, other].map(|config| {

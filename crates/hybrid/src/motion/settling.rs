@@ -1,6 +1,7 @@
 //! Sides of switching functions, and what is known where these are zero.
 
 use std::collections::HashMap;
+use std::rc::Rc;
 
 use twofold_num::random::RandomStream;
 use twofold_num::{Arithmetic as _, Elementary as _};
@@ -1636,30 +1637,30 @@ impl Follower<'_> {
 
     /// The events whose conditions hold on the sides to which the motion goes and not where it is:
     /// x < 0 from x = 0 downwards.
-    pub(super) fn true_right_after(&self, definition: &crate::Definition) -> Vec<usize> {
+    pub(super) fn true_right_after(&self) -> Vec<usize> {
         let mut here = self.config.clone();
         for (guard, side) in here.sides.iter_mut().enumerate() {
             if !self.equation.guards[guard].whole {
                 *side = self.side_of(guard).unwrap_or(0.0);
             }
         }
-        let becomes = |(i, event): (usize, &crate::definition::Event)| match &event.when {
-            When::Becomes(e) => (self.holds[i] && !self.equation.holds(e, &here)).then_some(i),
-            _ => None,
+        let becomes = |(i, condition): (usize, &Option<Rc<Expression>>)| {
+            let e = condition.as_ref()?;
+            (self.holds[i] && !self.equation.holds(e, &here)).then_some(i)
         };
-        definition.events().iter().enumerate().filter_map(becomes).collect()
+        self.equation.conditions.iter().enumerate().filter_map(becomes).collect()
     }
 
     /// The events whose conditions hold now and did not before.
-    pub(super) fn new_conditions(&mut self, definition: &crate::Definition) -> Vec<usize> {
+    pub(super) fn new_conditions(&mut self) -> Vec<usize> {
         let mut new = Vec::new();
         let mut at = self.config.clone();
         // Functions slid upon are equal to zero.
         for guard in self.sliding.iter().filter(|guard| !self.equation.guards[**guard].whole) {
             at.sides[*guard] = 0.0;
         }
-        for (i, event) in definition.events().iter().enumerate() {
-            if let When::Becomes(e) = &event.when {
+        for (i, condition) in self.equation.conditions.iter().enumerate() {
+            if let Some(e) = condition {
                 let now = self.equation.holds(e, &at);
                 if now && !self.holds[i] {
                     new.push(i);

@@ -1001,3 +1001,26 @@ fn what_holds_where_its_mode_begins_is_no_event() {
         }
     }
 }
+
+/// Bounds that are functions of numbers and parameters: false until x = 5 at t = 3, beside any
+/// other switching function.
+#[test]
+fn conditions_see_what_parameters_decide() {
+    let conditions = [
+        "x >= abs(q)",
+        "-max(q, -9) <= x",
+        "not (x < clip(p, 0, 9))",
+        "x >= min(p, 9) and x >= max(q, 2)",
+    ];
+    for (condition, f) in conditions.iter().flat_map(|c| [(c, "sign(x + 9)"), (c, "1.5 - abs(s)")])
+    {
+        let text = format!(
+            "states = ['x', 's', 'n']\nstart = [1, 0.5, 0]\nf = ['{f}', '0', '0']\n\
+            [parameters]\np = 5\nq = -5\n[[event]]\nat = 0.5\nset = {{ x = 'x + 1' }}\n\
+            [[event]]\nwhen = '{condition}'\nset = {{ n = 'n + t' }}"
+        );
+        for outcome in by_each_method(&text, 4.0) {
+            near(outcome.x[2], 3.0, 1e-9);
+        }
+    }
+}
