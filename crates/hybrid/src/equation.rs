@@ -851,7 +851,18 @@ impl Equation {
             return;
         }
         let i = self.guards.len();
-        if !whole {
+        if whole {
+            // One surface, as that of floor(x) beside mod(x, 1).
+            if let Some(sum) = self.whole_key(&expression) {
+                if let Some((other, _)) = self.by_text.get(&sum).copied() {
+                    self.guards[other].chooses |= chooses;
+                    self.guards[other].kink &= kink;
+                    self.by_text.insert(key(&expression), (other, false));
+                    return;
+                }
+                self.by_text.insert(sum, (i, false));
+            }
+        } else {
             self.by_text.insert(key(&mirrored(&expression)), (i, true));
             if let Some((sum, flipped)) = self.sum_key(&expression) {
                 if let Some((other, opposite)) = self.by_text.get(&sum).copied() {
@@ -996,18 +1007,26 @@ impl Equation {
     /// A key that sums of the same states and time share in whatever scale and order they are
     /// written, and whether the sum is the key's negative.
     fn sum_key(&self, e: &Expression) -> Option<(String, bool)> {
+        let sum = self.sum(e)?;
+        let first = sum.factors.first()?.1;
+        Some((sum.key(first), first < 0.0))
+    }
+
+    /// The same of a sum whose whole part is asked for, which has its scale.
+    fn whole_key(&self, e: &Expression) -> Option<String> {
+        let sum = self.sum(e).filter(|sum| !sum.factors.is_empty())?;
+        Some(format!("whole {}", sum.key(1.0)))
+    }
+
+    /// A plain expression that is a sum of variables with constant factors.
+    fn sum(&self, e: &Expression) -> Option<Affine> {
         if !self.is_plain(e) {
             return None;
         }
-        let Affine { constant, mut factors } = affine(&self.record(&[e])).pop()??;
-        factors.retain(|(_, factor)| *factor != 0.0);
-        factors.sort_unstable_by_key(|(variable, _)| *variable);
-        let first = factors.first()?.1;
-        // Without the last digit, in which the same ratio may differ.
-        let scaled = |v: f64| format!("{:.14e}", v / first + 0.0);
-        let terms: Vec<String> =
-            factors.iter().map(|(variable, f)| format!("{variable} {}", scaled(*f))).collect();
-        Some((format!("sum {} {}", terms.join(" "), scaled(constant)), first < 0.0))
+        let mut sum = affine(&self.record(&[e])).pop()??;
+        sum.factors.retain(|(_, factor)| *factor != 0.0);
+        sum.factors.sort_unstable_by_key(|(variable, _)| *variable);
+        Some(sum)
     }
 
     /// The switching functions as text, in the order of a point's signs.
@@ -1504,6 +1523,15 @@ impl Affine {
             };
             (slope + change, size + change.abs())
         })
+    }
+
+    /// What sums of the same states and time have in common, each divided by a scale, without the
+    /// last digit, in which the same ratio may differ.
+    fn key(&self, scale: f64) -> String {
+        let scaled = |v: f64| format!("{:.14e}", v / scale + 0.0);
+        let terms: Vec<String> =
+            self.factors.iter().map(|(variable, f)| format!("{variable} {}", scaled(*f))).collect();
+        format!("sum {} {}", terms.join(" "), scaled(self.constant))
     }
 
     fn plus(mut self, other: &Self, factor: f64) -> Self {

@@ -1,6 +1,6 @@
 //! Sliding on one surface: where it begins, ends and jumps away.
 
-use super::{end, end_of, last, model, near, run, shipped};
+use super::{by_each_method, end, end_of, last, model, near, run, shipped};
 use crate::motion::{Exit, Method, Record};
 use crate::{Definition, Ending, Model, Options, follow};
 
@@ -776,5 +776,18 @@ fn sliding_ends_before_its_sides_have_one_speed() {
         let x = end_of(two, 4.0, method).unwrap();
         near(x[0], -4.5, 1e-9);
         near(x[1], 20.0 * (1.0 - 0.23_f64.cos()), 1e-9);
+    }
+}
+
+/// The jumps of floor(x) and mod(x, 1) are one surface, slid upon with 0.35 of its upper side.
+#[test]
+fn whole_parts_of_one_quotient_are_one_surface() {
+    for saw in ["mod(x, 1)", "mod(3*x, 3)/3", "x - floor(x)", "4*mod(0.25*x, 0.25)"] {
+        let text =
+            format!("states = ['x', 'y']\nstart = [0.3, 0]\nf = ['0.7 - 2*floor(x)', '{saw}']");
+        for outcome in by_each_method(&text, 3.0) {
+            near(outcome.x[0], 1.0, 1e-12);
+            near(outcome.x[1], 1.95, 1e-9);
+        }
     }
 }
