@@ -1525,7 +1525,7 @@ impl Affine {
         })
     }
 
-    /// What sums of the same states and time have in common, each divided by a scale, without the
+    /// The part that sums of the same states and time share, each divided by a scale, without the
     /// last digit, in which the same ratio may differ.
     fn key(&self, scale: f64) -> String {
         let scaled = |v: f64| format!("{:.14e}", v / scale + 0.0);
