@@ -879,8 +879,29 @@ impl Follower<'_> {
         }
         sliding.sort_unstable();
         self.adopt(config, sliding);
+        if zero.len() > 1 {
+            self.forget_what_jumped(zero);
+        }
         if self.cells.is_none() {
             self.corners = Vec::new();
+        }
+    }
+
+    /// Of functions that have been met at zero those that another one's switch has moved from it,
+    /// as that of abs(2*heaviside(z) - 2 + y) where y and z are zero, do not leave it in the next
+    /// step: there are no roundings to be put to zero.
+    fn forget_what_jumped(&mut self, zero: &[usize]) {
+        let values = self.watched_values();
+        for guard in zero.iter().copied().filter(|guard| !self.slides[*guard]) {
+            let Some(place) = self.compiled.place(guard) else { continue };
+            let (own, side) = (&self.equation.guards[guard], self.config.sides[guard]);
+            let inside = match own.whole {
+                true => (values[place] - side).min(side + 1.0 - values[place]),
+                false => values[place] * side,
+            };
+            if inside > 1e-9 * self.magnitude(&own.expression) {
+                (self.fresh_guard[guard], self.tangent_guard[guard]) = (false, false);
+            }
         }
     }
 

@@ -1,6 +1,6 @@
 //! Several switching surfaces at once, and sliding of higher order.
 
-use super::{end, end_of, model, near, run};
+use super::{by_each_method, end, end_of, model, near, run};
 use crate::motion::{Exit, Method, Record};
 use crate::{Ending, HybridError, Options, follow};
 
@@ -954,5 +954,23 @@ fn sliding_of_higher_order_is_followed() {
         let f = "['-1.5e-3*sign(x)*sqrt(abs(x)) + w + 3e-7*cos(t)', '-1.1e-6*sign(x)']";
         let text = format!("states = ['x', 'w']\nstart = [4e-7, 0]\nf = {f}");
         near(end_of(&text, 10.0, method).unwrap()[1], -3e-7 * c, 1e-18);
+    }
+}
+
+/// Functions of a sign that are zero with it at the start, and jump from zero as it does: y = t and
+/// z = -t have one sign each from then on.
+#[test]
+fn functions_that_jump_from_zero_at_the_start_stay_on_their_side() {
+    for (f, want) in [
+        ("max(1 - heaviside(z), y)", 0.5),
+        ("abs(2*heaviside(z) - 2 + y)", 0.875),
+        ("if(1 - heaviside(z) > y, 1, 0)", 0.5),
+        ("min(heaviside(z), -y)", -0.125),
+        ("clip(2*sign(z) + y + 3, 1, 2)", 0.5 + 0.125),
+    ] {
+        let text = format!("states = ['x', 'y', 'z']\nstart = [0, 0, 0]\nf = ['{f}', '1', '-1']");
+        for outcome in by_each_method(&text, 0.5) {
+            near(outcome.x[0], want, 1e-9);
+        }
     }
 }
