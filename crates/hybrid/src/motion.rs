@@ -887,12 +887,13 @@ fn scale_now(follower: &Follower, step: &Step, out: &mut Vec<f64>) {
                 let grows = before > 0.0 && step.x[i].abs() > before.max(0.5 * follower.size[i]);
                 let ends = grows && resolves && step.h < AT_THE_END * step.t.abs();
                 let most = if ends { MOST_OF_SIZE * before } else { f64::INFINITY };
+                // Before a millionth of the run is over no speed has been seen to last so long:
+                // one that falls is taken to fall to zero.
                 let [first, last] = [0, 6].map(|k: usize| step.k[k][i].abs());
                 let time = 1e-6 * span;
-                // Not until such a part of the run is over has it been seen to.
-                let begins = step.t - options.t_start < time && last < first;
-                let lasts = if begins { step.h * first / (first - last) } else { time };
-                let least = (0.1 * moved).max((lasts.min(time) * speed).min(most));
+                let falls = step.t - options.t_start < time && last < first;
+                let lasts = if falls { time.min(step.h * first / (first - last)) } else { time };
+                let least = (0.1 * moved).max((lasts * speed).min(most));
                 // A rounding error without a bound leaves the old size.
                 let size = size.max(if put { follower.width(i) } else { 0.01 * known });
                 options.rtol * size.max(least)

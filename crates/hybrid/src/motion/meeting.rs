@@ -607,14 +607,15 @@ impl Follower<'_> {
                 newly.extend(blown);
             }
             // A condition that holds where its mode begins has not become true.
-            let began = mode.filter(|mode| *mode != mode_before);
-            let here = self.x.clone();
-            newly.retain(|i| match &definition.events()[*i] {
-                Event { when: When::Becomes(e), from, .. } if began.is_some() && *from == began => {
-                    !self.holds_at(e, &here)
-                }
-                _ => true,
-            });
+            if mode.is_some_and(|mode| mode != mode_before) {
+                let here = self.x.clone();
+                newly.retain(|i| match &definition.events()[*i] {
+                    Event { when: When::Becomes(e), from, .. } if *from == mode => {
+                        !self.holds_at(e, &here)
+                    }
+                    _ => true,
+                });
+            }
             newly.sort_unstable();
             newly.dedup();
             // A state that may stick to a surface is not let through it without a word.
